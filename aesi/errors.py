@@ -1,0 +1,41 @@
+"""Errors a user can act on: what was found, where, and what to do.
+
+Every error the package raises on purpose is an `AesiError`, so that the command line turns it into one
+sentence and an exit code. An expected failure inside a search is a value, `aesi.records.Failed`.
+"""
+
+
+class AesiError(Exception):
+    """Root of all errors raised on purpose; `exit_code` is what the command line returns."""
+
+    exit_code = 1
+
+
+class InputError(AesiError, ValueError):
+    """A file, a table or an argument from the user cannot be used as it is."""
+
+    exit_code = 2
+
+
+class ParameterError(InputError):
+    """A parameter lies outside its declared bounds."""
+
+
+class DataError(InputError):
+    """A measurement is malformed, contradicts itself, or does not fit the cell."""
+
+
+class CellError(InputError):
+    """A cell file fails its schema or lacks a field that is needed."""
+
+
+class ConfigError(InputError):
+    """An experiment file has an unknown key or an inadmissible value."""
+
+
+class SimulationError(AesiError, RuntimeError):
+    """The model cannot be evaluated on this input (a stoichiometry ran out, a solver did not converge)."""
+
+
+class FitError(AesiError, RuntimeError):
+    """An estimation cannot be carried out on these data."""

@@ -1,0 +1,11 @@
+"""Array types used in annotations; shapes are stated in the docstrings."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.int64]
+AnyArray = NDArray[Any]

@@ -1,0 +1,95 @@
+"""A physical parameter, declared once: default, unit, bounds and where the range comes from.
+
+The check, the box of a fit, the range of a search and the table in the documentation all read this record.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.errors import ParameterError
+from aesi.numerics.typing import Array
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One scalar parameter.
+
+    `default` is the value at which an effect is typically seen; `neutral` is the value at which it vanishes
+    (None where it has none). `log` asks for a search on a logarithmic scale.
+    """
+
+    default: float
+    unit: str
+    bounds: tuple[float, float]
+    source: str
+    log: bool = False
+    neutral: float | None = None
+    description: str = ""
+
+    def __post_init__(self) -> None:
+        low, high = self.bounds
+        if not low < high:
+            raise ParameterError(f"bounds [{low:g}, {high:g}] {self.unit} are empty; give low < high.")
+        if self.log and low <= 0:
+            raise ParameterError(
+                f"a logarithmic scale needs a positive lower bound, not {low:g} {self.unit}."
+            )
+        self.check("default", self.default)
+
+    def check(self, name: str, value: float) -> float:
+        """Return `value` if it lies within the bounds.
+
+        Raises ParameterError naming the value, the range and its source.
+        """
+        low, high = self.bounds
+        if low <= value <= high:  # this way round, NaN fails too
+            return value
+        raise ParameterError(
+            f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit}, "
+            f"the range from {self.source}. If the cell warrants it, widen it where {name} is declared."
+        )
+
+    def to_unit_interval(self, value: float) -> float:
+        """Map [low, high] to [0, 1], on the logarithm where `log`."""
+        low, high = self.bounds
+        if self.log:
+            return float(np.log(value / low) / np.log(high / low))
+        return (value - low) / (high - low)
+
+    def from_unit_interval(self, u: float) -> float:
+        """Inverse of `to_unit_interval`."""
+        low, high = self.bounds
+        if self.log:
+            return float(low * (high / low) ** u)
+        return low + u * (high - low)
+
+
+def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> dict[str, float]:
+    """Defaults overlaid with `values`, each within its bounds.
+
+    Raises ParameterError for an unknown name (with the nearest match) or a value out of bounds.
+    """
+    from difflib import get_close_matches
+
+    for name in values:
+        if name not in parameters:
+            near = get_close_matches(name, list(parameters), n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else ""
+            raise ParameterError(
+                f"unknown parameter {name!r}{hint} Known: {', '.join(parameters) or 'none'}."
+            )
+    return {name: p.check(name, float(values.get(name, p.default))) for name, p in parameters.items()}
+
+
+def to_vector(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> Array:
+    """Values as a vector in [0, 1]^n, in declaration order."""
+    return np.array([p.to_unit_interval(values[name]) for name, p in parameters.items()])
+
+
+def from_vector(parameters: Mapping[str, Parameter], vector: Array) -> dict[str, float]:
+    """Inverse of `to_vector`."""
+    return {n: p.from_unit_interval(float(u)) for (n, p), u in zip(parameters.items(), vector, strict=True)}

@@ -1,0 +1,197 @@
+"""Frozen records that pass between the rooms: data, simulations, error series, failures.
+
+SI units and seconds; current is positive on discharge; voltage error e = V_measured - V_model, in volts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Literal, Protocol
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array, BoolArray
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Hold = Literal["linear", "backward"]
+"""How the current runs between samples: straight lines, or constant since the row before (as loggers write)."""
+
+
+def digest(*arrays: Array | None) -> str:
+    """SHA-256 of the bytes of the arrays, 16 hexadecimal digits; None counts as an empty array."""
+    sha = hashlib.sha256()
+    for array in arrays:
+        sha.update(b"|" if array is None else np.ascontiguousarray(array, dtype=float).tobytes())
+    return sha.hexdigest()[:16]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One continuous test of one cell.
+
+    time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V.
+    temperature_degc : (n,) degC, or None where it was not measured.
+    notes : what a reader dropped, mapped or resampled, one sentence each.
+    """
+
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+    temperature_degc: Array | None = None
+    name: str = "measurement"
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        n = len(self.time_s)
+        for label in ("current_a", "voltage_v", "temperature_degc"):
+            column = getattr(self, label)
+            if column is not None and len(column) != n:
+                raise DataError(f"{self.name}: {label} has {len(column)} rows, time_s has {n}.")
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def digest(self) -> str:
+        """Content hash of the four columns."""
+        return digest(self.time_s, self.current_a, self.voltage_v, self.temperature_degc)
+
+    def take(self, rows: slice | Array) -> Measurement:
+        """The given rows, as a measurement of the same name."""
+        temperature = None if self.temperature_degc is None else self.temperature_degc[rows]
+        return replace(
+            self,
+            time_s=self.time_s[rows],
+            current_a=self.current_a[rows],
+            voltage_v=self.voltage_v[rows],
+            temperature_degc=temperature,
+        )
+
+    def between(self, start_s: float, stop_s: float) -> Measurement:
+        """The rows with start_s <= time_s < stop_s."""
+        low, high = np.searchsorted(self.time_s, [start_s, stop_s])
+        return self.take(slice(int(low), int(high)))
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One simulation: voltage and the internal states, a value a sample.
+
+    series : name -> (n,) array. Always there: c_sp, c_sn (surface, mol/m3), c_e0, c_eL (electrolyte at the
+    negative and the positive current collector, mol/m3), soc, temperature_k; effects add their own.
+    """
+
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+    series: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def states(self) -> pd.DataFrame:
+        """The series as a table, one row a sample."""
+        import pandas as pd
+
+        return pd.DataFrame(self.series)
+
+
+INPUT_NAMES = ("I", "c_sp", "c_sn", "c_e0", "c_eL")
+"""The inputs U of the sparse model, in the paper's order."""
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorSeries:
+    """The voltage error over one continuous, evenly sampled record, and what may drive it.
+
+    error_v : (n,) V, V_measured - V_model.  inputs : (n, n_inputs) SI, columns `input_names`.
+    soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
+    The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
+    """
+
+    name: str
+    dt_s: float
+    time_s: Array
+    error_v: Array
+    inputs: Array
+    soc: Array
+    model_v: Array
+    input_names: tuple[str, ...] = INPUT_NAMES
+
+    def __len__(self) -> int:
+        return len(self.error_v)
+
+    @property
+    def current_a(self) -> Array:
+        """(n,) A, discharge positive."""
+        return self.inputs[:, self.input_names.index("I")]
+
+    @property
+    def digest(self) -> str:
+        """Content hash of error and inputs."""
+        return digest(self.error_v, self.inputs)
+
+    def take(self, rows: slice, name: str | None = None) -> ErrorSeries:
+        """A contiguous piece of the record."""
+        return replace(
+            self,
+            name=name or self.name,
+            time_s=self.time_s[rows],
+            error_v=self.error_v[rows],
+            inputs=self.inputs[rows],
+            soc=self.soc[rows],
+            model_v=self.model_v[rows],
+        )
+
+
+@dataclass(frozen=True)
+class Split:
+    """Records by role. The test records choose nothing: they are met once, by the model already chosen."""
+
+    train: tuple[ErrorSeries, ...]
+    valid: tuple[ErrorSeries, ...]
+    test: tuple[ErrorSeries, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRun:
+    """A prediction without measured voltage after its start.
+
+    error_v : (n,) V, the predicted error; held at its last value inside the range after a divergence.
+    diverged_at : the first sample at which the prediction left ten times the trained range, or None.
+    outside : (n,) True where an input lies outside the range the model was trained on.
+    """
+
+    error_v: Array
+    diverged_at: int | None
+    outside: BoolArray
+
+
+class ErrorModel(Protocol):
+    """What every model of the voltage error offers: sparse ensembles, baselines, the bare ESPM (zero)."""
+
+    name: str
+
+    def one_step(self, series: ErrorSeries) -> Array:
+        """(n,) V: the prediction of error_v[k] given the measured error_v[k - 1]; the first is error_v[0]."""
+        ...
+
+    def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
+        """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
+        ...
+
+    def k_step(self, series: ErrorSeries, steps: int) -> Array:
+        """(n,) V: the prediction of error_v[k] given error_v[k - steps] and the inputs since; first
+        `steps` values as in a free run from the first sample."""
+        ...
+
+
+@dataclass(frozen=True)
+class Failed:
+    """An expected failure inside a search or a fit: a value, not an exception."""
+
+    reason: str
+    time_s: float | None = None
