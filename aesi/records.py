@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Hold = Literal["linear", "backward"]
-"""How the current runs between samples: straight lines, or constant since the row before (as loggers write)."""
+"""How the current runs between samples: straight lines, or constant since the row before (as loggers do)."""
 
 
 def digest(*arrays: Array | None) -> str:
