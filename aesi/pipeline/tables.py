@@ -1,0 +1,255 @@
+"""The tables of the paper, from plain rows to Markdown, LaTeX and CSV.
+
+A row is an entry of `models` in a run's summary.json. Every value is optional and shows as a dash where it is
+absent; beyond the published schema a row may carry
+
+    free_run   {train,valid,test}_{mser_pct,rmse_mv}, diverged (the number of records left behind)
+    one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
+    k_step     {"1": mV, "10": mV, ...}: test RMSE, keyed by the horizon in seconds
+    intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct (one step ahead)
+    free_run_intervals   the same keys, in free run
+    spread     {"seeds": n, "test_mser_pct": [low, high]}
+    seconds    wall time of fit and evaluation
+
+Captions name the regime, because figures of the two regimes must never be read side by side.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+Row = Mapping[str, Any]
+Format = Literal["md", "tex", "csv"]
+
+ABSENT = "–"
+MILLIVOLT_PER_VOLT = 1e3
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table ready to be set: `key` names it in LaTeX labels, `rows` hold formatted cells, name first."""
+
+    key: str
+    caption: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def free_run_table(models: Sequence[Row]) -> Table:
+    """Table 1: mean squared error reduction against the bare ESPM, in free run."""
+    columns: list[Column] = [
+        ("MSER train, %", lambda row: _number(row, "free_run.train_mser_pct", 2)),
+        ("MSER valid, %", lambda row: _number(row, "free_run.valid_mser_pct", 2)),
+        ("MSER test, %", _test_mser),
+        ("RMSE test, mV", lambda row: _number(row, "free_run.test_rmse_mv", 2)),
+        ("terms", lambda row: _number(row, "terms", 0)),
+        ("time, s", lambda row: _number(row, "seconds", 1)),
+    ]
+    caption = (
+        "Table 1. Mean squared error reduction (MSER) of the voltage against the bare ESPM. Regime: free "
+        "run, the error estimate feeds back on itself and no measured voltage is used after the first sample."
+    )
+    seeds = _seeds(models)
+    if seeds:
+        caption += f" In brackets: lowest and highest of {seeds} seeds."
+    return _table("mser", caption, columns, models)
+
+
+def interval_table(models: Sequence[Row]) -> Table:
+    """Table 2: prediction intervals one step ahead."""
+    caption = (
+        "Table 2. Prediction intervals on the test set. Regime: one step ahead, the measured voltage of the "
+        "step before is given. Worst bin: the lowest coverage in any (current, SOC) bin. Winkler score: "
+        "width plus the penalty for misses; lower is better."
+    )
+    return _table("intervals", caption, _interval_columns("intervals"), _having(models, "intervals"))
+
+
+def free_run_band_table(models: Sequence[Row]) -> Table:
+    """Prediction bands of a free run."""
+    caption = (
+        "Prediction bands on the test set. Regime: free run, no measured voltage after the first sample. "
+        "Worst bin: the lowest coverage in any (current, SOC) bin."
+    )
+    rows = _having(models, "free_run_intervals")
+    return _table("free-run-bands", caption, _interval_columns("free_run_intervals"), rows)
+
+
+def one_step_table(models: Sequence[Row]) -> Table:
+    """One step ahead, beside persistence."""
+    columns: list[Column] = [
+        ("RMSE train, mV", lambda row: _number(row, "one_step.train_rmse_mv", 3)),
+        ("RMSE valid, mV", lambda row: _number(row, "one_step.valid_rmse_mv", 3)),
+        ("RMSE test, mV", lambda row: _number(row, "one_step.test_rmse_mv", 3)),
+        ("persistence test, mV", lambda row: _number(row, "one_step.persistence_rmse_mv", 3)),
+    ]
+    caption = (
+        "Voltage error one step ahead. Regime: one step ahead, the measured voltage of the step before is "
+        "given. Persistence repeats the last measured error; a model that does not beat it learnt an echo."
+    )
+    return _table("one-step", caption, columns, _having(models, "one_step"))
+
+
+def k_step_table(models: Sequence[Row]) -> Table:
+    """Test RMSE by horizon, between one step ahead and free run."""
+    rows = _having(models, "k_step")
+    horizons = sorted({key for row in rows for key in row["k_step"]}, key=float)
+    columns = [(f"{horizon} s, mV", _k_step_cell(horizon)) for horizon in horizons]
+    caption = (
+        "Voltage RMSE on the test set by horizon. Regime: the measured voltage is given once, the stated "
+        "time before the sample that is predicted, and not again."
+    )
+    return _table("k-step", caption, columns, rows)
+
+
+TABLES: tuple[Callable[[Sequence[Row]], Table], ...] = (
+    free_run_table,
+    one_step_table,
+    k_step_table,
+    interval_table,
+    free_run_band_table,
+)
+
+
+def all_tables(models: Sequence[Row]) -> tuple[Table, ...]:
+    """Every table that has at least one row and one column of values."""
+    built = (build(models) for build in TABLES)
+    return tuple(table for table in built if table.rows and len(table.header) > 1)
+
+
+def render(models: Sequence[Row], format: Format = "md") -> str:
+    """All tables of one run as one text, in the given format."""
+    write = {"md": to_markdown, "tex": to_latex, "csv": to_csv}[format]
+    return "\n".join(write(table) for table in all_tables(models))
+
+
+def to_markdown(table: Table) -> str:
+    """Caption, then a pipe table with the numbers aligned to the right."""
+    rule = ["---"] + ["---:"] * (len(table.header) - 1)
+    lines = [_pipe(table.header), "|" + "|".join(rule) + "|", *(_pipe(row) for row in table.rows)]
+    return f"{table.caption}\n\n" + "\n".join(lines) + "\n"
+
+
+def to_latex(table: Table) -> str:
+    """A floating table in the style of booktabs; needs that package and a UTF-8 engine or inputenc."""
+    body = [_ampersand(table.header), r"\midrule", *(_ampersand(row) for row in table.rows)]
+    return "\n".join(
+        [
+            r"\begin{table}[htbp]",
+            r"\centering",
+            rf"\caption{{{_tex(table.caption)}}}",
+            rf"\label{{tab:{table.key}}}",
+            rf"\begin{{tabular}}{{l{'r' * (len(table.header) - 1)}}}",
+            r"\toprule",
+            *body,
+            r"\bottomrule",
+            r"\end{tabular}",
+            r"\end{table}",
+            "",
+        ]
+    )
+
+
+def to_csv(table: Table) -> str:
+    """The caption as a comment line, then comma-separated cells; absent values are empty."""
+    out = io.StringIO()
+    out.write(f"# {table.caption}\n")
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(table.header)
+    writer.writerows([["" if cell == ABSENT else cell for cell in row] for row in table.rows])
+    return out.getvalue()
+
+
+Column = tuple[str, Callable[[Row], str]]
+
+
+def _table(key: str, caption: str, columns: Sequence[Column], models: Sequence[Row]) -> Table:
+    """Set the columns that have a value in at least one row."""
+    cells = [[cell(row) for row in models] for _, cell in columns]
+    kept = [i for i, column in enumerate(cells) if any(cell != ABSENT for cell in column)]
+    header = ("model", *(columns[i][0] for i in kept))
+    rows = tuple((str(row["name"]), *(cells[i][j] for i in kept)) for j, row in enumerate(models))
+    return Table(key, caption, header, rows)
+
+
+def _interval_columns(group: str) -> list[Column]:
+    return [
+        ("nominal, %", lambda row: _number(row, f"{group}.nominal_pct", 0)),
+        ("coverage, %", lambda row: _number(row, f"{group}.coverage_pct", 2)),
+        ("worst bin, %", lambda row: _number(row, f"{group}.worst_bin_coverage_pct", 2)),
+        ("average width, mV", lambda row: _number(row, f"{group}.average_width_v", 3, MILLIVOLT_PER_VOLT)),
+        ("Winkler, mV", lambda row: _number(row, f"{group}.winkler_v", 3, MILLIVOLT_PER_VOLT)),
+    ]
+
+
+def _test_mser(row: Row) -> str:
+    text = _number(row, "free_run.test_mser_pct", 2)
+    diverged = _find(row, "free_run.diverged")
+    if diverged:
+        text += f" ({int(diverged)} diverged)"
+    spread = _find(row, "spread.test_mser_pct")
+    return text if spread is None else f"{text} [{spread[0]:.2f}, {spread[1]:.2f}]"
+
+
+def _k_step_cell(horizon: str) -> Callable[[Row], str]:
+    return lambda row: _formatted(row["k_step"].get(horizon), 2)
+
+
+def _seeds(models: Sequence[Row]) -> int:
+    return max((int(_find(row, "spread.seeds") or 0) for row in models), default=0)
+
+
+def _having(models: Sequence[Row], group: str) -> list[Row]:
+    return [row for row in models if row.get(group)]
+
+
+def _find(row: Row, path: str) -> Any:
+    value: Any = row
+    for key in path.split("."):
+        if not isinstance(value, Mapping) or key not in value:
+            return None
+        value = value[key]
+    return value
+
+
+def _number(row: Row, path: str, digits: int, factor: float = 1.0) -> str:
+    value = _find(row, path)
+    return _formatted(None if value is None else value * factor, digits)
+
+
+def _formatted(value: float | None, digits: int) -> str:
+    if value is None or math.isnan(value):
+        return ABSENT
+    return f"{value:.{digits}f}"
+
+
+def _pipe(cells: Sequence[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
+
+
+def _ampersand(cells: Sequence[str]) -> str:
+    return " & ".join(_tex(cell) for cell in cells) + r" \\"
+
+
+_TEX = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    ABSENT: "--",
+}
+
+
+def _tex(text: str) -> str:
+    return "".join(_TEX.get(character, character) for character in text)
