@@ -1,0 +1,341 @@
+"""What an experiment is: one validated record read from a YAML file.
+
+Files an experiment reads are named relative to its YAML file. What it writes goes below the workspace; an
+experiment's name becomes a folder there and can therefore hold letters, digits, `_` and `-` alone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from aesi.errors import ConfigError
+from aesi.records import INPUT_NAMES, Hold
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+Range = tuple[float, float]
+Share = Annotated[float, Field(gt=0, lt=1)]
+Positive = Annotated[float, Field(gt=0)]
+Count = Annotated[int, Field(ge=1)]
+
+
+class Section(BaseModel):
+    """Base of all sections: frozen, and unknown keys are refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class RepeatsConfig(Section):
+    """One record that repeats a schedule, cut into its repeats (numbered from 1).
+
+    The last `valid_share` of every training repeat validates, so that validation spans the state of charge.
+    """
+
+    period_s: Positive
+    train: tuple[Count, ...]
+    test: tuple[Count, ...]
+    valid_share: Share = 0.2
+
+    @model_validator(mode="after")
+    def _apart(self) -> RepeatsConfig:
+        both = sorted(set(self.train) & set(self.test))
+        if both:
+            raise ValueError(f"repeat {both[0]} is in train and in test; a repeat has one role")
+        return self
+
+
+class VirtualConfig(Section):
+    """How a virtual measurement is made (kind: virtual)."""
+
+    model: Literal["DFN", "SPMe"] = "DFN"
+    effects: tuple[str, ...] = ()
+    magnitude: Positive = 1.0
+    soc0: Annotated[float, Field(gt=0, le=1)] = 0.9
+    pulse_c: Annotated[float, Field(ge=0)] = 5.0
+    voltage_noise_v: Annotated[float, Field(ge=0)] = 1e-3
+    current_noise_a: Annotated[float, Field(ge=0)] = 4e-3
+    voltage_step_v: Annotated[float, Field(ge=0)] = 0.0
+    seed: int = 0
+
+
+class DataConfig(Section):
+    """Records by role, or one record cut by repeats.
+
+    files: paths of measurement files; catalogue: names of records of the data set `set`;
+    virtual: names of bundled drive schedules that the laboratory runs. `repeats` cuts the one file or record
+    `record`.
+    """
+
+    kind: Literal["files", "catalogue", "virtual"]
+    set: str | None = None
+    record: str | None = None
+    repeats: RepeatsConfig | None = None
+    train: tuple[str, ...] = ()
+    valid: tuple[str, ...] = ()
+    test: tuple[str, ...] = ()
+    dt_s: Positive = 1.0
+    hold: Hold = "backward"
+    columns: dict[str, str] = {}
+    sign: Literal["discharge-positive", "charge-positive"] = "discharge-positive"
+    virtual: VirtualConfig = VirtualConfig()
+
+    @model_validator(mode="after")
+    def _complete(self) -> DataConfig:
+        if self.kind == "catalogue" and not self.set:
+            raise ValueError("kind: catalogue needs `set`, the name of a data set (`aesi data list`)")
+        if self.repeats:
+            if not self.record:
+                raise ValueError("`repeats` needs `record`, the record to cut")
+        elif not (self.train and self.test):
+            raise ValueError("give `train` and `test` records, or one `record` with `repeats`")
+        return self
+
+
+class CellConfig(Section):
+    """The cell: a BPX file, or `catalogue` for the one that belongs to the data set.
+
+    soc0 : state of charge at the first row; None finds it from the rest voltage.
+    effects : id -> parameters, effects added to the declared cell.
+    """
+
+    bpx: str = "catalogue"
+    soc0: Annotated[float, Field(ge=0, le=1)] | None = None
+    effects: dict[str, dict[str, float]] = {}
+
+
+class LibraryConfig(Section):
+    """The candidate terms the search may choose from."""
+
+    p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (1, 2)
+    d: tuple[Annotated[int, Field(ge=1, le=5)], Annotated[int, Field(ge=1, le=5)]] = (1, 3)
+    functions: tuple[str, ...] = ("sin", "cos", "tan", "sinh", "cosh", "tanh")
+    inputs: tuple[str, ...] = INPUT_NAMES
+
+
+class SearchConfig(Section):
+    """The evolutionary search, in the paper's symbols.
+
+    block : rows of a bootstrap block.  weights : gamma of the losses (out-of-bag, validation, sparsity) in
+    the scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints.
+    timeout_s, memory_mb : what one candidate may take before it counts as failed.
+    """
+
+    candidates: Count = 40
+    population: Annotated[int, Field(ge=2)] = 20
+    resamples: Annotated[int, Field(ge=2)] = 100
+    block: Annotated[int, Field(ge=1)] = 500
+    top_share: Annotated[float, Field(gt=0, le=1)] = 0.1
+    lambda1: tuple[Positive, Positive] = (1e-13, 1e-1)
+    lambda2: tuple[Positive, Positive] = (1e-2, 5.0)
+    tau: tuple[Share, Share] = (0.3, 0.7)
+    pearson_train: Annotated[float, Field(ge=-1, le=1)] = 0.5
+    pearson_valid: Annotated[float, Field(ge=-1, le=1)] = 0.5
+    weights: tuple[float, float, float] = (0.25, 0.7, 0.05)
+    timeout_s: Positive = 300.0
+    memory_mb: Positive = 6000.0
+    workers: Count = 1
+
+    @field_validator("lambda1", "lambda2", "tau")
+    @classmethod
+    def _ordered(cls, value: Range) -> Range:
+        if not value[0] < value[1]:
+            raise ValueError(f"the range [{value[0]:g}, {value[1]:g}] is empty; give low < high")
+        return value
+
+
+class ConformalConfig(Section):
+    """Prediction intervals: `method` is a name in `aesi.conformal.METHODS`; horizons for free-run bands."""
+
+    method: str = "linear"
+    alpha: Share = 0.1
+    window: Annotated[int, Field(ge=2)] = 200
+    horizons_s: tuple[Positive, ...] = (1.0, 10.0, 60.0)
+    compare: tuple[str, ...] = ()
+
+
+class TrackingConfig(Section):
+    """Where runs are tracked: an MLflow URI, or None for the SQLite store of the workspace."""
+
+    uri: str | None = None
+    register_model: bool = True
+    system_metrics: bool = True
+
+
+class RunnerConfig(Section):
+    """Who evaluates candidates: worker processes here, or Dask workers (`address` of a scheduler, or local).
+
+    storage : a database URL where several `aesi worker` processes share the candidates of one study.
+    """
+
+    kind: Literal["local", "dask"] = "local"
+    address: str | None = None
+    storage: str | None = None
+
+
+class DiscoverConfig(Section):
+    """What `aesi discover` needs beyond cell and data: files by role, or one record and a holdout share."""
+
+    fit: tuple[str, ...] = ()
+    test: tuple[str, ...] = ()
+    fit_until_s: Positive | None = None
+    test_until_s: Positive | None = None
+    holdout: Share = 0.3
+    max_effects: Annotated[int, Field(ge=0, le=10)] = 3
+
+
+class FallbackConfig(Section):
+    """What to run instead where the measured data cannot be had."""
+
+    data: DataConfig
+    cell: CellConfig
+
+
+ModelName = Literal["ESPM", "AESI I", "AESI II", "SINDy-C", "ridge", "gradient boosting"]
+
+
+class ExperimentConfig(Section):
+    """One experiment. `base` is the folder its relative paths start from; it is not part of its identity."""
+
+    name: str
+    note: str = ""
+    seed: Annotated[int, Field(ge=0)] = 0
+    data: DataConfig
+    cell: CellConfig = CellConfig()
+    fallback: FallbackConfig | None = None
+    library: LibraryConfig = LibraryConfig()
+    search: SearchConfig = SearchConfig()
+    conformal: ConformalConfig = ConformalConfig()
+    models: tuple[ModelName, ...] = get_args(ModelName)
+    tracking: TrackingConfig = TrackingConfig()
+    runner: RunnerConfig = RunnerConfig()
+    discover: DiscoverConfig | None = None
+    base: Path = Field(default_factory=Path.cwd, exclude=True)
+
+    @field_validator("name")
+    @classmethod
+    def _is_a_folder_name(cls, value: str) -> str:
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}", value):
+            raise ValueError(
+                f"{value!r} has to be letters, digits, `_` and `-`: it becomes a folder below runs/"
+            )
+        return value
+
+    def path(self, name: str) -> Path:
+        """A file the experiment reads: absolute, or relative to the experiment's own folder."""
+        path = Path(name).expanduser()
+        return path if path.is_absolute() else (self.base / path).resolve()
+
+    @property
+    def digest(self) -> str:
+        """Content hash of what decides the result; who computes and where it is tracked does not."""
+        content = self.model_dump(mode="json", exclude={"note", "tracking", "runner", "base"})
+        for key in ("workers", "timeout_s", "memory_mb"):
+            content["search"].pop(key)
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> ExperimentConfig:
+    """The experiment in a YAML file, with `key.subkey=value` overrides laid over it.
+
+    Raises ConfigError in one sentence: file, key, what was found, what is admissible.
+    """
+    import yaml
+
+    path = Path(path)
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: there is no such experiment file.{_neighbours(path)}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read as text ({error}).") from None
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{path}: is not YAML ({' '.join(str(error).split())}).") from None
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path}: holds no keys; an experiment starts with `name:`, `data:`, `cell:`.")
+    for override in overrides:
+        _override(content, override)
+    return parse_experiment(content, base=path.resolve().parent, where=str(path))
+
+
+def parse_experiment(
+    content: Mapping[str, Any], base: Path | None = None, where: str = "experiment"
+) -> ExperimentConfig:
+    """The experiment in a mapping. Raises ConfigError like `read_experiment`; `where` names the source."""
+    try:
+        return ExperimentConfig.model_validate({**content, "base": base or Path.cwd()})
+    except ValidationError as error:
+        raise ConfigError(f"{where}: {_sentence(error.errors()[0])}") from None
+
+
+def _neighbours(path: Path) -> str:
+    if not path.parent.is_dir():
+        return ""
+    names = sorted(p.name for p in path.parent.glob("*.yaml"))
+    near = get_close_matches(path.name, names, n=1)
+    if near:
+        return f" Did you mean {path.parent / near[0]}?"
+    return f" There are: {', '.join(names)}." if names else ""
+
+
+def _override(content: dict[str, Any], override: str) -> None:
+    """Lay `a.b=value` over the mapping, the value read as YAML."""
+    import yaml
+
+    key, equals, text = override.partition("=")
+    parts = [part.strip() for part in key.split(".")]
+    if not equals or not all(parts):
+        raise ConfigError(f"--set {override}: has to read key=value, for instance search.candidates=50.")
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ConfigError(f"--set {override}: {text!r} is not a YAML value.") from None
+    for depth, part in enumerate(parts[:-1]):
+        child = content.setdefault(part, {})
+        if not isinstance(child, dict):
+            raise ConfigError(f"--set {override}: {'.'.join(parts[: depth + 1])} is a value and has no keys.")
+        content = child
+    content[parts[-1]] = value
+
+
+def _sentence(detail: ErrorDetails) -> str:
+    """One pydantic error as a sentence that says where, what was found and what to do."""
+    location = [str(part) for part in detail["loc"]]
+    key = ".".join(location) or "the experiment"
+    if detail["type"] == "extra_forbidden":
+        known = _keys_at(location[:-1])
+        near = get_close_matches(location[-1], known, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else f" Known here: {', '.join(known)}."
+        return f"unknown key {key!r}.{hint}"
+    if detail["type"] == "missing":
+        return f"{key!r} is missing; please give it."
+    if detail["type"] == "value_error":
+        return f"{key}: {str(detail['ctx']['error']).rstrip('.')}."
+    found = detail["input"]
+    return f"{key} = {found!r} is not admissible: {detail['msg'].rstrip('.').lower()}."
+
+
+def _keys_at(location: Sequence[str]) -> list[str]:
+    """The keys of the section at `location`."""
+    section: type[BaseModel] = ExperimentConfig
+    for part in location:
+        field = section.model_fields.get(part)
+        inner = (
+            [t for t in (field.annotation, *get_args(field.annotation)) if _is_section(t)] if field else []
+        )
+        if not inner:
+            return []
+        section = inner[0]
+    return [name for name in section.model_fields if name != "base"]
+
+
+def _is_section(annotation: object) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
