@@ -84,7 +84,7 @@ class DataConfig(Section):
     test: tuple[str, ...] = ()
     dt_s: Positive = 1.0
     hold: Hold = "backward"
-    columns: dict[str, str] = {}
+    columns: dict[str, str | None] = {}
     sign: Literal["discharge-positive", "charge-positive"] = "discharge-positive"
     virtual: VirtualConfig = VirtualConfig()
 
@@ -320,7 +320,11 @@ def _sentence(detail: ErrorDetails) -> str:
     if detail["type"] == "value_error":
         return f"{key}: {str(detail['ctx']['error']).rstrip('.')}."
     found = detail["input"]
-    return f"{key} = {found!r} is not admissible: {detail['msg'].rstrip('.').lower()}."
+    return f"{key} = {found!r} is not admissible: {_lower_first(detail['msg'].rstrip('.'))}."
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def _keys_at(location: Sequence[str]) -> list[str]:

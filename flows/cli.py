@@ -1,0 +1,98 @@
+"""The `aesi` command: arguments in, exit code out (0 done, 1 the job failed, 2 bad input or usage).
+
+Commands live in `flows.commands`; each imports what it needs when it runs, so that --help stays instant.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import NoReturn
+
+import typer
+
+from aesi.errors import AesiError
+from flows import environment
+from flows.commands import bench, cell, data, effects, experiment
+
+INTERRUPTED = 130  # what shells return for a process that Ctrl-C ended
+
+app = typer.Typer(
+    name="aesi",
+    help="Hybrid lithium-ion cell models: physics, a sparse correction of its error, intervals, and a tracer "
+    "that names the missing physics.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("run")(experiment.run)
+app.command("discover")(cell.discover)
+app.command("calibrate")(cell.calibrate)
+app.command("simulate")(cell.simulate)
+app.command("predict")(cell.predict)
+app.command("tables")(experiment.tables)
+app.command("effects")(effects.effects)
+app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")
+app.command("worker")(experiment.worker)
+app.command("ui")(experiment.ui)
+app.command("bench")(bench.bench)
+
+
+@app.callback(invoke_without_command=True)
+def _version(version: bool = typer.Option(False, "--version", help="Print the version and exit.")) -> None:
+    if version:
+        from aesi import __version__
+
+        typer.echo(f"aesi {__version__}")
+        raise typer.Exit
+
+
+def main() -> NoReturn:
+    """Entry point of the `aesi` script."""
+    environment.prepare()
+    try:
+        app(args=repeated(sys.argv[1:]))
+    except AesiError as error:
+        _fail(str(error), error.exit_code)
+    except MemoryError:
+        _fail("out of memory; use fewer library terms, a larger dt_s or fewer workers.", 1)
+    except OSError as error:
+        _fail(f"{error.filename or 'a file'}: {error.strerror or error}.", 1)
+    except SystemExit as error:
+        if error.code == INTERRUPTED:
+            print("Interrupted.", file=sys.stderr)
+        raise
+    except Exception as error:
+        if os.environ.get("AESI_DEBUG"):
+            raise
+        _fail(f"unexpected {type(error).__name__}: {_first_line(error)} (AESI_DEBUG=1 shows where).", 1)
+    raise SystemExit(0)
+
+
+def repeated(arguments: list[str]) -> list[str]:
+    """`--data A B C` as `--data A --data B --data C`, for the two commands that take lists of files."""
+    if not arguments or arguments[0] not in ("discover", "calibrate"):
+        return arguments
+    result: list[str] = []
+    option = ""
+    for argument in arguments:
+        if argument.startswith("-"):
+            option = argument
+        elif option in ("--data", "--test") and result[-1] != option:
+            result.append(option)
+        result.append(argument)
+    return result
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or ["no message"])[0]
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    print(f"aesi: {message}", file=sys.stderr)
+    raise SystemExit(code)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""The commands of `aesi`, by subject. Arguments to one call; no logic."""

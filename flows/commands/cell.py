@@ -1,0 +1,114 @@
+"""Commands about one cell: simulate, predict, calibrate, discover."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flows.commands import options
+
+
+def simulate(
+    cell: options.Cell,
+    current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, temperature_degc].")],
+    out: Annotated[Path, typer.Option(help="CSV to write: time, current, voltage and states.")],
+    soc0: options.Soc0 = None,
+    effect: options.Effects = None,
+    effect_file: options.EffectFiles = None,
+    hold: options.Hold = "linear",
+    column: options.Columns = None,
+    sign: options.Sign = "discharge-positive",
+) -> None:
+    """The physics model alone, under a current profile."""
+    from aesi.pipeline.simulation import simulate_file
+
+    run = simulate_file(
+        cell,
+        current,
+        out,
+        soc0=soc0,
+        effects=[options.effect_values(text) for text in effect or []],
+        effect_files=effect_file or [],
+        hold=options.one_of("--hold", hold, ("linear", "backward")),
+        columns=options.columns(column),
+        sign=options.one_of("--sign", sign, ("discharge-positive", "charge-positive")),
+    )
+    low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
+    typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)
+
+
+def predict(
+    model: Annotated[Path, typer.Option(help="Folder of a saved model (runs/.../model).")],
+    current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, voltage_v, temperature_degc].")],
+    out: Annotated[Path, typer.Option(help="CSV to write: voltage_v, lower_v, upper_v.")],
+    measured: Annotated[
+        bool, typer.Option("--measured", help="Use the measured voltage: one step ahead, not free run.")
+    ] = False,
+    soc0: options.Soc0 = None,
+    column: options.Columns = None,
+    sign: options.Sign = "discharge-positive",
+) -> None:
+    """A saved hybrid model with its intervals."""
+    from aesi.pipeline.simulation import predict_file
+
+    rows = predict_file(
+        model,
+        current,
+        out,
+        measured=measured,
+        soc0=soc0,
+        columns=options.columns(column),
+        sign=options.one_of("--sign", sign, ("discharge-positive", "charge-positive")),
+    )
+    regime = "one step ahead" if measured else "free run"
+    typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
+
+
+def calibrate(
+    cell: options.Cell,
+    data: Annotated[list[Path], typer.Option("--data", help="Measurement to fit; may be given again.")],
+    out: Annotated[Path, typer.Option(help="BPX file to write; a report is written beside it.")],
+    soc0: options.Soc0 = None,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    column: options.Columns = None,
+    sign: options.Sign = "discharge-positive",
+) -> None:
+    """Fit the physics model's own parameters to measurements."""
+    from flows.calibrate import calibrate as flow
+
+    flow(cell, options.measurements(data, column, sign), out, soc0=soc0, seed=seed)
+
+
+def discover(
+    cell: options.Cell,
+    data: Annotated[list[Path], typer.Option("--data", help="Measurement; may be given again.")],
+    out: Annotated[Path, typer.Option(help="Folder for discovery.json, report.html and model/.")],
+    test: Annotated[
+        list[Path] | None, typer.Option("--test", help="Measurement that chooses nothing; may be repeated.")
+    ] = None,
+    soc0: options.Soc0 = None,
+    holdout: Annotated[
+        float, typer.Option(min=0.05, max=0.9, help="Last share of the data kept back, without --test.")
+    ] = 0.3,
+    max_effects: Annotated[int, typer.Option(min=0, max=10)] = 3,
+    seed: Annotated[int, typer.Option(min=0)] = 0,
+    effect_file: options.EffectFiles = None,
+    column: options.Columns = None,
+    sign: options.Sign = "discharge-positive",
+) -> None:
+    """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
+    from flows.discover import discover as flow
+
+    flow(
+        cell,
+        options.measurements(data, column, sign),
+        options.measurements(test or [], column, sign),
+        out,
+        soc0=soc0,
+        holdout=holdout,
+        max_effects=max_effects,
+        seed=seed,
+        effect_files=tuple(effect_file or ()),
+    )

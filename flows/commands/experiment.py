@@ -1,0 +1,83 @@
+"""Commands about experiments: run, worker, tables, ui."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+Experiment = Annotated[Path, typer.Argument(help="An experiment file, for instance experiments/smoke.yaml.")]
+Overrides = Annotated[
+    list[str] | None, typer.Option("--set", help="key=value laid over the file: search.candidates=50.")
+]
+
+
+def run(
+    experiment: Experiment,
+    overrides: Overrides = None,
+    runner: Annotated[
+        Literal["local", "dask"] | None, typer.Option(help="Who evaluates the candidates.")
+    ] = None,
+    address: Annotated[
+        str | None, typer.Option(help="Dask scheduler; without it a cluster on this machine.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the last unfinished run.")] = False,
+    cache: Annotated[
+        bool, typer.Option("--cache/--no-cache", help="Use what was computed before from the same content.")
+    ] = True,
+    prefect: Annotated[
+        bool, typer.Option("--prefect/--no-prefect", help="Run the stages as a Prefect flow.")
+    ] = True,
+) -> None:
+    """The whole flow: data, physics, search, ensembles, intervals, tables, figures, report."""
+    from flows.run import start
+
+    start(
+        experiment,
+        list(overrides or []),
+        runner=runner,
+        address=address,
+        resume=resume,
+        use_cache=cache,
+        use_prefect=prefect,
+    )
+
+
+def worker(
+    experiment: Experiment,
+    overrides: Overrides = None,
+    wait_s: Annotated[float, typer.Option(help="How long to wait for others' candidates.")] = 3600.0,
+) -> None:
+    """One more process on a shared study: evaluates candidates of an experiment that others also work on."""
+    from flows.worker import work
+
+    work(experiment, list(overrides or []), wait_s=wait_s)
+
+
+def tables(
+    experiment: Annotated[str, typer.Argument(help="Name of an experiment, or its file.")],
+    format: Annotated[Literal["md", "tex", "csv"], typer.Option(help="Markdown, LaTeX or CSV.")] = "md",
+    run_id: Annotated[
+        list[str] | None, typer.Option("--run", help="Only this tracked run; may be repeated.")
+    ] = None,
+    figures: Annotated[
+        Path | None, typer.Option(help="Also write the tracked figures and reports to this folder.")
+    ] = None,
+    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+) -> None:
+    """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
+    from flows.tables import tables_of
+
+    typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
+
+
+def ui(
+    port: Annotated[int, typer.Option(min=1, max=65535)] = 5000,
+    host: Annotated[str, typer.Option(help="Loopback unless you say otherwise.")] = "127.0.0.1",
+    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+) -> None:
+    """The MLflow UI on the tracking store in use."""
+    from flows.ui import serve
+
+    serve(port=port, host=host, uri=uri)

@@ -1,0 +1,58 @@
+"""What a person sees: one moving line on a terminal, plain lines elsewhere. All of it on stderr."""
+
+from __future__ import annotations
+
+import sys
+import time
+
+
+class Console:
+    """Messages and progress. `every_s` is how often progress is written where nothing can be overwritten."""
+
+    def __init__(self, every_s: float = 15.0) -> None:
+        self._moving = sys.stderr.isatty()
+        self._every_s = every_s
+        self._last_s = 0.0
+        self._open_line = False
+
+    def say(self, message: str) -> None:
+        """One line that stays."""
+        self._close()
+        print(message, file=sys.stderr, flush=True)
+
+    def progress(self, what: str, done: int, total: int, started_s: float, note: str = "") -> None:
+        """Where a long piece of work stands; `started_s` is time.monotonic() at its start."""
+        now = time.monotonic()
+        finished = done >= total
+        if not self._moving and not finished and now - self._last_s < self._every_s:
+            return
+        self._last_s = now
+        line = f"  {what}: {done}/{total}{_left(done, total, now - started_s)}{f', {note}' if note else ''}"
+        if not self._moving:
+            print(line, file=sys.stderr, flush=True)
+            return
+        sys.stderr.write(f"\r\x1b[2K{line[:110]}")
+        self._open_line = True
+        if finished:
+            self._close()
+        sys.stderr.flush()
+
+    def _close(self) -> None:
+        if self._open_line:
+            sys.stderr.write("\n")
+            self._open_line = False
+
+
+def _left(done: int, total: int, elapsed_s: float) -> str:
+    if done == 0:
+        return ""
+    if done >= total:
+        return f" in {duration(elapsed_s)}"
+    return f", about {duration(elapsed_s / done * (total - done))} left"
+
+
+def duration(seconds: float) -> str:
+    """A duration as a person says it."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.1f} min"

@@ -1,0 +1,53 @@
+"""What has to be set before numpy, Prefect and MLflow load: threads, telemetry, where state lives.
+
+Anything the user has set already wins.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+    "NUMEXPR_NUM_THREADS",
+)
+
+QUIET = {
+    "DO_NOT_TRACK": "1",
+    "PYBAMM_DISABLE_TELEMETRY": "true",
+    "MLFLOW_DISABLE_TELEMETRY": "true",
+    "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+    "PREFECT_CLI_PROMPT": "false",
+    # The temporary server takes up to 24 s to start on a slow disk; Prefect gives up after 20 s by default.
+    "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
+    "PREFECT_LOGGING_LEVEL": "WARNING",
+    "PREFECT_SERVER_LOGGING_LEVEL": "ERROR",
+    "PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW": "ignore",
+    "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2",
+    "MLFLOW_HTTP_REQUEST_TIMEOUT": "20",
+    "MLFLOW_LOGGING_LEVEL": "WARNING",
+    "GIT_PYTHON_REFRESH": "quiet",
+}
+
+
+def workspace() -> Path:
+    """The folder that holds runs/, the tracking store and .aesi/: $AESI_HOME, else the current folder."""
+    return Path(os.environ.get("AESI_HOME") or Path.cwd()).expanduser().resolve()
+
+
+def state() -> Path:
+    """The workspace's .aesi/: caches, journals, Prefect's home. Safe to delete while nothing runs."""
+    return workspace() / ".aesi"
+
+
+def prepare() -> None:
+    """Set what is not set: one thread a process (processes are the unit of parallel work), no telemetry."""
+    for name in THREAD_VARIABLES:
+        os.environ.setdefault(name, "1")
+    for name, value in QUIET.items():
+        os.environ.setdefault(name, value)
+    os.environ.setdefault("PREFECT_HOME", str(state() / "prefect"))
