@@ -1,4 +1,4 @@
-"""`aesi effects`: the catalogue of physics, wrong parameters and instrument faults, as declared in the code."""
+"""`aesi effects`: the catalogue of physics, wrong parameters and instrument faults."""
 
 from __future__ import annotations
 
