@@ -1,1 +1,25 @@
-"""."""
+"""Measurements in: files, public data sets, drive schedules, a virtual laboratory, labelled blind cases.
+
+Names are imported where they are first used: PyBaMM, pandas and pyarrow are heavy.
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from aesi.data.read import read_measurement
+    from aesi.data.resample import decimate, to_even
+
+_HOME = {
+    "read_measurement": "aesi.data.read",
+    "decimate": "aesi.data.resample",
+    "to_even": "aesi.data.resample",
+}
+
+__all__ = ["decimate", "read_measurement", "to_even"]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        return getattr(import_module(_HOME[name]), name)
+    raise AttributeError(f"module 'aesi.data' has no attribute {name!r}")

@@ -1,0 +1,60 @@
+"""Parquet tables, through pyarrow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+
+
+class ParquetTable:
+    """A Parquet file; see `aesi.data.readers.table.Table`."""
+
+    def __init__(self, path: Path) -> None:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        self.path = path
+        self.notes: tuple[str, ...] = ()
+        try:
+            self._file = pq.ParquetFile(path)
+            self.header = tuple(self._file.schema_arrow.names)
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise DataError(f"{path.name} is damaged or no Parquet file: {_brief(error)}") from None
+
+    def read(self, positions: tuple[int, ...]) -> list[Array]:
+        """The columns at the given positions; null becomes NaN."""
+        import pyarrow as pa
+
+        names = [self.header[position] for position in positions]
+        for name in names:
+            kind = self._file.schema_arrow.field(name).type
+            if not (pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)):
+                raise DataError(
+                    f"{self.path.name}: column {name!r} holds {kind}, not numbers, from row 1 on; "
+                    "store it as float64."
+                )
+        try:
+            table = self._file.read(columns=names)
+            return [_floats(table.column(name)) for name in names]
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise DataError(f"{self.path.name} is damaged: {_brief(error)}") from None
+
+    def where(self, row: int) -> str:
+        """Parquet has rows, no lines."""
+        return f"row {row + 1}"
+
+
+def _floats(column: Any) -> Array:
+    import pyarrow as pa
+
+    values: Array = column.cast(pa.float64()).to_numpy().astype(np.float64)
+    return values
+
+
+def _brief(error: Exception) -> str:
+    return str(error).splitlines()[0][:200] if str(error) else type(error).__name__

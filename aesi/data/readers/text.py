@@ -1,0 +1,248 @@
+"""Text tables: comma, semicolon, tab or bar between the cells, plain or gzip, in any encoding loggers write.
+
+The header is the first line that is neither blank nor a comment (#). Numbers are converted by pyarrow in a
+stream, so that ten million rows cost the memory of their numbers; only when that fails does a slow pass in
+Python look for the first cell at fault.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO, cast
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+
+SEPARATORS = ",;\t|"
+HEAD_BYTES = 1 << 18
+BLOCK_BYTES = 1 << 22
+COMMENT = "#"
+MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None", "-nan", "-NaN")
+BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
+DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text table is written: what a look at its head tells."""
+
+    encoding: str
+    separator: str
+    decimal: str
+    header: tuple[str, ...]
+    lines_before_data: int
+    notes: tuple[str, ...]
+
+
+class TextTable:
+    """A delimited text file; see `aesi.data.readers.table.Table`."""
+
+    def __init__(self, path: Path, compressed: bool = False) -> None:
+        self.path = path
+        self._compressed = compressed
+        self._layout = self._look()
+        self.header = self._layout.header
+        self.notes = self._layout.notes
+
+    def read(self, positions: tuple[int, ...]) -> list[Array]:
+        """The columns at the given positions; an empty cell is NaN."""
+        import pyarrow as pa
+
+        try:
+            return self._convert(positions)
+        except DAMAGED as error:
+            raise self._damaged(error) from None
+        except (pa.ArrowException, OSError, ValueError) as error:
+            if not self._raise_first_fault(positions):
+                return [np.empty(0) for _ in positions]
+            text = (str(error).splitlines() or [type(error).__name__])[0]
+            raise DataError(f"{self.path.name} cannot be read as a table: {text[:200]}") from None
+
+    def where(self, row: int) -> str:
+        """The row and its line, blank lines and preamble counted."""
+        try:
+            for number, (line, _) in enumerate(self._rows()):
+                if number == row:
+                    return f"row {row + 1} (line {line})"
+        except (*DAMAGED, OSError, UnicodeError, csv.Error):
+            pass
+        return f"row {row + 1}"
+
+    def _convert(self, positions: tuple[int, ...]) -> list[Array]:
+        import pyarrow as pa
+        import pyarrow.csv as pacsv
+
+        layout = self._layout
+        names = [str(position) for position in range(len(layout.header))]
+        wanted = [names[position] for position in positions]
+        reader = pacsv.open_csv(
+            pa.PythonFile(self._utf8(), mode="r"),
+            pacsv.ReadOptions(
+                use_threads=False,
+                block_size=BLOCK_BYTES,
+                column_names=names,
+                skip_rows=layout.lines_before_data,
+            ),
+            pacsv.ParseOptions(delimiter=layout.separator),
+            pacsv.ConvertOptions(
+                column_types=dict.fromkeys(wanted, pa.float64()),
+                include_columns=wanted,
+                null_values=list(MISSING),
+                decimal_point=layout.decimal,
+            ),
+        )
+        pieces: list[list[Array]] = [[] for _ in wanted]
+        for batch in reader:
+            for column, piece in zip(batch.columns, pieces, strict=True):
+                piece.append(column.to_numpy(zero_copy_only=False).astype(float, copy=False))
+        return [np.concatenate(piece) if piece else np.empty(0) for piece in pieces]
+
+    def _bytes(self) -> BinaryIO:
+        if self._compressed:
+            return cast(BinaryIO, gzip.open(self.path, "rb"))
+        return self.path.open("rb")
+
+    def _utf8(self) -> BinaryIO:
+        """The file as UTF-8 bytes; loggers' files nearly always are, and then nothing is copied."""
+        if self._layout.encoding in ("utf-8", "utf-8-sig"):
+            return self._bytes()
+        return cast(BinaryIO, codecs.EncodedFile(self._bytes(), "utf-8", self._layout.encoding))
+
+    def _text(self) -> io.TextIOWrapper:
+        return io.TextIOWrapper(self._bytes(), encoding=self._layout.encoding, errors="replace")
+
+    def _rows(self) -> Iterator[tuple[int, list[str]]]:
+        """Line number and cells of each row below the header; blank lines are passed over."""
+        with self._text() as text:
+            for _ in range(self._layout.lines_before_data):
+                text.readline()
+            reader = csv.reader(text, delimiter=self._layout.separator)
+            for cells in reader:
+                if cells:
+                    yield self._layout.lines_before_data + reader.line_num, cells
+
+    def _raise_first_fault(self, positions: tuple[int, ...]) -> int:
+        """The slow pass: name the first row of the wrong length or cell that is no number.
+
+        Returns the number of rows where it finds no fault.
+        """
+        width, decimal = len(self.header), self._layout.decimal
+        row = -1
+        try:
+            for row, (line, cells) in enumerate(self._rows()):
+                place = f"{self.path.name}, row {row + 1} (line {line})"
+                if len(cells) != width:
+                    raise DataError(
+                        f"{place}: {len(cells)} cells where the header has {width}; the row is cut short or "
+                        "damaged: correct or remove it."
+                    )
+                for position in positions:
+                    cell = cells[position].strip()
+                    if cell not in MISSING and not NUMBER.fullmatch(cell.replace(decimal, ".")):
+                        raise DataError(
+                            f"{place}: column {self.header[position]!r} holds {cell[:40]!r}, which is not a "
+                            f"number{_advice(cell)}."
+                        )
+        except DAMAGED as error:
+            raise self._damaged(error) from None
+        except (csv.Error, UnicodeError, OSError) as error:
+            raise DataError(f"{self.path.name} is damaged: {error}.") from None
+        return row + 1
+
+    def _damaged(self, error: Exception) -> DataError:
+        return DataError(
+            f"{self.path.name} is a damaged or truncated gzip file ({error}); copy or export it again."
+        )
+
+    def _look(self) -> Layout:
+        try:
+            with self._bytes() as stream:
+                head = stream.read(HEAD_BYTES)
+        except DAMAGED as error:
+            raise self._damaged(error) from None
+        except OSError as error:
+            raise DataError(f"{self.path} cannot be opened: {error}.") from None
+        encoding, text = _decode(head, self.path.name)
+        return _layout(text, encoding, whole=len(head) < HEAD_BYTES, name=self.path.name)
+
+
+def _decode(head: bytes, name: str) -> tuple[str, str]:
+    """Encoding and text of the head: by its mark, else UTF-8, else Latin-1, which takes any byte."""
+    for mark, encoding in BYTE_ORDER_MARKS:
+        if head.startswith(mark):
+            try:
+                return encoding, codecs.getincrementaldecoder(encoding)().decode(head)
+            except UnicodeDecodeError:
+                raise DataError(f"{name} starts with a {encoding} mark but is not {encoding}.") from None
+    if b"\x00" in head:
+        raise DataError(f"{name} holds binary data; give a text table (CSV) or a Parquet file.")
+    try:
+        return "utf-8", codecs.getincrementaldecoder("utf-8")().decode(head)
+    except UnicodeDecodeError:
+        return "latin-1", head.decode("latin-1")
+
+
+def _layout(text: str, encoding: str, *, whole: bool, name: str) -> Layout:
+    lines = text.splitlines()
+    if not whole:
+        lines = lines[:-1]  # the last one may be cut by the size of the look
+    start = next((i for i, line in enumerate(lines) if line.strip() and not line.startswith(COMMENT)), None)
+    if start is None:
+        raise DataError(f"{name} has no header line; the first line should name the columns.")
+    separator = max(SEPARATORS, key=lines[start].count)
+    try:
+        header = tuple(cell.strip() for cell in next(csv.reader([lines[start]], delimiter=separator)))
+    except (csv.Error, StopIteration) as error:
+        raise DataError(f"{name}, line {start + 1}: the header cannot be read: {error}.") from None
+    if len(header) == 1 and len(header[0].split()) > 2:
+        raise DataError(
+            f"{name}, line {start + 1}: no comma, semicolon, tab or bar between the names of the columns; "
+            "separate the cells by one of these."
+        )
+    if len(header) > 1 and all(NUMBER.fullmatch(cell) for cell in header):
+        raise DataError(
+            f"{name}, line {start + 1}: numbers where the header should be; put a line with the names of the "
+            "columns first: time_s,current_a,voltage_v."
+        )
+    notes = []
+    if start:
+        notes.append(f"{start} lines before the header were passed over.")
+    if encoding == "latin-1":
+        notes.append("The file is not UTF-8; it was read as Latin-1.")
+    if whole and text and not text.endswith(("\n", "\r")):
+        notes.append("The last line does not end: if the file was cut there, its last number is too short.")
+    decimal = _decimal(lines[start + 1 : start + 50], separator)
+    if decimal == ",":
+        notes.append("Numbers were read with a decimal comma.")
+    return Layout(encoding, separator, decimal, header, start + 1, tuple(notes))
+
+
+def _decimal(lines: list[str], separator: str) -> str:
+    """A comma, where cells are separated otherwise and commas but no points are in the first rows."""
+    body = "".join(lines)
+    return "," if separator != "," and "," in body and "." not in body else "."
+
+
+def _advice(cell: str) -> str:
+    if re.match(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d", cell):
+        return ": give times as seconds since the start"
+    if "," in cell:
+        return ": write a decimal point, or separate the cells by semicolons"
+    return ""

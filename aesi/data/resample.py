@@ -1,0 +1,127 @@
+"""Fewer or evenly spaced rows, with the charge kept and nothing said to be a sample that is an average.
+
+A logger writes a row at the end of an interval: row k's current held over (t[k-1], t[k]]. The average of the
+current over any interval then follows from the charge, which is piecewise linear in time, and the charge
+between two kept stamps is exact. The voltage is taken as straight lines between rows; its average over the
+same interval belongs to that average current (the ohmic drop is linear in it). Where rows are no denser than
+the new step there is nothing to average, and the voltage is that at the stamp.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+from aesi.records import Measurement
+
+DENSE = 0.75
+"""Below this share of the new step the old rows count as denser, and the voltage is averaged."""
+MOST_EVEN_ROWS = 20_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Intervals:
+    """The intervals between consecutive new stamps, over a record's old ones.
+
+    time_s : (n,) old stamps.  stamps_s : (m,) new ones, inside the old range; value j of an average belongs
+    to (stamps[j-1], stamps[j]], and value 0 to the first stamp itself.
+    """
+
+    time_s: Array
+    stamps_s: Array
+
+    def held(self, values: Array) -> Array:
+        """(m,) averages of a quantity that row k held over (t[k-1], t[k]], such as a logged current."""
+        area = np.concatenate([[0.0], np.cumsum(values[1:] * np.diff(self.time_s))])
+        first = values[np.searchsorted(self.time_s, self.stamps_s[0])]
+        return self._average(np.interp(self.stamps_s, self.time_s, area), first)
+
+    def linear(self, values: Array) -> Array:
+        """(m,) averages of a quantity that runs straight between rows, such as a voltage."""
+        step = np.diff(self.time_s)
+        area = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * step)])
+        k = np.clip(np.searchsorted(self.time_s, self.stamps_s, side="right") - 1, 0, len(step) - 1)
+        since = self.stamps_s - self.time_s[k]
+        slope = (values[k + 1] - values[k]) / step[k]
+        at_stamps = area[k] + values[k] * since + 0.5 * slope * since**2
+        return self._average(at_stamps, self.sampled(values)[0])
+
+    def sampled(self, values: Array) -> Array:
+        """(m,) values at the new stamps, on straight lines between rows."""
+        return np.interp(self.stamps_s, self.time_s, values)
+
+    def _average(self, area: Array, first: float) -> Array:
+        return np.concatenate([[first], np.diff(area) / np.diff(self.stamps_s)])
+
+
+def even_stamps(time_s: Array, dt_s: float) -> Array:
+    """(m,) s: stamps dt_s apart from the first row on, as far as the record goes."""
+    count = int(np.floor((time_s[-1] - time_s[0]) / dt_s * (1 + 1e-12))) + 1
+    return np.minimum(time_s[0] + dt_s * np.arange(count), time_s[-1])
+
+
+def is_even(time_s: Array, dt_s: float, tolerance: float = 1e-6) -> bool:
+    """Whether the rows already lie dt_s apart, to the given share of dt_s."""
+    return bool(np.all(np.abs(np.diff(time_s) - dt_s) <= tolerance * dt_s))
+
+
+def to_even(measurement: Measurement, dt_s: float) -> Measurement:
+    """The measurement on stamps dt_s apart (s), with a note; itself where it already is.
+
+    Current: interval averages (the charge is kept). Voltage and temperature: interval averages where the rows
+    are denser than dt_s, values at the stamps elsewhere. Raises DataError for a step that is not positive,
+    that is longer than the record, or that would make more than 20 million rows.
+    """
+    time = measurement.time_s
+    length = float(time[-1] - time[0])
+    if not 0 < dt_s <= length:
+        raise DataError(
+            f"{measurement.name}: a step of {dt_s:g} s is not possible; "
+            f"give one above 0 and up to {length:g} s."
+        )
+    if length / dt_s > MOST_EVEN_ROWS:
+        raise DataError(
+            f"{measurement.name}: a step of {dt_s:g} s over {length:g} s makes more than "
+            f"{MOST_EVEN_ROWS:,} rows; give a longer step."
+        )
+    if is_even(time, dt_s):
+        return measurement
+    note = (
+        f"Resampled from {len(time)} rows to {{rows}} rows every {dt_s:g} s: interval averages of the "
+        "current, {voltage}."
+    )
+    return _onto(measurement, even_stamps(time, dt_s), note)
+
+
+def decimate(measurement: Measurement, max_rows: int) -> Measurement:
+    """At most max_rows rows: averages over runs of consecutive rows, stamped at their ends, with a note."""
+    n = len(measurement)
+    if n <= max_rows:
+        return measurement
+    if max_rows < 2:
+        raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")
+    run = -(-(n - 1) // (max_rows - 1))
+    note = (
+        f"Decimated from {n} to {{rows}} rows: runs of {run} rows, interval averages of the current, "
+        "{voltage}."
+    )
+    return _onto(measurement, measurement.time_s[::run], note)
+
+
+def _onto(measurement: Measurement, stamps: Array, note: str) -> Measurement:
+    intervals = Intervals(measurement.time_s, stamps)
+    dense = bool(np.median(np.diff(measurement.time_s)) < DENSE * np.median(np.diff(stamps)))
+    along = intervals.linear if dense else intervals.sampled
+    temperature = measurement.temperature_degc
+    voltage = "interval averages of the voltage" if dense else "the voltage at the stamps"
+    return replace(
+        measurement,
+        time_s=stamps,
+        current_a=intervals.held(measurement.current_a),
+        voltage_v=along(measurement.voltage_v),
+        temperature_degc=None if temperature is None else along(temperature),
+        notes=(*measurement.notes, note.format(rows=len(stamps), voltage=voltage)),
+    )
