@@ -1,0 +1,49 @@
+"""What a conformal method has to supply: a raw band from the past, for a whole record and for one step."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from aesi.numerics.typing import Array, BoolArray
+
+State = dict[str, Any]
+"""Plain values and numpy arrays under string keys; nothing in it needs pickle."""
+
+
+@dataclass(frozen=True, eq=False)
+class RawBand:
+    """low, high : (n,) V.  ready : (n,) False where the band cannot be made (history too short)."""
+
+    low: Array
+    high: Array
+    ready: BoolArray
+
+
+class Band(ABC):
+    """A fitted rule from the past to a raw band.
+
+    `batch` and `row` must agree: row k of `batch(residuals)` is `row(residuals[:k])`, as far back as the
+    last missing residual and as the window reaches.
+    """
+
+    kind: ClassVar[str]
+
+    @abstractmethod
+    def batch(self, residuals: Array) -> RawBand:
+        """The band of every sample of a record, (n,) V, from the samples before it; NaN is missing."""
+
+    @abstractmethod
+    def row(self, past: Array) -> tuple[float, float] | None:
+        """The band after `past`: the finite residuals since the last missing one, at most the window,
+        most recent last. None where there are too few."""
+
+    @abstractmethod
+    def to_state(self) -> State:
+        """Everything `from_state` needs."""
+
+    @classmethod
+    @abstractmethod
+    def from_state(cls, state: State) -> Self:
+        """Inverse of `to_state`."""

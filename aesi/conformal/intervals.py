@@ -1,0 +1,32 @@
+"""The record of a replay: a lower and an upper bound a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aesi.numerics.typing import Array, BoolArray
+
+
+@dataclass(frozen=True, eq=False)
+class Intervals:
+    """Prediction intervals of the residual, each made before its residual was seen.
+
+    lower_v, upper_v : (n,) V, relative to the prediction (add the prediction to get the measured voltage's).
+    warm : (n,) False where the history was too short and the marginal interval of the calibration stands in.
+    """
+
+    lower_v: Array
+    upper_v: Array
+    warm: BoolArray
+
+    def __len__(self) -> int:
+        return len(self.lower_v)
+
+    @property
+    def width_v(self) -> Array:
+        """(n,) V, always positive."""
+        return self.upper_v - self.lower_v
+
+    def covers(self, residuals: Array) -> BoolArray:
+        """(n,) True where the residual lies inside; a missing (NaN) residual is not covered."""
+        return (residuals >= self.lower_v) & (residuals <= self.upper_v)

@@ -1,0 +1,59 @@
+"""Linear quantile regression on the causal history.
+
+    Q_tau(e[k] | past) = a_tau + b_tau . features[k]
+
+The features are of degree one in the residuals, so location and scale of the band follow the recent location
+and scale: an autoregression with a changing variance lies inside the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numba import njit
+
+from aesi.conformal.band import State
+from aesi.conformal.regression import QuantileModel
+from aesi.numerics.quantile_regression import fit_quantiles
+from aesi.numerics.typing import Array
+
+
+@njit(cache=True)
+def _affine(rows: Array, intercept: Array, slope: Array, out: Array) -> None:
+    # Written out so that one row and many rows round alike; BLAS gives no such promise.
+    for k in range(rows.shape[0]):
+        for j in range(intercept.size):
+            total = intercept[j]
+            for i in range(rows.shape[1]):
+                total += slope[i, j] * rows[k, i]
+            out[k, j] = total
+
+
+@dataclass(frozen=True, eq=False)
+class LinearQuantiles(QuantileModel):
+    """intercept : (2 B,) V.  slope : (p, 2 B)."""
+
+    intercept: Array
+    slope: Array
+    kind: ClassVar[str] = "linear"
+
+    @classmethod
+    def fit(cls, rows: Array, targets: Array, weights: Array, levels: Array) -> Self:
+        """rows (n, p), targets (n,) V, weights (n,) > 0 (one over the local scale), levels (2 B,)."""
+        design = np.column_stack([np.ones(len(rows)), rows]) * weights[:, None]
+        coefficients = fit_quantiles(design, targets * weights, levels)
+        return cls(coefficients[0].copy(), np.ascontiguousarray(coefficients[1:]))
+
+    def quantiles(self, rows: Array) -> Array:
+        out = np.empty((len(rows), self.intercept.size))
+        _affine(rows, self.intercept, self.slope, out)
+        return out
+
+    def to_state(self) -> State:
+        return {"intercept": self.intercept, "slope": self.slope}
+
+    @classmethod
+    def from_state(cls, state: State) -> Self:
+        return cls(np.asarray(state["intercept"], dtype=float), np.asarray(state["slope"], dtype=float))

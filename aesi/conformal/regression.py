@@ -1,0 +1,79 @@
+"""The family of SPCI: quantile regression of the next residual on its causal history.
+
+A `QuantileModel` turns feature rows into quantiles; `RegressionBand` feeds it with the history and picks the
+narrowest pair. A new regressor is one small file with a QuantileModel and a line in the registry.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+
+from aesi.conformal.band import Band, RawBand, State
+from aesi.conformal.history import History
+from aesi.conformal.narrowest import narrowest
+from aesi.numerics.typing import Array
+
+
+class QuantileModel(ABC):
+    """A fitted map from feature rows (n, p) to quantiles (n, 2 B): B lower levels, then B upper ones."""
+
+    kind: ClassVar[str]
+
+    @abstractmethod
+    def quantiles(self, rows: Array) -> Array:
+        """(n, 2 B) V."""
+
+    @abstractmethod
+    def to_state(self) -> State:
+        """Everything `from_state` needs."""
+
+    @classmethod
+    @abstractmethod
+    def from_state(cls, state: State) -> Self:
+        """Inverse of `to_state`."""
+
+
+@dataclass(frozen=True, eq=False)
+class RegressionBand(Band):
+    """The narrowest pair of conditional quantiles given the history."""
+
+    history: History
+    model: QuantileModel
+    kind: ClassVar[str] = "regression"
+
+    def from_rows(self, rows: Array) -> tuple[Array, Array]:
+        """(low, high), (n,) V each, of feature rows (n, p)."""
+        low, high = np.empty(len(rows)), np.empty(len(rows))
+        narrowest(self.model.quantiles(rows), low, high)
+        return low, high
+
+    def batch(self, residuals: Array) -> RawBand:
+        rows, ready = self.history.rows(residuals)
+        low, high = self.from_rows(rows)
+        return RawBand(low, high, ready)
+
+    def row(self, past: Array) -> tuple[float, float] | None:
+        features = self.history.row(past)
+        if features is None:
+            return None
+        low, high = self.from_rows(features[None, :])
+        return float(low[0]), float(high[0])
+
+    def to_state(self) -> State:
+        return {
+            "history": self.history.to_state(),
+            "model_kind": self.model.kind,
+            "model": self.model.to_state(),
+        }
+
+    @classmethod
+    def from_state(cls, state: State) -> Self:
+        from aesi.conformal.registry import MODELS
+
+        return cls(
+            History.from_state(state["history"]), MODELS[state["model_kind"]].from_state(state["model"])
+        )

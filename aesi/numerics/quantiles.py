@@ -1,0 +1,24 @@
+"""Empirical quantiles with the finite-sample correction of conformal prediction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.errors import FitError
+from aesi.numerics.typing import Array
+
+
+def conformal_quantile(scores: Array, alpha: float) -> float:
+    """The ceil((n + 1)(1 - alpha))-th smallest score: one more exchangeable score is below with >= 1 - alpha.
+
+    scores : (n,), finite.  Raises FitError where n is too small for that rank to exist (n < 1/alpha - 1).
+    Vovk, Gammerman & Shafer, Algorithmic Learning in a Random World (2005), ch. 2.
+    """
+    n = scores.size
+    rank = int(np.ceil((n + 1) * (1 - alpha) - 1e-9))  # round-off must not ask for one rank too many
+    if rank > n:
+        raise FitError(
+            f"{n} scores cannot support a miss rate of {alpha:g}: at least {int(np.ceil(1 / alpha)) - 1} "
+            "are needed; give more calibration data or a larger alpha."
+        )
+    return float(np.partition(scores, rank - 1)[rank - 1])

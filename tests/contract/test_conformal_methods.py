@@ -1,0 +1,143 @@
+"""What every registered method promises, whatever it does inside."""
+
+import io
+
+import numpy as np
+import pytest
+
+from aesi.conformal import METHODS, Calibrated
+from aesi.errors import FitError, InputError
+
+WINDOW = 50
+
+
+def series(n: int, seed: int) -> np.ndarray:
+    """AR(1) with a slowly changing scale, in volts."""
+    rng = np.random.default_rng(seed)
+    scale = 1e-4 * np.exp(0.7 * np.sin(2 * np.pi * np.arange(n) / 900))
+    out = np.zeros(n)
+    for k in range(1, n):
+        out[k] = 0.8 * out[k - 1] + scale[k] * rng.standard_normal()
+    return out
+
+
+@pytest.fixture(scope="module", params=sorted(METHODS))
+def calibrated(request: pytest.FixtureRequest) -> Calibrated:
+    return METHODS[request.param].fit([series(2500, 1), series(1500, 2)], window=WINDOW)
+
+
+def test_covers_near_the_nominal_level(calibrated: Calibrated) -> None:
+    # Independent residuals, 4,000 to test with: four standard deviations of the share are 1.9 %, and the
+    # calibration on 2,000 of them adds about as much.
+    method, rng = METHODS[calibrated.method], np.random.default_rng(3)
+    fitted = method.fit([1e-4 * rng.standard_normal(2000)], window=WINDOW)
+    fresh = 1e-4 * rng.standard_normal(4000)
+    assert fitted.intervals(fresh).covers(fresh).mean() == pytest.approx(0.9, abs=0.035)
+
+
+def test_an_interval_uses_only_what_came_before(calibrated: Calibrated) -> None:
+    record = series(600, 4)
+    changed = record.copy()
+    changed[400:] = 1.0
+    before, after = calibrated.intervals(record), calibrated.intervals(changed)
+    np.testing.assert_array_equal(before.lower_v[:401], after.lower_v[:401])
+    np.testing.assert_array_equal(before.upper_v[:401], after.upper_v[:401])
+
+
+def test_the_stream_gives_the_intervals_of_the_replay(calibrated: Calibrated) -> None:
+    record = series(700, 5)
+    record[[100, 300, 301]] = np.nan
+    replay = calibrated.adaptive(0.05).intervals(record)
+    stream = calibrated.adaptive(0.05).stream()
+    bounds = []
+    for error in record:
+        bounds.append(stream.interval())
+        stream.update(float(error))
+    low, high = np.array(bounds).T
+    np.testing.assert_array_equal(low, replay.lower_v)
+    np.testing.assert_array_equal(high, replay.upper_v)
+
+
+def test_survives_a_file_without_pickle(calibrated: Calibrated) -> None:
+    state = calibrated.to_dict()
+    arrays: dict[str, np.ndarray] = {}
+    bare = _pull_arrays(state, "", arrays)
+    file = io.BytesIO()
+    np.savez(file, **arrays)
+    file.seek(0)
+    with np.load(file, allow_pickle=False) as stored:
+        restored = Calibrated.from_dict(_put_arrays(bare, stored))
+    record = series(400, 6)
+    np.testing.assert_array_equal(restored.intervals(record).lower_v, calibrated.intervals(record).lower_v)
+    np.testing.assert_array_equal(restored.intervals(record).upper_v, calibrated.intervals(record).upper_v)
+
+
+def _pull_arrays(value, path, arrays):
+    if isinstance(value, dict):
+        return {k: _pull_arrays(v, f"{path}/{k}", arrays) for k, v in value.items()}
+    if isinstance(value, np.ndarray):
+        arrays[path] = value
+        return {"array": path}
+    assert isinstance(value, (str, int, float, list))
+    return value
+
+
+def _put_arrays(value, arrays):
+    if isinstance(value, dict):
+        if set(value) == {"array"}:
+            return arrays[value["array"]]
+        return {k: _put_arrays(v, arrays) for k, v in value.items()}
+    return value
+
+
+def test_fitting_twice_gives_the_same_intervals() -> None:
+    for method in METHODS.values():
+        first, second = (
+            method.fit([series(1500, 1)], window=WINDOW).intervals(series(300, 2)) for _ in range(2)
+        )
+        np.testing.assert_array_equal(first.lower_v, second.lower_v)
+
+
+def test_a_constant_stretch_never_gets_a_band_of_width_zero(calibrated: Calibrated) -> None:
+    record = np.zeros(2000)
+    widths = calibrated.adaptive(0.05).intervals(record).width_v
+    assert widths.min() >= calibrated.floor_v > 0
+
+
+def test_a_missing_residual_brings_back_the_marginal_interval(calibrated: Calibrated) -> None:
+    record = series(400, 7)
+    record[200] = np.nan
+    replay = calibrated.intervals(record)
+    assert np.all(np.isfinite(replay.width_v))
+    assert not replay.covers(record)[200]
+    if calibrated.method != "split":
+        assert not replay.warm[201]
+        assert (replay.lower_v[201], replay.upper_v[201]) == calibrated.marginal_v
+        assert replay.warm[201 + WINDOW :].all()
+
+
+def test_a_record_shorter_than_the_window_gets_valid_bands(calibrated: Calibrated) -> None:
+    replay = calibrated.intervals(series(5, 8))
+    assert len(replay) == 5
+    assert np.all(replay.width_v > 0)
+    assert len(calibrated.intervals(np.empty(0))) == 0
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_constant_residuals_are_refused(name: str) -> None:
+    with pytest.raises(FitError, match="says nothing about the spread"):
+        METHODS[name].fit([np.full(1000, 1e-3)], window=WINDOW)
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_too_few_residuals_are_refused(name: str) -> None:
+    with pytest.raises(FitError, match="need"):
+        METHODS[name].fit([series(12, 9)], window=WINDOW)
+    with pytest.raises(FitError, match="need"):
+        METHODS[name].fit([], window=WINDOW)
+
+
+@pytest.mark.parametrize("name", sorted(METHODS))
+def test_an_impossible_level_is_refused(name: str) -> None:
+    with pytest.raises(InputError, match="share of misses"):
+        METHODS[name].fit([series(1000, 9)], alpha=1.5)
