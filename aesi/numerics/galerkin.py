@@ -1,0 +1,148 @@
+"""Galerkin projections of diffusion, diagonalised: in a sphere, and through a stack of three layers.
+
+Both give modes of   d q_k / dt = -lambda_k D q_k + beta_k u   with lambda_0 = 0 for the conserved mean, so
+that time stepping is exact mode by mode where D is constant, and the mean is the integral of the input to
+round-off.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import legendre
+from scipy.linalg import eigh
+
+from aesi.numerics.typing import Array
+
+
+def _locked(array: Array) -> Array:
+    out = np.ascontiguousarray(array, dtype=float)
+    out.flags.writeable = False
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class SphereModes:
+    """Diffusion in the unit sphere with a prescribed outward flux, in even Legendre polynomials.
+
+    With z_k the surface value of mode k:  dz_k/dt = -lam_k (D/R^2) z_k - gain_k (flux/R),  surface = sum z_k.
+    lam : (n,) ascending, lam[0] = 0.  gain : (n,) gain[0] = 3.
+    r : (m,) collocation points in [0, 1], r[-1] = 1.  at : (m, n) values at r from z.
+    project : (n, m) z from values at r, by the least-squares that the volume weight defines.
+    """
+
+    lam: Array
+    gain: Array
+    r: Array
+    at: Array
+    project: Array
+
+
+@lru_cache(maxsize=32)
+def sphere_modes(order: int) -> SphereModes:
+    """Modes of the projection on P_0, P_2, ..., P_{2 (order - 1)}."""
+    x, w = legendre.leggauss(4 * order)
+    x, w = 0.5 * (x + 1.0), 0.5 * w  # [0, 1]; the products are polynomials of degree <= 4 order - 2
+    basis = np.eye(2 * order - 1)[::2]
+    value = np.array([legendre.legval(x, c) for c in basis])
+    slope = np.array([legendre.legval(x, legendre.legder(c)) for c in basis])
+    mass = (value * w * x**2) @ value.T
+    stiff = (slope * w * x**2) @ slope.T
+    lam, v = eigh(stiff, mass)
+    lam[0] = 0.0
+    at_surface = legendre.legval(1.0, basis.T) @ v
+    # Gauss-Lobatto points of the even extension hold r = 1 and resolve as many even polynomials as there are
+    # modes.
+    r = np.sort(np.abs(gauss_lobatto(2 * order)[0][order:]))
+    at = legendre.legval(r, basis.T).T @ v / at_surface
+    return SphereModes(
+        lam=_locked(lam),
+        gain=_locked(at_surface**2),
+        r=_locked(r),
+        at=_locked(at),
+        project=_locked(np.linalg.inv(at)),
+    )
+
+
+@lru_cache(maxsize=32)
+def gauss_lobatto(points: int) -> tuple[Array, Array]:
+    """Nodes in [-1, 1] with both ends, and weights; exact to degree 2 points - 3."""
+    c = np.zeros(points)
+    c[-1] = 1.0
+    inner = legendre.legroots(legendre.legder(c))
+    x = np.concatenate([[-1.0], np.sort(inner), [1.0]])
+    w = 2.0 / (points * (points - 1) * legendre.legval(x, c) ** 2)
+    return _locked(x), _locked(w)
+
+
+@dataclass(frozen=True, eq=False)
+class StackModes:
+    """Diffusion through negative electrode, separator, positive electrode, by one polynomial a layer.
+
+    q_k :  dq_k/dt = -lam_k (project Phi(c))_k + gain_k i,  c = c0 + to_nodes q, for Phi' = D(c).
+    lam : (n,), lam[0] = 0.  gain : (n,) of a source +i/L_n in the negative and -i/L_p in the positive
+    electrode.
+    to_nodes : (m, n).  project : (n, m).  gauss : (6, m) three Gauss points in the negative and in the
+    positive electrode.  mean : (m,) weights of the average over the whole thickness.  salt : (m,) weights of
+    the salt content.
+    """
+
+    lam: Array
+    gain: Array
+    to_nodes: Array
+    project: Array
+    gauss: Array
+    mean: Array
+    salt: Array
+
+
+GAUSS_3 = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)])
+
+
+@lru_cache(maxsize=256)
+def stack_modes(
+    thickness: tuple[float, float, float],
+    porosity: tuple[float, float, float],
+    efficiency: tuple[float, float, float],
+    order: int,
+) -> StackModes:
+    """Modes for layers of given thickness (m), porosity and transport efficiency; `order` is the degree a
+    layer.
+    """
+    m = 3 * order + 1
+    nodes = gauss_lobatto(order + 1)[0]
+    x, w = legendre.leggauss(order + 2)
+    to_coefficients = np.linalg.inv(legendre.legvander(nodes, order))
+    value = legendre.legvander(x, order) @ to_coefficients
+    derivative = np.array([legendre.legval(x, legendre.legder(c)) for c in np.eye(order + 1)]).T
+    slope = derivative @ to_coefficients
+    mass, stiff = np.zeros((m, m)), np.zeros((m, m))
+    mean, source = np.zeros(m), np.zeros(m)
+    signs = (1.0 / thickness[0], 0.0, -1.0 / thickness[2])
+    for layer in range(3):
+        rows = slice(layer * order, layer * order + order + 1)
+        half = 0.5 * thickness[layer]
+        mass[rows, rows] += porosity[layer] * half * (value.T * w) @ value
+        stiff[rows, rows] += efficiency[layer] / half * (slope.T * w) @ slope
+        integral = half * w @ value
+        mean[rows] += integral
+        source[rows] += signs[layer] * integral
+    lam, v = eigh(stiff, mass)
+    lam[0] = 0.0
+    gain = v.T @ source
+    gain[0] = 0.0  # what leaves one electrode enters the other; keeps salt exactly
+    gauss = np.zeros((6, m))
+    at_gauss = legendre.legvander(2.0 * GAUSS_3 - 1.0, order) @ to_coefficients
+    gauss[:3, : order + 1] = at_gauss
+    gauss[3:, 2 * order :] = at_gauss
+    return StackModes(
+        lam=_locked(lam),
+        gain=_locked(gain),
+        to_nodes=_locked(v),
+        project=_locked(v.T @ mass),
+        gauss=_locked(gauss),
+        mean=_locked(mean / sum(thickness)),
+        salt=_locked(mass.sum(axis=0)),
+    )
