@@ -1,0 +1,79 @@
+"""Moving blocks over several records: which rows a resample holds, and how often.
+
+Rows of all records are numbered through; a block never runs over the end of its record. The number of
+blocks is the number of rows over the block length, rounded up, and the last block is cut so that a resample
+has as many rows as the data.
+
+Kunsch, Annals of Statistics 17 (1989) 1217, doi:10.1214/aos/1176347265.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from aesi.numerics.typing import Array, BoolArray, IntArray
+
+Span = tuple[int, int]
+"""First row, and the row after the last."""
+
+
+def block_starts(spans: Sequence[Span], length: int) -> IntArray:
+    """All rows at which a block of `length` fits into its record (the record's start where none does)."""
+    return np.concatenate([np.arange(a, max(a, b - length) + 1) for a, b in spans])
+
+
+def moving_block_weights(
+    spans: Sequence[Span], length: int, resamples: int, rng: np.random.Generator
+) -> Array:
+    """How often each row occurs in each resample.
+
+    spans : consecutive records covering rows 0 to n.  Returns (resamples, n), whole numbers as floats.
+    """
+    n = spans[-1][1]
+    ends = np.concatenate([np.full(b - a, b) for a, b in spans])
+    starts = block_starts(spans, length)
+    weights = np.empty((resamples, n))
+    for row in weights:
+        change = np.zeros(n + 1)
+        drawn = 0
+        while drawn < n:
+            start = int(starts[rng.integers(len(starts))])
+            stop = min(start + length, int(ends[start]), start + n - drawn)
+            change[start] += 1.0
+            change[stop] -= 1.0
+            drawn += stop - start
+        row[:] = np.cumsum(change[:-1])
+    return weights
+
+
+def coverage(weights: Array) -> Array:
+    """(resamples,) the share of rows that each resample holds at least once."""
+    return np.asarray((weights > 0).mean(axis=1))
+
+
+def pieces(spans: Sequence[Span], length: int) -> list[Span]:
+    """Records cut into consecutive pieces of about `length` rows, equal within a record."""
+    cut: list[Span] = []
+    for a, b in spans:
+        count = max(1, round((b - a) / length))
+        edges = np.linspace(a, b, count + 1).round().astype(int)
+        cut += [(int(p), int(q)) for p, q in pairwise(edges)]
+    return cut
+
+
+def leave_out_weights(cut: Sequence[Span], n: int) -> Array:
+    """(pieces, n): one everywhere but zero on one piece."""
+    weights = np.ones((len(cut), n))
+    for row, (a, b) in zip(weights, cut, strict=True):
+        row[a:b] = 0.0
+    return weights
+
+
+def starts_mask(cut: Sequence[Span], n: int) -> BoolArray:
+    """(n,) True on the first row of each piece."""
+    mask = np.zeros(n, dtype=bool)
+    mask[[a for a, _ in cut]] = True
+    return mask

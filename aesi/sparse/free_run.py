@@ -1,0 +1,111 @@
+"""Compiled free runs: the predicted error feeds back on itself, no measured voltage after the start.
+
+A sparse model splits by the function q of the error that a term holds, e'[k+1] = sum_q q(e'[k]) g_q[k], where
+g_q depends on the inputs alone and is known for the whole record before the loop starts. What is left of a
+step is a sum over at most twelve functions.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from aesi.numerics.typing import Array, BoolArray, IntArray
+from aesi.sparse.basis import slope, value
+
+LIMIT = 10.0
+"""A prediction beyond this many times the trained half-range counts as diverged."""
+
+
+@njit(cache=True)
+def run(drive: Array, functions: IntArray, start: float, clip: bool, limit: float) -> tuple[Array, int]:
+    """One model along one record, in scaled error.
+
+    drive : (n_functions, n), g_q at each sample.  Returns (n,) predictions of samples 1 to n, and the index
+    of the first that left `limit` (-1: none); from there on the last value inside is held.
+    """
+    n = drive.shape[1]
+    out = np.empty(n)
+    x = start
+    for k in range(n):
+        inside = min(1.0, max(-1.0, x)) if clip else x
+        following = 0.0
+        for q in range(len(functions)):
+            following += value(functions[q], inside) * drive[q, k]
+        if not abs(following) <= limit:
+            out[k:] = x
+            return out, k
+        x = following
+        out[k] = x
+    return out, -1
+
+
+@njit(cache=True)
+def run_many(
+    drive: Array,
+    functions: IntArray,
+    measured: Array,
+    restart: BoolArray,
+    state: Array,
+    clip: bool,
+    limit: float,
+) -> Array:
+    """Several models along the same rows, each piece started from its measured error.
+
+    drive : (n_functions, n, models).  measured : (n,) scaled error at each row.  restart : (n,) where a piece
+    starts.  state : (models,) the running prediction, updated in place.  Returns (n, models): the prediction
+    of the sample after each row; infinite from a divergence to the end of its piece.
+    """
+    n, models = drive.shape[1], drive.shape[2]
+    out = np.empty((n, models))
+    for k in range(n):
+        if restart[k]:
+            state[:] = measured[k]
+        for j in range(models):
+            x = state[j]
+            inside = min(1.0, max(-1.0, x)) if clip else x
+            following = 0.0
+            for q in range(len(functions)):
+                following += value(functions[q], inside) * drive[q, k, j]
+            if not abs(x) <= limit or not abs(following) <= limit:
+                following = np.inf
+            state[j] = following
+            out[k, j] = following
+    return out
+
+
+@njit(cache=True)
+def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: bool, limit: float) -> Array:
+    """Predictions `steps` samples ahead of each measured error.
+
+    Returns (n,): entry k predicts sample k + 1 from the measured sample max(0, k + 1 - steps).
+    """
+    n = drive.shape[1]
+    out = np.empty(n)
+    for k in range(n):
+        first = max(0, k + 1 - steps)
+        x = measured[first]
+        for i in range(first, k + 1):
+            inside = min(1.0, max(-1.0, x)) if clip else x
+            following = 0.0
+            for q in range(len(functions)):
+                following += value(functions[q], inside) * drive[q, i]
+            if not abs(following) <= limit:
+                break
+            x = following
+        out[k] = x
+    return out
+
+
+@njit(cache=True)
+def gains(drive: Array, functions: IntArray, measured: Array, clip: bool) -> Array:
+    """(n,) the slope of e'[k] -> e'[k + 1] at each measured error; above one the map amplifies."""
+    n = drive.shape[1]
+    out = np.zeros(n)
+    for k in range(n):
+        x = measured[k]
+        if clip and abs(x) > 1.0:
+            continue
+        for q in range(len(functions)):
+            out[k] += slope(functions[q], x) * drive[q, k]
+    return out

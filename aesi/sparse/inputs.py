@@ -1,0 +1,63 @@
+"""Further inputs of the sparse model, derived from those a record has.
+
+The paper's inputs at sample k are I, c_sp, c_sn, c_e0 and c_eL. Offered besides, by name:
+
+    soc       the state of charge of the record
+    I_next    I[k + 1], the current that flows while the predicted error arises; a simulation knows it, and
+              at 1 Hz it differs a lot from I[k]
+    I_60s     the current through a first-order low-pass of 60 s (any number of seconds), x' = (I - x) / tau,
+              starting at rest from the first current of the record: a memory that is not fed back
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import lfilter
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+from aesi.records import ErrorSeries
+
+_FILTERED = re.compile(r"^I_(\d+(?:\.\d+)?)s$")
+
+
+def low_pass(x: Array, dt_s: float, tau_s: float) -> Array:
+    """First-order low-pass of (n,) samples held over each interval, steady at the first of them."""
+    keep = np.exp(-dt_s / tau_s)
+    return lfilter([1.0 - keep], [1.0, -keep], x, zi=[keep * x[0]])[0] if len(x) else x
+
+
+def is_derivable(name: str) -> bool:
+    """Whether `name` is one of the inputs this module can derive."""
+    return name in ("soc", "I_next") or _FILTERED.match(name) is not None
+
+
+def with_inputs(series: ErrorSeries, names: Sequence[str]) -> ErrorSeries:
+    """The record with exactly the named inputs, in that order; those it lacks are derived.
+
+    Derive on the whole measurement before cutting it into records, so that filters know the past.
+    Raises DataError for a name that is neither there nor derivable.
+    """
+    if tuple(names) == series.input_names:
+        return series
+    columns = [_column(series, name) for name in names]
+    return replace(series, inputs=np.column_stack(columns), input_names=tuple(names))
+
+
+def _column(series: ErrorSeries, name: str) -> Array:
+    if name in series.input_names:
+        return series.inputs[:, series.input_names.index(name)]
+    if name == "soc":
+        return series.soc
+    if name == "I_next":
+        return np.append(series.current_a[1:], series.current_a[-1:])
+    if match := _FILTERED.match(name):
+        return low_pass(series.current_a, series.dt_s, float(match.group(1)))
+    raise DataError(
+        f"{series.name}: no input {name!r}; it has {', '.join(series.input_names)}, and soc, I_next and "
+        "filtered currents such as I_60s can be derived."
+    )

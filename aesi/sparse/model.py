@@ -1,0 +1,157 @@
+"""The sparse model of the voltage error, e[k + 1] = Theta(e[k], U[k]) xi, the paper's equation (8).
+
+It lives in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged
+in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array, IntArray
+from aesi.records import ErrorSeries, FreeRun
+from aesi.sparse import free_run
+from aesi.sparse.inputs import with_inputs
+from aesi.sparse.library import Library, Term, evaluate_terms
+from aesi.sparse.scaling import Scaling
+
+SCHEMA = "aesi.sparse_model/1"
+
+
+@dataclass(frozen=True, eq=False)
+class SparseModel:
+    """Active terms and their coefficients, in scaled variables.
+
+    library : the active terms, over the error and the inputs.  coefficients : (m,), none of them zero.
+    dt_s : the sampling interval of the training records; the model is a map over one such step.
+    inclusion : (m,) share of the ensemble's members that hold each term.
+    low, high : (m,) 5th and 95th percentile of each coefficient over the ensemble's members.
+    """
+
+    name: str
+    library: Library
+    coefficients: Array
+    scaling: Scaling
+    dt_s: float
+    inclusion: Array | None = None
+    low: Array | None = None
+    high: Array | None = None
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Names of the active terms."""
+        return self.library.names
+
+    @property
+    def input_names(self) -> tuple[str, ...]:
+        """Inputs the model reads; those a record lacks are derived where that is possible."""
+        return self.library.variables[1:]
+
+    def named(self, name: str) -> SparseModel:
+        """The same model under another name."""
+        return replace(self, name=name)
+
+    def coefficient_table(self) -> dict[str, float]:
+        """Term to coefficient."""
+        return dict(zip(self.terms, self.coefficients.tolist(), strict=True))
+
+    def one_step(self, series: ErrorSeries) -> Array:
+        """(n,) V: the prediction of error_v[k] given error_v[k - 1]; the first is the measured error_v[0]."""
+        scaled = self.scaling.apply(self._variables(series))
+        prediction = evaluate_terms(self.library.terms, scaled).T @ self.coefficients
+        return np.append(series.error_v[:1], self.scaling.error_to_volts(prediction[:-1]))
+
+    def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
+        """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
+        start = float(series.error_v[0]) if error0_v is None else error0_v
+        variables = self._variables(series)
+        scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
+        prediction, diverged = free_run.run(
+            self._drive(variables)[:, :-1], self._functions, scaled0, self._clip, free_run.LIMIT
+        )
+        error_v = np.append(start, self.scaling.error_to_volts(prediction))
+        variables[:, 0] = error_v
+        return FreeRun(error_v, None if diverged < 0 else diverged + 1, self.scaling.is_outside(variables))
+
+    def k_step(self, series: ErrorSeries, steps: int) -> Array:
+        """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
+        if steps < 1:
+            raise DataError(f"{self.name}: a prediction {steps} steps ahead is none; give at least 1.")
+        drive = self._drive(self._variables(series))[:, :-1]
+        measured = self.scaling.error_to_scaled(series.error_v)
+        scaled = free_run.ahead(drive, self._functions, measured, steps, self._clip, free_run.LIMIT)
+        return np.append(series.error_v[:1], self.scaling.error_to_volts(scaled))
+
+    def gain(self, series: ErrorSeries) -> Array:
+        """(n,) slope of the map e[k] -> e[k + 1] along a record; stable where its size is below one."""
+        drive = self._drive(self._variables(series))
+        measured = self.scaling.error_to_scaled(series.error_v)
+        return free_run.gains(drive, self._functions, measured, self._clip)
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values; the terms by their factors (variable, function) and, to be read, by name."""
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "variables": list(self.library.variables),
+            "terms": [[list(factor) for factor in term.factors] for term in self.library.terms],
+            "term_names": list(self.terms),
+            "coefficients": self.coefficients.tolist(),
+            "scaling": self.scaling.to_dict(),
+            "dt_s": self.dt_s,
+        } | {
+            key: None if values is None else values.tolist()
+            for key, values in (("inclusion", self.inclusion), ("low", self.low), ("high", self.high))
+        }
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> SparseModel:
+        """Inverse of `to_dict`. Raises DataError for anything else."""
+        if data.get("schema") != SCHEMA:
+            raise DataError(f"not a sparse model: schema is {data.get('schema')!r}, expected {SCHEMA!r}.")
+        terms = tuple(Term(tuple((int(v), int(f)) for v, f in factors)) for factors in data["terms"])
+        optional = {
+            key: None if data[key] is None else np.array(data[key], dtype=float)
+            for key in ("inclusion", "low", "high")
+        }
+        return cls(
+            data["name"],
+            Library(tuple(data["variables"]), terms),
+            np.array(data["coefficients"], dtype=float),
+            Scaling.from_dict(data["scaling"]),
+            float(data["dt_s"]),
+            **optional,
+        )
+
+    @property
+    def _clip(self) -> bool:
+        return self.scaling.outside == "clip"
+
+    @cached_property
+    def _functions(self) -> IntArray:
+        return np.unique(self.library.feedbacks)
+
+    def _variables(self, series: ErrorSeries) -> Array:
+        if abs(series.dt_s / self.dt_s - 1.0) > 0.01:
+            raise DataError(
+                f"{series.name}: sampled every {series.dt_s:g} s, but the model steps {self.dt_s:g} s; "
+                f"resample the record to {self.dt_s:g} s."
+            )
+        return np.column_stack([series.error_v, with_inputs(series, self.input_names).inputs])
+
+    def _drive(self, variables: Array) -> Array:
+        """(n_functions, n): for each function of the error, the sum of its terms' input parts."""
+        products = evaluate_terms(
+            [term.without_error() for term in self.library.terms], self.scaling.apply(variables)
+        )
+        return np.stack(
+            [
+                self.coefficients[mine] @ products[mine]
+                for mine in (self.library.feedbacks == q for q in self._functions)
+            ]
+        )

@@ -1,0 +1,68 @@
+"""Scaling of error and inputs to [-1, 1] by the ranges of the training records, the paper's equation (10).
+
+    x' = 2 (x - low) / (high - low) - 1
+
+Outside the trained range Chebyshev polynomials grow like a power and tan has poles, so a term there says
+nothing that was learned. Scaled values are therefore held at -1 or 1, and the samples are flagged. With
+`outside="extrapolate"` they are left as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from aesi.numerics.typing import Array, BoolArray
+
+Outside = Literal["clip", "extrapolate"]
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """low, high : (n_variables,) the trained range of each variable, SI."""
+
+    low: Array
+    high: Array
+    outside: Outside = "clip"
+
+    @classmethod
+    def of(cls, blocks: Sequence[Array], outside: Outside = "clip") -> Scaling:
+        """The range over several (n, n_variables) blocks."""
+        low = np.min([block.min(axis=0) for block in blocks], axis=0)
+        high = np.max([block.max(axis=0) for block in blocks], axis=0)
+        return cls(low, high, outside)
+
+    def apply(self, data: Array) -> Array:
+        """Scale (n, n_variables)."""
+        scaled = 2.0 * (data - self.low) / (self.high - self.low) - 1.0
+        return np.clip(scaled, -1.0, 1.0) if self.outside == "clip" else scaled
+
+    def is_outside(self, data: Array) -> BoolArray:
+        """(n,) True where any variable leaves its trained range."""
+        slack = 1e-9 * (self.high - self.low)
+        return np.asarray(((data < self.low - slack) | (data > self.high + slack)).any(axis=1))
+
+    def error_to_scaled(self, error_v: Array) -> Array:
+        """The error alone, not clipped (it is a target, or the state of a free run)."""
+        return 2.0 * (error_v - self.low[0]) / (self.high[0] - self.low[0]) - 1.0
+
+    def error_to_volts(self, scaled: Array) -> Array:
+        """Inverse of `error_to_scaled`."""
+        return self.low[0] + 0.5 * (scaled + 1.0) * (self.high[0] - self.low[0])
+
+    @property
+    def error_volts_per_unit(self) -> float:
+        """Volts of error in one unit of scaled error."""
+        return float(0.5 * (self.high[0] - self.low[0]))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON values."""
+        return {"low": self.low.tolist(), "high": self.high.tolist(), "outside": self.outside}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Scaling:
+        """Inverse of `to_dict`."""
+        return cls(np.array(data["low"]), np.array(data["high"]), data["outside"])
