@@ -1,0 +1,40 @@
+"""A saved hybrid model as MLflow serves it. MLflow runs this file when it loads the model; nothing is pickled.
+
+In: a table with time_s, current_a and, if measured, voltage_v (one step ahead then; free run without it).
+Out: voltage_v, lower_v, upper_v, one row a row. Parameter soc0: state of charge at the first row.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mlflow
+import pandas as pd
+
+import aesi
+
+
+class HybridPyfunc(mlflow.pyfunc.PythonModel):  # type: ignore[misc, unused-ignore]
+    """`aesi.HybridModel.predict` on tables."""
+
+    def load_context(self, context: Any) -> None:
+        """Read the model folder, which is data alone."""
+        self._model = aesi.HybridModel.load(context.artifacts["model"])
+
+    def predict(
+        self, context: Any, model_input: pd.DataFrame, params: dict[str, Any] | None = None
+    ) -> pd.DataFrame:
+        """The voltage with its band."""
+        voltage = None
+        if "voltage_v" in model_input and model_input["voltage_v"].notna().all():
+            voltage = model_input["voltage_v"].to_numpy(float)
+        prediction = self._model.predict(
+            model_input["time_s"].to_numpy(float),
+            model_input["current_a"].to_numpy(float),
+            soc0=(params or {}).get("soc0"),
+            voltage_v=voltage,
+        )
+        return prediction.to_frame()[["voltage_v", "lower_v", "upper_v"]]
+
+
+mlflow.models.set_model(HybridPyfunc())

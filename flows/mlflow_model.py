@@ -1,0 +1,53 @@
+"""Log a saved hybrid model to MLflow: pyfunc from code, with signature and input example, registered."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+
+import aesi
+
+CODE = Path(__file__).with_name("hybrid_pyfunc.py")
+NEEDS = ("bpx", "numba", "numpy", "pandas", "pyarrow", "pydantic", "quantile-forest", "scikit-learn", "scipy")
+
+
+def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None, soc0: float) -> None:
+    """Log the model folder under the run and register it. soc0 : what `predict` takes where none is given."""
+    import mlflow
+    import pandas as pd
+    from mlflow.models import ModelSignature
+    from mlflow.types import ColSpec, ParamSchema, ParamSpec, Schema
+
+    if not folder.is_dir():
+        raise ValueError(f"the model folder {folder} is gone")
+    signature = ModelSignature(
+        inputs=Schema(
+            [
+                ColSpec("double", "time_s"),
+                ColSpec("double", "current_a"),
+                ColSpec("double", "voltage_v", required=False),
+            ]
+        ),
+        outputs=Schema([ColSpec("double", name) for name in ("voltage_v", "lower_v", "upper_v")]),
+        params=ParamSchema([ParamSpec("soc0", "double", soc0)]),
+    )
+    capacity_ah = aesi.HybridModel.load(folder).cell.capacity_ah
+    time_s = [float(t) for t in range(10)]
+    example = pd.DataFrame({"time_s": time_s, "current_a": [capacity_ah / 2] * len(time_s)})
+    before = mlflow.get_tracking_uri()
+    mlflow.set_tracking_uri(uri)
+    mlflow.set_registry_uri(uri)
+    try:
+        with mlflow.start_run(run_id=run_id, log_system_metrics=False):
+            mlflow.pyfunc.log_model(
+                name="model",
+                python_model=str(CODE),
+                artifacts={"model": str(folder)},
+                code_paths=[str(Path(aesi.__file__).parent)],
+                pip_requirements=[f"{name}=={version(name)}" for name in NEEDS],
+                signature=signature,
+                input_example=example,
+                registered_model_name=registered_as,
+            )
+    finally:
+        mlflow.set_tracking_uri(before)

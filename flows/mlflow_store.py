@@ -1,0 +1,256 @@
+"""The tracking store, spoken to through MLflow's client with explicit run ids.
+
+Nothing here decides what is tracked (`flows.tracking` does); this sends items, knows whether a failure passes,
+and sends an item twice without doubling it.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from aesi.errors import AesiError
+from flows import environment
+from flows.outbox import Item
+
+PARENT = "mlflow.parentRunId"
+NUMBER = "aesi.number"
+KIND = "aesi.kind"
+REACH_S = 5.0
+PAGE = 1000
+
+
+class StoreAway(AesiError):
+    """The tracking store does not answer."""
+
+
+def default_uri() -> str:
+    """MLFLOW_TRACKING_URI, or the SQLite file in the workspace."""
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{environment.workspace() / 'mlflow.db'}"
+
+
+class Store:
+    """One tracking store.
+
+    Raises StoreAway where it does not answer, with what to do.
+    """
+
+    def __init__(self, uri: str | None = None) -> None:
+        self.uri = uri or default_uri()
+        self._local = self.uri.startswith("sqlite:///")
+        if self.uri.startswith(("http://", "https://")):
+            _reach(self.uri)
+        with _alone(self._local):
+            if self._local:
+                _write_ahead(Path(self.uri.removeprefix("sqlite:///")))
+            try:
+                from mlflow import MlflowClient
+
+                self.client = MlflowClient(tracking_uri=self.uri, registry_uri=self.uri)
+                self.client.search_experiments(max_results=1)
+            except Exception as error:
+                raise _unusable(self.uri, error) from None
+
+    def experiment(self, name: str) -> str:
+        """Id of the experiment of that name, made if it is not there."""
+        with _alone(self._local):
+            found = self.client.get_experiment_by_name(name)
+            if found is not None:
+                if found.lifecycle_stage == "deleted":
+                    self.client.restore_experiment(found.experiment_id)
+                return str(found.experiment_id)
+            folder = environment.workspace() / "mlartifacts" / name
+            return str(self.client.create_experiment(name, folder.as_uri() if self._local else None))
+
+    def find_experiment(self, name: str) -> str | None:
+        """Id of the experiment of that name, or None."""
+        found = self.client.get_experiment_by_name(name)
+        return None if found is None else str(found.experiment_id)
+
+    def create_run(self, experiment_id: str, name: str, tags: dict[str, str]) -> str:
+        """A new running run."""
+        return str(self.client.create_run(experiment_id, run_name=name, tags=tags).info.run_id)
+
+    def runs(self, experiment_id: str, condition: str) -> Iterator[Any]:
+        """All runs of an experiment that meet an MLflow filter, newest first."""
+        token = None
+        while True:
+            page = self.client.search_runs([experiment_id], condition, max_results=PAGE, page_token=token)
+            yield from page
+            token = page.token
+            if not token:
+                return
+
+    def children(self, experiment_id: str, parent: str) -> dict[str, Any]:
+        """Nested runs of a parent by the label they were given (`candidate:7`, `model:AESI I`)."""
+        condition = f"tags.`{PARENT}` = '{parent}'"
+        return {
+            run.data.tags[NUMBER]: run
+            for run in self.runs(experiment_id, condition)
+            if NUMBER in run.data.tags
+        }
+
+    def away(self, error: Exception) -> bool:
+        """True for a failure that passes: no connection, a server error, a locked database, a full disk."""
+        return _passes(error)
+
+    def deliver(self, item: Item, again: bool) -> None:
+        """Send an item; `again` says that it may have been sent before."""
+        getattr(self, f"_send_{item['kind']}")(item, again)
+
+    def _send_run(self, item: Item, again: bool) -> None:
+        """A finished nested run: parameters, metrics, files."""
+        from mlflow.entities import Metric, Param, RunTag
+
+        run_id = self._sent_before(item) if again else None
+        tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
+        if run_id is None:
+            created = self.client.create_run(
+                item["experiment_id"], start_time=item["start_ms"], run_name=item["name"], tags=tags
+            )
+            run_id = created.info.run_id
+        self.client.log_batch(
+            run_id,
+            metrics=[Metric(k, v, item["end_ms"], 0) for k, v in item["metrics"].items()],
+            params=[Param(k, v) for k, v in item["params"].items()],
+            tags=[RunTag(k, v) for k, v in tags.items()] if again else [],
+        )
+        for name, content in item["files"].items():
+            self.client.log_dict(run_id, content, name)
+        self.client.set_terminated(run_id, item["status"], item["end_ms"])
+
+    def _send_batch(self, item: Item, again: bool) -> None:
+        """Parameters, metrics and tags of a run that exists."""
+        from mlflow.entities import Metric, Param, RunTag
+
+        self.client.log_batch(
+            item["run_id"],
+            metrics=[Metric(k, v, item["at_ms"], item.get("step", 0)) for k, v in item["metrics"].items()],
+            params=[Param(k, v) for k, v in item["params"].items()],
+            tags=[RunTag(k, v) for k, v in item["tags"].items()],
+        )
+
+    def _send_datasets(self, item: Item, again: bool) -> None:
+        from mlflow.entities import Dataset, DatasetInput, InputTag
+
+        inputs = [
+            DatasetInput(
+                Dataset(d["name"], d["digest"], "local", d["source"], profile=d["profile"]),
+                [InputTag("mlflow.data.context", d["role"])],
+            )
+            for d in item["datasets"]
+        ]
+        self.client.log_inputs(item["run_id"], inputs)
+
+    def _send_files(self, item: Item, again: bool) -> None:
+        """A file or a folder as artifacts."""
+        source = Path(item["path"])
+        if source.is_dir():
+            self.client.log_artifacts(item["run_id"], str(source), item["to"])
+        elif source.is_file():
+            self.client.log_artifact(item["run_id"], str(source), item["to"])
+        else:
+            raise ValueError(f"{source} is gone")
+
+    def _send_json(self, item: Item, again: bool) -> None:
+        self.client.log_dict(item["run_id"], item["content"], item["name"])
+
+    def _send_model(self, item: Item, again: bool) -> None:
+        from flows.mlflow_model import log_hybrid
+
+        if again and self._registered(item):
+            return
+        log_hybrid(self.uri, item["run_id"], Path(item["path"]), item["registered_as"], item["soc0"])
+
+    def _send_end(self, item: Item, again: bool) -> None:
+        self.client.set_terminated(item["run_id"], item["status"], item["at_ms"])
+
+    def _sent_before(self, item: Item) -> str | None:
+        found = self.children(item["experiment_id"], item["parent"]).get(item["label"])
+        return None if found is None else str(found.info.run_id)
+
+    def _registered(self, item: Item) -> bool:
+        if not item["registered_as"]:
+            return False
+        return bool(self.client.search_model_versions(f"run_id = '{item['run_id']}'"))
+
+
+def now_ms() -> int:
+    """Milliseconds since the epoch, as MLflow counts."""
+    return int(time.time() * 1000)
+
+
+@contextmanager
+def _alone(local: bool) -> Iterator[None]:
+    """One process at a time makes tables and experiments in a SQLite store."""
+    if not local:
+        yield
+        return
+    import fcntl
+
+    path = environment.state() / "mlflow.lock"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with path.open("w") as handle:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+
+
+def _write_ahead(database: Path) -> None:
+    """With a write-ahead log, readers (the UI, another run) never block the writer. The mode is kept in the file."""
+    import sqlite3
+
+    database.parent.mkdir(parents=True, exist_ok=True)
+    connection = sqlite3.connect(database, timeout=30)
+    try:
+        connection.execute("PRAGMA journal_mode=WAL")
+    finally:
+        connection.close()
+
+
+def _reach(uri: str) -> None:
+    """Raise StoreAway unless a server answers at the address within a few seconds."""
+    try:
+        urllib.request.urlopen(f"{uri.rstrip('/')}/health", timeout=REACH_S).close()
+    except urllib.error.HTTPError:
+        return  # it answers, if not kindly; MLflow's own client says more
+    except (OSError, ValueError) as error:
+        raise _unusable(uri, error) from None
+
+
+def _unusable(uri: str, error: Exception) -> StoreAway:
+    reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+    advice = (
+        "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's SQLite file"
+        if uri.startswith("http")
+        else "check the address, or move the file away to start a new one"
+    )
+    return StoreAway(f"the tracking store {_without_password(uri)} cannot be used ({reason}); {advice}.")
+
+
+def _without_password(uri: str) -> str:
+    from urllib.parse import urlsplit
+
+    parts = urlsplit(uri)
+    return uri.replace(f":{parts.password}@", ":***@") if parts.password else uri
+
+
+def _passes(error: Exception) -> bool:
+    import requests
+    from mlflow.exceptions import MlflowException
+
+    seen: set[int] = set()
+    cause: BaseException | None = error
+    while cause is not None and id(cause) not in seen:
+        seen.add(id(cause))
+        if isinstance(cause, (OSError, requests.exceptions.RequestException)):
+            return True
+        cause = cause.__cause__ or cause.__context__
+    if isinstance(error, MlflowException):
+        return error.error_code in ("INTERNAL_ERROR", "TEMPORARILY_UNAVAILABLE", "REQUEST_LIMIT_EXCEEDED")
+    return False
