@@ -1,0 +1,99 @@
+"""One HTML file with everything inside: template, style, script, plotly.js and the figures."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aesi.pipeline.report.embed import Embedded, Store, embed
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+HERE = Path(__file__).parent
+
+
+def write_page(path: str | Path, template: str, figures: Mapping[str, Figure], **context: Any) -> Path:
+    """Render `template` with its figures into one offline file.
+
+    The file replaces an older one in one step, so that an interrupted write leaves the old report readable.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from plotly.offline import get_plotlyjs
+
+    environment = Environment(
+        loader=FileSystemLoader(HERE),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= FILTERS
+    store = Store()
+    embedded = {name: embed(fig, store) for name, fig in figures.items()}
+    html = environment.get_template(template).render(
+        **context,
+        figures={name: _describe(fig, embedded[name]) for name, fig in figures.items()},
+        payload=_script_safe({"figures": {n: e.data for n, e in embedded.items()}, "arrays": store.arrays}),
+        plotly_js=get_plotlyjs(),
+        style_css=(HERE / "report.css").read_text(encoding="utf-8"),
+        report_js=(HERE / "report.js").read_text(encoding="utf-8"),
+    )
+    target = Path(path)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    draft = target.with_name(target.name + ".part")
+    draft.write_text(html, encoding="utf-8")
+    draft.replace(target)
+    return target
+
+
+def write_figures(path: str | Path, title: str, figures: Mapping[str, Figure]) -> Path:
+    """All figures on one page, one after the other, each to be saved as SVG from its menu."""
+    return write_page(path, "figures.html", figures, title=title)
+
+
+def _describe(fig: Figure, embedded: Embedded) -> dict[str, Any]:
+    meta = fig.layout.meta
+    return {
+        "title": meta["title"],
+        "caption": meta["caption"] + _thinning(embedded),
+        "height": int(fig.layout.height),
+    }
+
+
+def _thinning(embedded: Embedded) -> str:
+    if embedded.drawn >= embedded.samples:
+        return ""
+    kept = "every sample"
+    if embedded.kept < embedded.samples:
+        kept = f"an envelope of {embedded.kept:,} of them"
+    return (
+        f" Drawn as the envelope (lowest and highest sample of each bucket) of up to {embedded.samples:,} "
+        f"samples a record; zooming in shows {kept}."
+    )
+
+
+def _script_safe(content: Any) -> str:
+    """JSON that cannot close the script element it stands in."""
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _fixed(value: float | None, digits: int = 1, unit: str = "") -> str:
+    if value is None or value != value:
+        return "–"
+    return f"{value:,.{digits}f}" + (f"\u00a0{unit}" if unit else "")
+
+
+def _significant(value: float | None, digits: int = 3) -> str:
+    return "–" if value is None or value != value else f"{value:.{digits}g}"
+
+
+def _tied(text: str) -> str:
+    """Numbers stay on the line of their unit."""
+    return re.sub(r"(\d) (?=(?:mV|%|s|V|A)(?!\w))", "\\1\u00a0", text)
+
+
+FILTERS = {"fixed": _fixed, "significant": _significant, "tied": _tied}

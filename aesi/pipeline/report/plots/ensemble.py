@@ -1,0 +1,189 @@
+"""Figures of the search and of the model it chose: front, terms, coefficients, bootstrap."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.pipeline.report import style
+from aesi.pipeline.report.views import BootstrapView, Row
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+MOST_TERMS = 30
+"""Bars beyond this many are too thin to read; the rest is in coefficients.json."""
+
+
+def front_figure(candidates: Sequence[Row]) -> Figure:
+    """Every candidate of the search: validation against out-of-bag loss, terms as colour."""
+    caption = (
+        "One point a candidate. Diamonds form the Pareto front over the three losses; the star is the chosen "
+        "one; crosses miss the correlation constraints."
+    )
+    fig = style.figure("Candidates of the search", caption, 400)
+    groups = (
+        ("infeasible", "x-thin", 6, [c for c in candidates if not c.get("feasible", True)]),
+        ("feasible", "circle", 6, [c for c in candidates if c.get("feasible", True) and not c.get("front")]),
+        ("Pareto front", "diamond", 9, [c for c in candidates if c.get("front") and not c.get("chosen")]),
+        ("chosen", "star", 16, [c for c in candidates if c.get("chosen")]),
+    )
+    scale = {"coloraxis": "coloraxis"}
+    for name, symbol, size, rows in groups:
+        if rows:
+            fig.add_scatter(
+                x=[c["oob"] for c in rows],
+                y=[c["valid"] for c in rows],
+                mode="markers",
+                name=name,
+                showlegend=False,
+                customdata=[[c.get("number", ""), c["terms"], _fitness(c)] for c in rows],
+                hovertemplate="candidate %{customdata[0]}: %{customdata[1]} terms, fitness %{customdata[2]}"
+                "<br>out of bag %{x:.4g}, validation %{y:.4g}<extra></extra>",
+                marker={
+                    "symbol": symbol,
+                    "size": size,
+                    "color": [c["terms"] for c in rows],
+                    "line": {"width": 1, "color": style.INK if symbol in ("star", "x-thin") else style.GREY},
+                    **scale,
+                },
+            )
+            _legend_entry(fig, name, symbol)
+    bar = {"title": {"text": "terms"}, "thickness": 12}
+    fig.update_layout(coloraxis={"colorscale": style.SEQUENTIAL, "colorbar": bar})
+    powers = {
+        "type": "log",
+        "dtick": 1,
+        "exponentformat": "power",
+        "minor": {"dtick": "D1", "ticks": "outside"},
+    }
+    fig.update_xaxes(title_text="out-of-bag loss, scaled MSE", **powers)
+    fig.update_yaxes(title_text="validation loss, scaled MSE", **powers)
+    return fig
+
+
+def importance_figure(terms: Sequence[Row]) -> Figure | None:
+    """SVD ranking of the terms of the chosen model."""
+    rows = [row for row in terms if row.get("importance") is not None]
+    if not rows:
+        return None
+    rows = sorted(rows, key=lambda row: -abs(row["importance"]))
+    caption = (
+        "Importance of each term by singular value decomposition of the columns term times coefficient; the "
+        f"intercept is left out.{_cut_note(len(rows))}"
+    )
+    return _bars(
+        rows, [abs(row["importance"]) for row in rows], "Ranking of the terms", caption, "importance, -"
+    )
+
+
+def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
+    """Coefficients of bagging and stability selection, with the inclusion probability as opacity of the "
+    "dot."""
+    rows = [row for row in terms if row.get("bagging") is not None or row.get("stability") is not None]
+    if not rows:
+        return None
+    rows = sorted(rows, key=lambda row: -abs(row.get("bagging") or row.get("stability") or 0.0))
+    caption = (
+        "Coefficients on scaled variables. The colour is the share of the best resampled models that "
+        "keep the "
+        f"term.{_cut_note(len(rows))}"
+    )
+    rows = rows[:MOST_TERMS][::-1]
+    fig = style.figure("Coefficients", caption, _tall(len(rows)))
+    looks = {
+        "bagging": ("circle", style.BLUE, "AESI I, bagging"),
+        "stability": ("diamond-open", style.GREEN, "AESI II, stability selection"),
+    }
+    for key, (symbol, colour, label) in looks.items():
+        shown = [row for row in rows if row.get(key) is not None]
+        marker: dict[str, Any] = {"symbol": symbol, "size": 9, "color": colour}
+        if key == "bagging" and all(row.get("inclusion") is not None for row in shown):
+            marker |= {"color": [row["inclusion"] for row in shown], "coloraxis": "coloraxis"}
+        fig.add_scatter(
+            x=[row[key] for row in shown],
+            y=[row["term"] for row in shown],
+            mode="markers",
+            name=label,
+            showlegend=False,
+            marker=marker,
+            customdata=[row.get("inclusion", float("nan")) for row in shown],
+            hovertemplate="%{y}: %{x:.4g}, kept by %{customdata:.0%}<extra></extra>",
+        )
+        if shown:
+            _legend_entry(fig, label, symbol)
+    bar = {"title": {"text": "kept by"}, "thickness": 12, "tickformat": ".0%"}
+    fig.update_layout(coloraxis={"colorscale": style.SEQUENTIAL, "cmin": 0, "cmax": 1, "colorbar": bar})
+    fig.update_xaxes(title_text="coefficient, -", zeroline=True)
+    return fig
+
+
+def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
+    """Share of distinct samples in every resample of the moving block bootstrap."""
+    share = 100 * np.sort(bootstrap.unique_fraction)
+    expected = 100 * expected_unique_fraction(bootstrap.n, bootstrap.block)
+    caption = (
+        f"Share of distinct samples in each of {len(share)} resamples of {bootstrap.n:,} samples in "
+        f"blocks of "
+        f"{bootstrap.block}; mean {share.mean():.1f} %, expected {expected:.1f} %."
+    )
+    fig = style.figure("Coverage of the moving block bootstrap", caption, 300, showlegend=False)
+    fig.add_scatter(
+        x=np.arange(1, len(share) + 1),
+        y=share,
+        mode="markers",
+        marker={"color": style.BLUE, "size": 6},
+        hovertemplate="%{y:.2f} %<extra></extra>",
+    )
+    fig.add_hline(y=float(share.mean()), line={"color": style.BLUE, "width": 1.5})
+    fig.add_hline(y=expected, line={"color": style.VERMILLION, "width": 1.5, "dash": "dash"})
+    fig.update_xaxes(title_text="resample, in order")
+    fig.update_yaxes(title_text="distinct samples, %")
+    return fig
+
+
+def expected_unique_fraction(n: int, block: int) -> float:
+    """Expected share of distinct samples in one resample: ceil(n / B) blocks, starts uniform on 0 ... n - B.
+
+    A sample near an edge lies in fewer blocks, so the mean runs over all samples.
+    """
+    starts = n - block + 1
+    position = np.arange(n)
+    holding = np.minimum.reduce([position + 1, np.full(n, block), np.full(n, starts), n - position])
+    return float(np.mean(1 - (1 - holding / starts) ** -(-n // block)))
+
+
+def _bars(rows: Sequence[Row], values: Sequence[float], title: str, caption: str, axis: str) -> Figure:
+    shown = list(zip(rows, values, strict=True))[:MOST_TERMS][::-1]
+    fig = style.figure(title, caption, _tall(len(shown)), showlegend=False)
+    fig.add_bar(
+        x=[value for _, value in shown],
+        y=[row["term"] for row, _ in shown],
+        orientation="h",
+        marker={"color": style.BLUE},
+        hovertemplate="%{y}: %{x:.4g}<extra></extra>",
+    )
+    fig.update_xaxes(title_text=axis)
+    return fig
+
+
+def _legend_entry(fig: Figure, name: str, symbol: str) -> None:
+    """A symbol in one grey, because a legend cannot show a colour that varies by point."""
+    marker = {"symbol": symbol, "size": 9, "color": style.GREY, "line": {"width": 1, "color": style.GREY}}
+    fig.add_scatter(x=[None], y=[None], mode="markers", name=name, marker=marker)
+
+
+def _tall(bars: int) -> int:
+    return max(220, 110 + 18 * bars)
+
+
+def _cut_note(n: int) -> str:
+    return f" The first {MOST_TERMS} of {n}." if n > MOST_TERMS else ""
+
+
+def _fitness(candidate: Row) -> str:
+    value = candidate.get("fitness")
+    return "-" if value is None else f"{value:.4g}"

@@ -1,0 +1,301 @@
+"""Figures over time: profiles, voltage traces and the error beneath them, records end to end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.pipeline.report import style
+from aesi.pipeline.report.views import DiscoveryTrace, Trace
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A record and where it starts on the common time axis, in the axis's unit."""
+
+    trace: Trace | DiscoveryTrace
+    x: Array
+
+
+def end_to_end(traces: Sequence[Trace | DiscoveryTrace]) -> tuple[list[Placed], str]:
+    """Records one after the other on one axis, and that axis's unit."""
+    spans = [float(t.time_s[-1] - t.time_s[0]) for t in traces]
+    unit, divisor = style.time_unit(sum(spans))
+    starts = np.concatenate([[0.0], np.cumsum(spans)])
+    placed = [Placed(t, (t.time_s - t.time_s[0] + s) / divisor) for t, s in zip(traces, starts, strict=False)]
+    return placed, unit
+
+
+def line(
+    fig: Figure,
+    x: Array,
+    y: Array,
+    name: str,
+    colour: str,
+    row: int = 1,
+    first: bool = True,
+    width: float = 1.2,
+) -> None:
+    """A series over time; the page thins it out for display and refines it on zoom."""
+    fig.add_scatter(
+        x=x,
+        y=y,
+        mode="lines",
+        name=name,
+        legendgroup=name,
+        showlegend=first,
+        line={"color": colour, "width": width},
+        meta={"keep": "minmax"},
+        row=row,
+        col=1,
+    )
+
+
+def band(
+    fig: Figure,
+    x: Array,
+    low: Array,
+    high: Array,
+    name: str,
+    colour: str,
+    row: int = 1,
+    first: bool = True,
+    edge: float = 0.0,
+) -> None:
+    """A shaded band between two series; `edge` is the width of its outline, px."""
+    look = {
+        "mode": "lines",
+        "line": {"width": edge, "color": colour},
+        "legendgroup": name,
+        "hoverinfo": "skip",
+    }
+    fig.add_scatter(x=x, y=low, name=name, showlegend=False, meta={"keep": "min"}, row=row, col=1, **look)
+    fig.add_scatter(
+        x=x,
+        y=high,
+        name=name,
+        showlegend=first,
+        fill="tonexty",
+        fillcolor=style.translucent(colour),
+        meta={"keep": "max"},
+        row=row,
+        col=1,
+        **look,
+    )
+
+
+def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
+    """Current or voltage of every record by role; `quantity` is `current` or `voltage`."""
+    fig = _stack(1)
+    label = {"current": "current, A (discharge > 0)", "voltage": "voltage, V"}[quantity]
+    placed, unit = end_to_end(traces)
+    colours = {"train": style.BLUE, "valid": style.ORANGE, "test": style.GREEN}
+    seen: set[str] = set()
+    for item in placed:
+        trace = item.trace
+        assert isinstance(trace, Trace)
+        y = trace.current_a if quantity == "current" else trace.measured_v
+        role = ROLE_NAMES[trace.role]
+        line(fig, item.x, y, role, colours[trace.role], first=role not in seen)
+        seen.add(role)
+    _mark_records(fig, placed)
+    fig.update_xaxes(title_text=f"time, records end to end, {unit}")
+    fig.update_yaxes(title_text=label)
+    caption = f"Measured {quantity} of the training (I), validation (II) and test (III) records."
+    return style.framed(fig, f"{quantity.capitalize()} profile", caption, 320, hovermode="x unified")
+
+
+def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure:
+    """Measured, physics and hybrid voltage in free run, and the error of both beneath, with its band."""
+    fig = _stack(2)
+    placed, unit = end_to_end(traces)
+    for i, item in enumerate(placed):
+        trace = item.trace
+        assert isinstance(trace, Trace)
+        first = i == 0
+        line(fig, item.x, trace.physics_v, physics, style.PHYSICS, first=first)
+        line(fig, item.x, _error(trace, trace.physics_v), physics, style.PHYSICS, 2, first=False)
+        prediction = trace.predictions.get(chosen)
+        if prediction is not None:
+            if prediction.free_run_lower_v is not None and prediction.free_run_upper_v is not None:
+                # The band of the voltage, seen from the measurement: e = V_measured - V, so its edges swap.
+                low = _error(trace, prediction.free_run_upper_v)
+                high = _error(trace, prediction.free_run_lower_v)
+                band(fig, item.x, low, high, f"band of {chosen}", style.BLUE, 2, first)
+            line(fig, item.x, prediction.free_run_v, chosen, style.BLUE, first=first)
+            line(fig, item.x, _error(trace, prediction.free_run_v), chosen, style.BLUE, 2, first=False)
+        line(fig, item.x, trace.measured_v, "measured", style.MEASURED, first=first, width=1.0)
+    _mark_records(fig, placed)
+    fig.update_yaxes(title_text="voltage, V", row=1)
+    fig.update_yaxes(title_text="error, mV", row=2, zeroline=True)
+    fig.update_xaxes(title_text=f"time, records end to end, {unit}", row=2)
+    role = traces[0].role
+    caption = (
+        f"Top: measured voltage, {physics} alone, and {chosen} in free run (no measured voltage after the "
+        f"first "
+        "sample of a record). Bottom: measured minus model; the measurement lies inside the band where the "
+        "band contains zero."
+    )
+    return style.framed(
+        fig, f"Voltage on the {_role_word(role)} records", caption, 560, hovermode="x unified"
+    )
+
+
+def residual_figure(traces: Sequence[DiscoveryTrace], labels: dict[str, str]) -> Figure:
+    """Measured voltage, current, and the residual before, recalibrated and after, over time."""
+    fig = _stack(3, (0.3, 0.2, 0.5))
+    placed, unit = end_to_end(traces)
+    for i, item in enumerate(placed):
+        trace = item.trace
+        assert isinstance(trace, DiscoveryTrace)
+        line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, 1.0)
+        line(fig, item.x, trace.current_a, "current", style.GREY, 2, i == 0, 1.0)
+        for state, label in labels.items():
+            error = (trace.measured_v - getattr(trace, f"{state}_v")) * style.MILLIVOLT
+            line(fig, item.x, error, label, style.STATE_COLOURS[state], 3, i == 0)
+    _mark_records(fig, placed)
+    fig.update_yaxes(title_text="voltage, V", row=1)
+    fig.update_yaxes(title_text="current, A", row=2)
+    fig.update_yaxes(title_text="residual, mV", zeroline=True, row=3)
+    fig.update_xaxes(title_text=f"time, records end to end, {unit}", row=3)
+    part = "data that chose nothing" if traces[0].part == "test" else "the data the loop was fitted on"
+    caption = f"Residual (measured minus model) over time on {part}; discharge current is positive."
+    return style.framed(
+        fig, f"Residual over time, {traces[0].part} part", caption, 600, hovermode="x unified"
+    )
+
+
+def interval_figure(traces: Sequence[Trace], model: str, zoom_s: float | None = None) -> Figure | None:
+    """Error, its one-step prediction and interval; with `zoom_s`, the liveliest stretch of that length."""
+    usable = [t for t in traces if _has_intervals(t, model)]
+    if not usable:
+        return None
+    if zoom_s is not None:
+        usable = [_liveliest(usable, zoom_s)]
+    fig = _stack(2)
+    placed, unit = end_to_end(usable)
+    for i, item in enumerate(placed):
+        _add_interval(fig, item, model, first=i == 0)
+    _mark_records(fig, placed)
+    fig.update_xaxes(title_text=f"time, {unit}", row=2)
+    fig.update_yaxes(title_text="voltage error, mV", row=1)
+    fig.update_yaxes(title_text="minus prediction, mV", zeroline=True, row=2)
+    title = f"Prediction intervals of {model}"
+    caption = (
+        "Regime: one step ahead, the measured voltage of the step before is given. Test records. Top: "
+        "measured "
+        "error of the physics model, its prediction and interval. Bottom: the same with the prediction "
+        "taken off."
+    )
+    if zoom_s is not None:
+        title += ", zoom"
+        caption += f" The {zoom_s:g} s in which the current changes most ({usable[0].name})."
+    return style.framed(fig, title, caption, 480, hovermode="x unified")
+
+
+def _add_interval(fig: Figure, item: Placed, model: str, first: bool) -> None:
+    trace = item.trace
+    assert isinstance(trace, Trace)
+    prediction = trace.predictions[model]
+    edges = (prediction.one_step_lower_v, prediction.one_step_upper_v)
+    low, high, centre = (_estimate(trace, v) for v in (*edges, prediction.one_step_v))
+    error = _error(trace, trace.physics_v)
+    band(fig, item.x, low, high, "interval", style.BLUE, first=first)
+    line(fig, item.x, error, "measured error", style.MEASURED, first=first, width=1.0)
+    line(fig, item.x, centre, "predicted error", style.BLUE, first=first)
+    line(fig, item.x, error - centre, "measured error", style.MEASURED, 2, False, 0.8)
+    band(fig, item.x, low - centre, high - centre, "interval", style.BLUE, 2, False, edge=1.2)
+
+
+def _stack(rows: int, heights: tuple[float, ...] | None = None) -> Figure:
+    from plotly.subplots import make_subplots
+
+    return make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.04, row_heights=heights)
+
+
+def _mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
+    """A dotted line where a record begins, and its name on top where there is room."""
+    for previous, item in zip(placed, placed[1:], strict=False):
+        fig.add_vline(x=float(previous.x[-1]), line={"width": 1, "dash": "dot", "color": style.GREY})
+        del item
+    if 1 < len(placed):
+        for item in placed:
+            fig.add_annotation(
+                x=float(item.x[0]),
+                y=1,
+                xref="x",
+                yref="y domain",
+                text=item.trace.name,
+                showarrow=False,
+                xanchor="left",
+                yanchor="top",
+                xshift=3,
+                font={"size": 10, "color": style.GREY},
+            )
+
+
+def _error(trace: Trace, model_v: Array) -> Array:
+    return (trace.measured_v - model_v) * style.MILLIVOLT
+
+
+def _estimate(trace: Trace, hybrid_v: Array | None) -> Array:
+    """The error that a hybrid voltage stands for, mV."""
+    assert hybrid_v is not None
+    return (hybrid_v - trace.physics_v) * style.MILLIVOLT
+
+
+def _has_intervals(trace: Trace, model: str) -> bool:
+    prediction = trace.predictions.get(model)
+    return prediction is not None and not (
+        prediction.one_step_v is None
+        or prediction.one_step_lower_v is None
+        or prediction.one_step_upper_v is None
+    )
+
+
+def _liveliest(traces: Sequence[Trace], window_s: float) -> Trace:
+    """The stretch of `window_s` in which the current travels furthest."""
+    best: tuple[float, Trace, slice] | None = None
+    for trace in traces:
+        for window in _windows(trace, window_s):
+            travelled = float(np.abs(np.diff(trace.current_a[window])).sum())
+            if best is None or travelled > best[0]:
+                best = (travelled, trace, window)
+    assert best is not None
+    return cut(best[1], best[2])
+
+
+def _windows(trace: Trace, window_s: float) -> Iterator[slice]:
+    """Half-overlapping windows over a record; the whole record where it is shorter."""
+    start, last = float(trace.time_s[0]), float(trace.time_s[-1])
+    while True:
+        low, high = np.searchsorted(trace.time_s, [start, start + window_s], side="left")
+        yield slice(int(low), max(int(high), int(low) + 2))
+        start += window_s / 2
+        if start + window_s > last:
+            return
+
+
+def cut(trace: Trace, rows: slice) -> Trace:
+    """A piece of a record, predictions included."""
+    from dataclasses import fields, replace
+
+    def piece(record: object) -> dict[str, Array]:
+        values = {f.name: getattr(record, f.name) for f in fields(record)}  # type: ignore[arg-type]
+        return {name: value[rows] for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    predictions = {name: replace(p, **piece(p)) for name, p in trace.predictions.items()}  # type: ignore[arg-type]
+    return replace(trace, predictions=predictions, **piece(trace))  # type: ignore[arg-type]
+
+
+def _role_word(role: str) -> str:
+    return {"train": "training", "valid": "validation", "test": "test"}[role]

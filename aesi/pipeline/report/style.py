@@ -1,0 +1,74 @@
+"""Colours, sizes and the frame of every figure. The palette is Okabe and Ito's, safe for colour-blind readers.
+
+Okabe & Ito, "Color Universal Design" (2008), jfly.uni-koeln.de/color. The page swaps INK and a few hues for
+lighter ones on a dark background.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+INK = "#1f2328"
+BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
+SKY, ORANGE, PURPLE, GREY = "#56B4E9", "#E69F00", "#CC79A7", "#8c8c8c"
+
+MEASURED, PHYSICS = INK, VERMILLION
+MODEL_COLOURS = (BLUE, GREEN, PURPLE, ORANGE, SKY)
+STATE_COLOURS = {"before": VERMILLION, "recalibrated": ORANGE, "after": BLUE}
+KIND_COLOURS = {"physics": BLUE, "parameter": GREEN, "instrument": ORANGE, "placebo": GREY}
+KIND_PATTERNS = {
+    kind: {"shape": shape, "fillmode": "overlay", "fgcolor": "rgba(255,255,255,0.7)", "solidity": 0.25}
+    for kind, shape in (("physics", ""), ("parameter", "/"), ("instrument", "x"), ("placebo", "."))
+}
+"""Kinds differ in hatching too, for prints in grey."""
+
+DIVERGING = "PuOr_r"
+SEQUENTIAL = "Cividis"
+
+MILLIVOLT = 1e3
+SECONDS_PER_HOUR = 3600.0
+LONGEST_IN_SECONDS = 20_000.0
+
+
+def figure(title: str, caption: str, height: int = 380, **layout: Any) -> Figure:
+    """An empty figure; title and caption travel in its `meta` for the page to set."""
+    from plotly.graph_objects import Figure
+
+    return framed(Figure(), title, caption, height, **layout)
+
+
+def framed(fig: Figure, title: str, caption: str, height: int = 380, **layout: Any) -> Figure:
+    """Give a figure the common frame: no title inside, the legend above, room for the units."""
+    fig.update_layout(
+        template="none",
+        meta={"title": title, "caption": caption},
+        height=height,
+        margin={"l": 64, "r": 16, "t": 36, "b": 48},
+        legend={"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom"},
+        **layout,
+    )
+    fig.update_xaxes(automargin=True, title_standoff=8)
+    fig.update_yaxes(automargin=True, title_standoff=8)
+    return fig
+
+
+def model_colours(names: Sequence[str], physics: str) -> dict[str, str]:
+    """One colour a model, the physics model always the same."""
+    others = [name for name in names if name != physics]
+    colours = {name: MODEL_COLOURS[i % len(MODEL_COLOURS)] for i, name in enumerate(others)}
+    return {physics: PHYSICS, **colours}
+
+
+def translucent(colour: str, alpha: float = 0.22) -> str:
+    """The same colour as rgba."""
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{alpha:g})"
+
+
+def time_unit(span_s: float) -> tuple[str, float]:
+    """Label and divisor for an axis of that length: seconds, or hours for long tests."""
+    return ("h", SECONDS_PER_HOUR) if span_s > LONGEST_IN_SECONDS else ("s", 1.0)

@@ -1,0 +1,159 @@
+"""What a report shows, as frozen records: arrays in SI units, plain rows, and nothing to compute from a file.
+
+Current is positive on discharge; voltage error e = V_measured - V_model, in volts here and in millivolts on
+the page.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from aesi.numerics.typing import Array, BoolArray
+
+Row = Mapping[str, Any]
+Role = Literal["train", "valid", "test"]
+Part = Literal["fit", "test"]
+
+KIND_ORDER = ("physics", "parameter", "instrument", "placebo")
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """One model's voltage over one record, (n,) V each; None where it was not computed.
+
+    free_run_* : no measured voltage after the first sample.  one_step_* : the step before is given.
+    """
+
+    free_run_v: Array
+    free_run_lower_v: Array | None = None
+    free_run_upper_v: Array | None = None
+    one_step_v: Array | None = None
+    one_step_lower_v: Array | None = None
+    one_step_upper_v: Array | None = None
+    diverged_at: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One record: what was measured, what the physics says, and what each model says.
+
+    time_s, current_a, soc, measured_v, physics_v : (n,).  outside : (n,) True where an input lies outside the
+    range the models were trained on.
+    """
+
+    name: str
+    role: Role
+    time_s: Array
+    current_a: Array
+    soc: Array
+    measured_v: Array
+    physics_v: Array
+    predictions: Mapping[str, Prediction] = field(default_factory=dict)
+    outside: BoolArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BootstrapView:
+    """The moving block bootstrap: n samples, block length, share of distinct samples in each resample."""
+
+    n: int
+    block: int
+    unique_fraction: Array
+
+
+@dataclass(frozen=True, eq=False)
+class RunView:
+    """Everything the report of a run shows.
+
+    models : rows of summary.json (see `aesi.pipeline.tables`); `chosen` and `physics` name two of them.
+    candidates : rows with oob, valid, terms and, where known, fitness, number, feasible, front, chosen.
+    terms : rows with term and, where known, importance (SVD), bagging, stability, inclusion.
+    settings : what the search picked (lambda1, lambda2, tau, ...), as text.
+    """
+
+    experiment: str
+    note: str
+    cell: str
+    chosen: str
+    models: tuple[Row, ...]
+    traces: tuple[Trace, ...]
+    candidates: tuple[Row, ...] = ()
+    terms: tuple[Row, ...] = ()
+    bootstrap: BootstrapView | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    versions: Mapping[str, str] = field(default_factory=dict)
+    mlflow_run_id: str = ""
+    seconds: float | None = None
+    physics: str = "ESPM"
+
+    def of(self, role: Role) -> tuple[Trace, ...]:
+        """The records of one role, in order."""
+        return tuple(trace for trace in self.traces if trace.role == role)
+
+    def model(self, name: str) -> Row | None:
+        """The row of that name, or None."""
+        return next((row for row in self.models if row["name"] == name), None)
+
+
+@dataclass(frozen=True, eq=False)
+class DiscoveryTrace:
+    """One measured file: (n,) V of the model as declared, with its own parameters refitted, and augmented."""
+
+    name: str
+    part: Part
+    time_s: Array
+    current_a: Array
+    soc: Array
+    measured_v: Array
+    before_v: Array
+    recalibrated_v: Array
+    after_v: Array
+
+
+@dataclass(frozen=True)
+class EffectView:
+    """An effect as the report explains it.
+
+    parameters : rows with name, unit, value, low, high and, where known, bounds (low, high) and description.
+    """
+
+    id: str
+    title: str
+    kind: str
+    equation: str
+    validity: str
+    source: str
+    parameters: tuple[Row, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class DiscoveryView:
+    """Everything the report of a discovery shows.
+
+    discovery : the content of discovery.json.  effects : those added, in their order.
+    files : rows with name, part, before_mv, recalibrated_mv, after_mv (RMSE) and, where known, gain_mv and
+    gain_low_mv, gain_high_mv (recalibrated minus after, with its block-bootstrap interval).
+    dependence : rows with variable, before, after: the share of the residual's variance that it explains.
+    experiments : rows with effects and experiment: what would tell the indistinguishable apart.
+    """
+
+    title: str
+    cell: str
+    discovery: Mapping[str, Any]
+    traces: tuple[DiscoveryTrace, ...]
+    effects: tuple[EffectView, ...] = ()
+    files: tuple[Row, ...] = ()
+    dependence: tuple[Row, ...] = ()
+    experiments: tuple[Row, ...] = ()
+    titles: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    versions: Mapping[str, str] = field(default_factory=dict)
+    mlflow_run_id: str = ""
+    seconds: float | None = None
+
+    def of(self, part: Part) -> tuple[DiscoveryTrace, ...]:
+        """The files of one part, in order."""
+        return tuple(trace for trace in self.traces if trace.part == part)

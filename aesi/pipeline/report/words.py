@@ -1,0 +1,119 @@
+"""The finding of a report in plain words, from the numbers alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from aesi.pipeline.report.views import DiscoveryView, Row, RunView
+
+LARGE_SHARE = 0.5
+"""An explainable rest above this share of the remaining error is worth a sentence."""
+
+
+def run_finding(view: RunView) -> str:
+    """What the correction buys on the test records in free run, and what the one-step figure is worth."""
+    model, physics = view.model(view.chosen), view.model(view.physics)
+    if model is None or physics is None or "free_run" not in model:
+        return f"No model of the voltage error could be evaluated on {view.cell}."
+    before, after = physics["free_run"]["test_rmse_mv"], model["free_run"]["test_rmse_mv"]
+    reduction = model["free_run"]["test_mser_pct"]
+    if reduction <= 0:
+        return (
+            f"The data-driven correction does not help here: in free run on the test records the error "
+            f"grows from "
+            f"{before:.1f} mV to {after:.1f} mV. Use the {view.physics} alone."
+        )
+    return (
+        f"On test records that chose nothing, run without any measured voltage, {view.chosen} takes the "
+        f"voltage "
+        f"error from {before:.1f} mV to {after:.1f} mV RMSE: {reduction:.1f} % less mean squared error "
+        f"than the "
+        f"{view.physics} alone."
+    )
+
+
+def persistence_finding(model: Row) -> str:
+    """One step ahead against persistence, in words."""
+    step = model.get("one_step", {})
+    ours, echo = step.get("test_rmse_mv"), step.get("persistence_rmse_mv")
+    if ours is None or echo is None:
+        return ""
+    verdict = "better than" if ours < echo else "no better than"
+    return (
+        f"One step ahead, with the measured voltage given, it errs by {ours:.2f} mV, {verdict} repeating "
+        f"the last "
+        f"error (persistence, {echo:.2f} mV): one-step figures flatter, the free run is the figure that "
+        f"counts."
+    )
+
+
+def interval_finding(model: Row) -> str:
+    """Coverage against the nominal level, in words."""
+    interval = model.get("intervals", {})
+    if "coverage_pct" not in interval:
+        return ""
+    text = (
+        f"{interval['nominal_pct']:.0f} % intervals one step ahead cover {interval['coverage_pct']:.1f} % "
+        f"of the "
+        f"test samples with {1e3 * interval['average_width_v']:.2f} mV average width"
+    )
+    worst = interval.get("worst_bin_coverage_pct")
+    return text + (f"; {worst:.1f} % in the worst (current, SOC) bin." if worst is not None else ".")
+
+
+def discovery_finding(view: DiscoveryView) -> str:
+    """The verdict as one sentence."""
+    verdict = view.discovery["verdict"]
+    effects = [_title(view.titles, e) for e in view.discovery["effects"]]
+    confidence = view.discovery["confidence"]
+    sure = f" ({100 * confidence:.0f} % confidence)"
+    if verdict == "found":
+        return f"The declared model of {view.cell} lacks {listed(effects)}{sure}."
+    if verdict == "none":
+        return f"Nothing is missing from the declared model of {view.cell} that these data could show{sure}."
+    if effects:
+        return (
+            f"The declared model of {view.cell} lacks {listed(effects)}, and something more that no "
+            f"effect of the "
+            f"catalogue explains{sure}."
+        )
+    return f"The declared model of {view.cell} lacks something real that no effect of the catalogue explains{sure}."
+
+
+def discovery_consequence(view: DiscoveryView) -> str:
+    """What that brings on data that chose nothing, apart from what any refit brings."""
+    values = {
+        state: view.discovery.get(state, {}).get("test", {}).get("rmse_mv")
+        for state in ("before", "recalibrated", "after")
+    }
+    if any(value is None for value in values.values()):
+        return ""
+    return (
+        f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
+        f"same model "
+        f"with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model with the "
+        f"finding "
+        f"added by {values['after']:.1f} mV; the noise floor is {view.discovery['noise_floor_mv']:.1f} mV."
+    )
+
+
+def rest_finding(discovery: Mapping[str, Any]) -> str:
+    """What a data-driven correction could still explain."""
+    rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")
+    text = f"A sparse correction learnt on what is left could still explain {rest:.1f} mV"
+    if after:
+        share = "much" if rest > LARGE_SHARE * after else "little"
+        text += f" of {after:.1f} mV: {share} structure is left for physics to name"
+    return text + "."
+
+
+def listed(names: Sequence[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    if len(names) < 2:
+        return "".join(names)
+    return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _title(titles: Mapping[str, str], effect: str) -> str:
+    return titles.get(effect, effect.replace("_", " "))

@@ -1,0 +1,99 @@
+"""The two reports: which figures and sentences stand on the page of a run and of a discovery."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aesi.pipeline import tables
+from aesi.pipeline.figures import paper_figures, predicted_models
+from aesi.pipeline.report import words
+from aesi.pipeline.report.page import write_page
+from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records
+from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, RunView
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+STATES = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding added"}
+
+
+def write_run_report(path: str | Path, view: RunView) -> Path:
+    """Write the report of one run to `path` and return it."""
+    figures = paper_figures(view)
+    if view.candidates:
+        figures["front"] = ensemble.front_figure(view.candidates)
+    coefficients = ensemble.coefficient_figure(view.terms)
+    if coefficients is not None:
+        figures["coefficients"] = coefficients
+    chosen = view.model(view.chosen) or {"name": view.chosen}
+    return write_page(
+        path,
+        "run.html",
+        figures,
+        title=f"{view.experiment}: hybrid model of {view.cell}",
+        view=view,
+        chosen=chosen,
+        physics=view.model(view.physics) or {"name": view.physics},
+        finding=words.run_finding(view),
+        sentences=[s for s in (words.persistence_finding(chosen), words.interval_finding(chosen)) if s],
+        tables=tables.all_tables(view.models),
+        models=predicted_models(view),
+    )
+
+
+def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
+    """Write the report of one discovery to `path` and return it."""
+    return write_page(
+        path,
+        "discovery.html",
+        discovery_figures(view),
+        title=f"{view.title}: what the model of {view.cell} lacks",
+        view=view,
+        discovery=view.discovery,
+        states=STATES,
+        finding=words.discovery_finding(view),
+        consequence=words.discovery_consequence(view),
+        rest=words.rest_finding(view.discovery),
+        candidates=sorted(view.discovery["candidates"], key=lambda row: -row["score"]),
+    )
+
+
+def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
+    """All figures of a discovery, by name."""
+    figures: dict[str, Figure] = {}
+    tested = view.of("test") or view.of("fit")
+    for part in ("test", "fit"):
+        if view.of(part):
+            figures[f"residual_{part}"] = records.residual_figure(view.of(part), STATES)
+    if tested:
+        figures |= _over_the_range(tested)
+    if view.discovery["candidates"]:
+        figures["scores"] = hypotheses.ranking_figure(
+            view.discovery["candidates"], view.titles, view.discovery["effects"]
+        )
+    if view.files:
+        figures["files"] = hypotheses.files_figure(view.files, STATES)
+    if view.dependence:
+        figures["dependence"] = hypotheses.dependence_bars(view.dependence)
+    return figures
+
+
+def _over_the_range(traces: Sequence[DiscoveryTrace]) -> dict[str, Figure]:
+    """Residual against current and SOC, and maps over both, before and after."""
+    current = np.concatenate([t.current_a for t in traces])
+    soc = np.concatenate([t.soc for t in traces])
+    errors = {
+        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces])
+        for state in ("before", "after")
+    }
+    limit = maps.shared_limit(current, soc, list(errors.values()), False)
+    return {
+        "against_current": maps.dependence_figure(current, errors, STATES, "current, A (discharge > 0)"),
+        "against_soc": maps.dependence_figure(100 * soc, errors, STATES, "SOC, %"),
+        "map_before": maps.map_figure(current, soc, errors["before"], "As declared", False, limit),
+        "map_after": maps.map_figure(current, soc, errors["after"], "With the finding added", False, limit),
+    }
