@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
 from aesi.sparse.inputs import with_inputs
@@ -86,6 +86,10 @@ class SparseModel:
         measured = self.scaling.error_to_scaled(series.error_v)
         scaled = free_run.ahead(drive, self._functions, measured, steps, self._clip, free_run.LIMIT)
         return np.append(series.error_v[:1], self.scaling.error_to_volts(scaled))
+
+    def outside(self, series: ErrorSeries) -> BoolArray:
+        """(n,) True where an input or the measured error lies outside the trained range."""
+        return self.scaling.is_outside(self._variables(series))
 
     def gain(self, series: ErrorSeries) -> Array:
         """(n,) slope of the map e[k] -> e[k + 1] along a record; stable where its size is below one."""

@@ -173,10 +173,10 @@ def _prepared(
 ) -> tuple[tuple[ErrorSeries, ...], tuple[ErrorSeries, ...], tuple[str, ...]]:
     if not split.train:
         raise DataError("there are no training records.")
+    notes: tuple[str, ...] = ()
+    names = options.inputs or split.train[0].input_names
     if library is not None:
-        names, notes = library.variables[1:], ()
-    else:
-        names = options.inputs or split.train[0].input_names
+        names = library.variables[1:]
     train = [with_inputs(record, names) for record in split.train]
     for record in train:
         _check(record, train[0].dt_s)

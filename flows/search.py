@@ -1,0 +1,277 @@
+"""Evolutionary search over libraries and hyperparameters: NSGA-II, three losses, two correlation constraints.
+
+    minimise  loss_oob, loss_valid, loss_sparse    subject to  pearson_train > eps1, pearson_valid > eps2
+
+The front is kept whole; the paper's scalar fitness, 1 - (g1 L_oob + g2 L_valid + g3 L_sparse), picks from it
+and `SearchResult.sensitivity` shows how the pick moves with g. A candidate that fails is a pruned trial with
+its reason. How the term mask travels, and why, is told in term_sampler.py.
+
+A generation is asked for as a whole and told in order, so a search gives the same trials whoever evaluates
+them and however many at a time.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import optuna
+from optuna.storages import BaseStorage, JournalStorage, RDBStorage
+from optuna.storages.journal import JournalFileBackend
+from optuna.study import Study
+from optuna.trial import FrozenTrial, TrialState
+
+from aesi.errors import ConfigError, FitError
+from aesi.records import Failed
+from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate, fitness
+from flows.term_sampler import INDEX, GenomeSpace, TermSampler, genome_of, violation
+
+Outcome = Candidate | Failed
+EvaluateMany = Callable[[Sequence[Genome]], Iterable[tuple[int, Outcome]]]
+"""A generation in, (position, outcome) out, in any order."""
+OnCandidate = Callable[[int, Genome, Outcome], None]
+
+_FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
+_RECORD = "record"
+_RECORDED = (
+    "fitness",
+    "pearson_train",
+    "pearson_valid",
+    "free_run_valid_mser_pct",
+    "one_step_valid_rmse_v",
+)
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Least Pearson correlation of error and prediction, in free run."""
+
+    pearson_train: float = 0.5
+    pearson_valid: float = 0.5
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One finished trial. `losses` is None where it failed, and `reason` says why.
+
+    number : its index in the search.
+    numbers : fitness, correlations and validation figures by name, as in `Candidate`.
+    """
+
+    number: int
+    genome: Genome
+    losses: tuple[float, float, float] | None
+    feasible: bool
+    numbers: dict[str, float]
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class Pick:
+    """Which trial the fitness takes under given weights."""
+
+    weights: FitnessWeights
+    trial: Trial
+    fitness: float
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """All finished trials of a study, and what to choose from them."""
+
+    study: Study
+    library_size: int
+    weights: FitnessWeights
+
+    @cached_property
+    def trials(self) -> tuple[Trial, ...]:
+        """In order of their number."""
+        stored = self.study.get_trials(deepcopy=False, states=_FINISHED)
+        return tuple(sorted((_read(trial) for trial in stored), key=lambda trial: trial.number))
+
+    @property
+    def feasible(self) -> tuple[Trial, ...]:
+        """Those that were evaluated and meet the constraints."""
+        return tuple(trial for trial in self.trials if trial.feasible)
+
+    def front(self) -> tuple[Trial, ...]:
+        """Feasible trials that no other feasible one beats in all losses."""
+        return tuple(
+            trial for trial in self.feasible if not any(_dominates(other, trial) for other in self.feasible)
+        )
+
+    def best(self, weights: FitnessWeights | None = None) -> Pick:
+        """The trial of highest fitness; the earlier one on a tie.
+
+        Raises FitError, with the reasons counted, where no trial is feasible.
+        """
+        weights = weights or self.weights
+        front = self.front()
+        if not front:
+            raise FitError(self._nothing_feasible())
+        scored = [(fitness(t.losses, self.library_size, weights), -t.number, t) for t in front if t.losses]
+        score, _, trial = max(scored, key=lambda entry: entry[:2])
+        return Pick(weights, trial, score)
+
+    def sensitivity(self, several: Sequence[FitnessWeights] = ()) -> tuple[Pick, ...]:
+        """The picks under other weights (default: each loss in turn counting little, or most)."""
+        return tuple(self.best(weights) for weights in several or _around(self.weights))
+
+    def _nothing_feasible(self) -> str:
+        reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)
+        listed = "; ".join(f"{count} x {reason}" for reason, count in reasons.most_common(4))
+        return (
+            f"none of {len(self.trials)} candidates is feasible ({listed or 'none was evaluated'}); "
+            "lower the correlation constraints, widen the ranges, or evaluate more candidates."
+        )
+
+
+def search(
+    problem: Problem,
+    n_trials: int,
+    seed: int = 0,
+    storage: str | Path | BaseStorage | None = None,
+    name: str = "aesi",
+    on_candidate: OnCandidate | None = None,
+    evaluate_one: Callable[[Problem, Genome], Outcome] = evaluate,
+    evaluate_many: EvaluateMany | None = None,
+    space: GenomeSpace | None = None,
+    population: int = 20,
+    constraints: Constraints | None = None,
+    weights: FitnessWeights | None = None,
+    warm_start: Sequence[Genome] = (),
+    shared: bool = False,
+) -> SearchResult:
+    """Search until the study holds `n_trials` finished trials; continue what `storage` already holds.
+
+    storage : None keeps the study in memory; a path is a journal file; a URL (with ://) a database. Workers
+    that share a storage and `name` share the study.
+    on_candidate : called with index, genome and outcome as each is evaluated.
+    evaluate_one : what evaluates a candidate; evaluate_many, if given, evaluates a generation instead.
+    population : candidates in a generation.  warm_start : genomes to begin with.
+    shared : other processes work on the study now; else trials that a killed process left are taken up again.
+    The same seed gives the same candidates, interrupted or not, as long as one process searches.
+    Exceptions of the evaluation are bugs: the trial is marked as failed and they propagate.
+    """
+    space = space or GenomeSpace(len(problem.library))
+    if space.size != len(problem.library):
+        raise ConfigError(f"the genome space has {space.size} terms, the library {len(problem.library)}.")
+    constraints = constraints or Constraints()
+    sampler = TermSampler(space, seed, population, warm_start)
+    study = _open(storage, name, sampler)
+    if not shared:
+        for left in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):
+            study.tell(left.number, state=TrialState.FAIL)
+
+    def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:
+        return ((k, evaluate_one(problem, genome)) for k, genome in enumerate(genomes))
+
+    while (missing := n_trials - len(study.get_trials(deepcopy=False, states=_FINISHED))) > 0:
+        _generation(
+            study,
+            sampler,
+            min(missing, population),
+            evaluate_many or one_by_one,
+            constraints,
+            on_candidate,
+        )
+    return SearchResult(study, space.size, weights or FitnessWeights())
+
+
+def _generation(
+    study: Study,
+    sampler: TermSampler,
+    most: int,
+    evaluate_many: EvaluateMany,
+    constraints: Constraints,
+    on_candidate: OnCandidate | None,
+) -> None:
+    indices = _next_indices(study, sampler.size, most)
+    asked = [sampler.ask(study, index) for index in indices]
+    outcomes: dict[int, Outcome] = {}
+    try:
+        for position, outcome in evaluate_many([genome for _, genome in asked]):
+            outcomes[position] = outcome
+            if on_candidate is not None:
+                on_candidate(indices[position], asked[position][1], outcome)
+    finally:
+        # What is known is told even if the rest was interrupted, so that a resumed search keeps it.
+        for position, (trial, _) in enumerate(asked):
+            if position in outcomes:
+                _tell(study, trial, outcomes[position], constraints)
+            else:
+                study.tell(trial, state=TrialState.FAIL)
+
+
+def _next_indices(study: Study, population: int, most: int) -> list[int]:
+    """The lowest free indices, within one generation so that the next one has all of its parents."""
+    trials = study.get_trials(deepcopy=False, states=(*_FINISHED, TrialState.RUNNING))
+    taken = {trial.user_attrs.get(INDEX) for trial in trials}
+    free = [index for index in range(len(trials) + most) if index not in taken][:most]
+    return [index for index in free if index // population == free[0] // population]
+
+
+def _tell(study: Study, trial: optuna.Trial, outcome: Outcome, constraints: Constraints) -> None:
+    if isinstance(outcome, Failed):
+        trial.set_user_attr("reason", outcome.reason)
+        study.tell(trial, state=TrialState.PRUNED)
+        return
+    trial.set_user_attr(_RECORD, {key: float(getattr(outcome, key)) for key in _RECORDED})
+    trial.set_constraint("pearson_train", constraints.pearson_train - outcome.pearson_train)
+    trial.set_constraint("pearson_valid", constraints.pearson_valid - outcome.pearson_valid)
+    study.tell(trial, outcome.losses)
+
+
+def _open(storage: str | Path | BaseStorage | None, name: str, sampler: TermSampler) -> Study:
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    return optuna.create_study(
+        storage=_storage(storage),
+        study_name=name,
+        sampler=sampler,
+        directions=["minimize"] * 3,
+        load_if_exists=True,
+    )
+
+
+def _storage(storage: str | Path | BaseStorage | None) -> BaseStorage | None:
+    if storage is None or isinstance(storage, BaseStorage):
+        return storage
+    if "://" in str(storage):
+        return RDBStorage(str(storage))
+    Path(storage).parent.mkdir(parents=True, exist_ok=True)
+    return JournalStorage(JournalFileBackend(str(storage)))
+
+
+def _read(trial: FrozenTrial) -> Trial:
+    done = trial.state == TrialState.COMPLETE
+    numbers: dict[str, Any] = trial.user_attrs.get(_RECORD, {})
+    losses = (trial.values[0], trial.values[1], trial.values[2]) if done else None
+    return Trial(
+        trial.user_attrs[INDEX],
+        genome_of(trial),
+        losses,
+        done and violation(trial) == 0,
+        numbers,
+        trial.user_attrs.get("reason"),
+    )
+
+
+def _dominates(a: Trial, b: Trial) -> bool:
+    pairs = list(zip(a.losses or (), b.losses or (), strict=True))
+    return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)
+
+
+def _around(centre: FitnessWeights) -> tuple[FitnessWeights, ...]:
+    few, most = 0.1, 0.8
+    return (
+        centre,
+        FitnessWeights(most, few, few),
+        FitnessWeights(few, most, few),
+        FitnessWeights(few, few, most),
+        FitnessWeights(0.5, 0.5, 0.0),
+        FitnessWeights(1 / 3, 1 / 3, 1 / 3),
+    )
