@@ -1,4 +1,4 @@
-"""A saved hybrid model as MLflow serves it. MLflow runs this file when it loads the model; nothing is pickled.
+"""A saved hybrid model as MLflow serves it. MLflow runs this file to load the model; nothing is pickled.
 
 In: a table with time_s, current_a and, if measured, voltage_v (one step ahead then; free run without it).
 Out: voltage_v, lower_v, upper_v, one row a row. Parameter soc0: state of charge at the first row.

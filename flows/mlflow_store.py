@@ -1,7 +1,7 @@
 """The tracking store, spoken to through MLflow's client with explicit run ids.
 
-Nothing here decides what is tracked (`flows.tracking` does); this sends items, knows whether a failure passes,
-and sends an item twice without doubling it.
+Nothing here decides what is tracked (`flows.tracking` does); this sends items, knows whether a failure
+passes, and sends an item twice without doubling it.
 """
 
 from __future__ import annotations
@@ -202,7 +202,7 @@ def _alone(local: bool) -> Iterator[None]:
 
 
 def _write_ahead(database: Path) -> None:
-    """With a write-ahead log, readers (the UI, another run) never block the writer. The mode is kept in the file."""
+    """With a write-ahead log readers (the UI, another run) never block the writer; the file keeps the mode."""
     import sqlite3
 
     database.parent.mkdir(parents=True, exist_ok=True)
@@ -226,7 +226,8 @@ def _reach(uri: str) -> None:
 def _unusable(uri: str, error: Exception) -> StoreAway:
     reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
     advice = (
-        "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's SQLite file"
+        "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's own "
+        "SQLite file"
         if uri.startswith("http")
         else "check the address, or move the file away to start a new one"
     )

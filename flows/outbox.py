@@ -1,8 +1,8 @@
 """A queue on disk between a run and its tracking store.
 
-What is to be tracked is first written here, then delivered by a thread, in order. A store that is away, slow or
-locked costs the run nothing; a killed run loses nothing. Delivery is idempotent: an item that was sent but not
-yet crossed off when the process died is recognised by the store's own records.
+What is to be tracked is first written here, then delivered by a thread, in order. A store that is away, slow
+or locked costs the run nothing; a killed run loses nothing. Delivery is idempotent: an item that was sent but
+not yet crossed off when the process died is recognised by the store's own records.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ REFUSED = "refused"
 class Outbox:
     """Items of one run below `folder`; `deliver` raises where an item could not be sent.
 
-    away : tells a passing failure (retried for ever) from an item that the store refuses (put aside, and said).
+    away : tells a passing failure (retried for ever) from an item the store refuses (put aside, and said).
     """
 
     def __init__(

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from aesi.errors import ConfigError
-from aesi.records import INPUT_NAMES, Hold
+from aesi.records import Hold
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -113,33 +113,43 @@ class CellConfig(Section):
 
 
 class LibraryConfig(Section):
-    """The candidate terms the search may choose from."""
+    """The candidate terms the search may choose from (`aesi.sparse.Library.build`).
 
-    p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (1, 2)
+    p_c, d : range of the highest polynomial order and of the total degree; their upper ends make the library.
+    factors : most variables in a product.  special : with trigonometric and hyperbolic functions.
+    mixed : and their products with first-order terms.  inputs : None takes those of the records.
+    """
+
+    p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (0, 3)
     d: tuple[Annotated[int, Field(ge=1, le=5)], Annotated[int, Field(ge=1, le=5)]] = (1, 3)
-    functions: tuple[str, ...] = ("sin", "cos", "tan", "sinh", "cosh", "tanh")
-    inputs: tuple[str, ...] = INPUT_NAMES
+    factors: Annotated[int, Field(ge=1, le=3)] = 3
+    special: bool = True
+    mixed: bool = False
+    inputs: tuple[str, ...] | None = None
 
 
 class SearchConfig(Section):
     """The evolutionary search, in the paper's symbols.
 
-    block : rows of a bootstrap block.  weights : gamma of the losses (out-of-bag, validation, sparsity) in
-    the scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints.
+    block : rows of a bootstrap block.  horizon : rows of a free run inside the losses, None for a block.
+    regime : what the losses measure.  weights : gamma of the losses (out-of-bag, validation, sparsity) in the
+    scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints.
     timeout_s, memory_mb : what one candidate may take before it counts as failed.
     """
 
     candidates: Count = 40
     population: Annotated[int, Field(ge=2)] = 20
     resamples: Annotated[int, Field(ge=2)] = 100
-    block: Annotated[int, Field(ge=1)] = 500
+    block: Count | None = None
+    horizon: Count | None = None
+    regime: Literal["free_run", "one_step"] = "free_run"
     top_share: Annotated[float, Field(gt=0, le=1)] = 0.1
-    lambda1: tuple[Positive, Positive] = (1e-13, 1e-1)
-    lambda2: tuple[Positive, Positive] = (1e-2, 5.0)
+    lambda1: tuple[Positive, Positive] = (1e-13, 1e3)
+    lambda2: tuple[Positive, Positive] = (1e-3, 5.0)
     tau: tuple[Share, Share] = (0.3, 0.7)
     pearson_train: Annotated[float, Field(ge=-1, le=1)] = 0.5
     pearson_valid: Annotated[float, Field(ge=-1, le=1)] = 0.5
-    weights: tuple[float, float, float] = (0.25, 0.7, 0.05)
+    weights: tuple[float, float, float] = (0.45, 0.45, 0.10)
     timeout_s: Positive = 300.0
     memory_mb: Positive = 6000.0
     workers: Count = 1
@@ -237,7 +247,15 @@ class ExperimentConfig(Section):
     @property
     def digest(self) -> str:
         """Content hash of what decides the result; who computes and where it is tracked does not."""
-        content = self.model_dump(mode="json", exclude={"note", "tracking", "runner", "base"})
+        return self._hash()
+
+    @property
+    def setting(self) -> str:
+        """The digest without the seed: runs of one setting can be put together as mean and spread."""
+        return self._hash("seed")
+
+    def _hash(self, *without: str) -> str:
+        content = self.model_dump(mode="json", exclude={"note", "tracking", "runner", "base", *without})
         for key in ("workers", "timeout_s", "memory_mb"):
             content["search"].pop(key)
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]

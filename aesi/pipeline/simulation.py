@@ -1,0 +1,135 @@
+"""Files in, files out: the physics model alone, and a saved hybrid model with its intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aesi.data.current import CurrentProfile, read_current
+from aesi.data.read import Sign
+from aesi.errors import DataError, InputError
+from aesi.physics import Cell, simulate
+from aesi.pipeline.hybrid import HybridModel
+from aesi.records import Hold, Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from aesi.physics import ActiveEffect
+
+
+def simulate_file(
+    cell: Path,
+    current: Path,
+    out: Path,
+    soc0: float | None = None,
+    effects: Sequence[tuple[str, Mapping[str, float]]] = (),
+    effect_files: Sequence[Path] = (),
+    hold: Hold = "linear",
+    columns: Mapping[str, str | None] | None = None,
+    sign: Sign = "discharge-positive",
+) -> Run:
+    """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
+
+    cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
+    soc0 : None takes it from the first voltage of the file, where it has one, else from the saved model.
+    """
+    profile = read_current(current, columns, sign)
+    saved = HybridModel.load(cell) if cell.is_dir() else None
+    declared = saved.cell if saved else Cell.from_bpx(cell)
+    active = (*(saved.effects if saved else ()), *_activated(effects, effect_files))
+    if soc0 is None and profile.voltage_v is None:
+        soc0 = saved.soc0 if saved else None
+        if soc0 is None:
+            raise DataError(f"{current.name} has no voltage to start from; give --soc0.")
+    rest = None if profile.voltage_v is None else float(profile.voltage_v[0])
+    run = simulate(
+        declared,
+        profile.time_s,
+        profile.current_a,
+        soc0,
+        active,
+        profile.temperature_degc,
+        hold,
+        rest_voltage_v=rest,
+    )
+    columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
+    write_table(out, columns_out)
+    return run
+
+
+def predict_file(
+    model: Path,
+    current: Path,
+    out: Path,
+    measured: bool = False,
+    soc0: float | None = None,
+    columns: Mapping[str, str | None] | None = None,
+    sign: Sign = "discharge-positive",
+) -> int:
+    """Predict the voltage of the profile in `current`, write it with its band to `out`; the number of rows.
+
+    measured : one step ahead from the file's voltage; otherwise a free run.
+    """
+    profile = read_current(current, columns, sign)
+    if measured and profile.voltage_v is None:
+        raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
+    hybrid = HybridModel.load(model)
+    prediction = hybrid.predict(
+        profile.time_s,
+        profile.current_a,
+        soc0=_start(hybrid, profile, soc0),
+        voltage_v=profile.voltage_v if measured else None,
+        temperature_degc=profile.temperature_degc,
+    )
+    frame = prediction.to_frame()
+    frame.insert(1, "current_a", profile.current_a)
+    _write(out, frame)
+    return len(frame)
+
+
+def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Columns as a CSV; the folder is made. Raises InputError where it cannot be written."""
+    import pandas as pd
+
+    _write(path, pd.DataFrame(columns))
+
+
+def _start(hybrid: HybridModel, profile: CurrentProfile, soc0: float | None) -> float | None:
+    if soc0 is not None or profile.voltage_v is None:
+        return soc0
+    from aesi.physics import initial_soc
+
+    return initial_soc(hybrid.cell, float(profile.voltage_v[0]))
+
+
+def _write(path: Path, frame: pd.DataFrame) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        frame.to_csv(path, index=False, float_format="%.9g")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
+
+
+def _activated(
+    effects: Sequence[tuple[str, Mapping[str, float]]], files: Sequence[Path]
+) -> tuple[ActiveEffect, ...]:
+    from difflib import get_close_matches
+
+    from aesi.physics.effects import CATALOGUE
+
+    known = dict(CATALOGUE)
+    for path in files:
+        from aesi.physics.effects import load_effect
+
+        effect = load_effect(path)
+        known[effect.id] = effect
+    for name, _ in effects:
+        if name not in known:
+            near = get_close_matches(name, list(known), n=1)
+            hint = f"; did you mean {near[0]!r}?" if near else "."
+            raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
+    return tuple(known[name].activate(**values) for name, values in effects)
