@@ -202,7 +202,7 @@ def _alone(local: bool) -> Iterator[None]:
 
 
 def _write_ahead(database: Path) -> None:
-    """With a write-ahead log readers (the UI, another run) never block the writer; the file keeps the mode."""
+    """With a write-ahead log readers (the UI, another run) never block the writer; the mode stays."""
     import sqlite3
 
     database.parent.mkdir(parents=True, exist_ok=True)
