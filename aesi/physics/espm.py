@@ -9,19 +9,19 @@ doi:10.1149/2.0341915jes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
 from aesi.errors import DataError, SimulationError
-from aesi.numerics.galerkin import sphere_modes, stack_modes
 from aesi.numerics.typing import Array
-from aesi.physics.cell import Cell, Electrode, initial_soc
-from aesi.physics.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
+from aesi.physics.cell import Cell, initial_soc
+from aesi.physics.constants import ZERO_CELSIUS_K
+from aesi.physics.effect import ActiveEffect, Record, Trace
 from aesi.physics.model import EspmModel
-from aesi.physics.tables import conductivity_table, electrolyte_diffusion, ocp_table
+from aesi.physics.plain import run_plain
 from aesi.records import Hold, Run
 
 OnDepletion = Literal["raise", "clip"]
@@ -33,7 +33,7 @@ def simulate(
     time_s: Array,
     current_a: Array,
     soc0: float | None = None,
-    effects: Iterable[Any] = (),
+    effects: Iterable[ActiveEffect] = (),
     temperature_degc: Array | float | None = None,
     hold: Hold = "linear",
     *,
@@ -44,6 +44,9 @@ def simulate(
 
     time_s : (n,) s, strictly increasing, any sampling.  current_a : (n,) A, positive on discharge.
     soc0 : state of charge at rest before the first sample; None takes it from `rest_voltage_v`.
+    effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
+    temperature_degc : (n,) or one value: the cell's measured temperature; None leaves it to the cell file's
+    initial temperature, or to the heat balance where an effect brings one.
     hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row
     before.
     on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
@@ -55,18 +58,82 @@ def simulate(
     Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated.
     """
     time, current = _checked_record(time_s, current_a)
+    active = _instruments_first(effects)
+    model = model_with(cell, active)
+    record = Record(time, current, _kelvin(temperature_degc, time))
+    for effect in active:
+        if effect.effect.on_record is not None:
+            record = effect.effect.on_record(record, **effect.parameters)
     if soc0 is None:
-        soc0 = _soc_from_rest(cell, rest_voltage_v)
-    model = EspmModel(cell)
-    rows, fault_at, fault = _run(model, time, current, soc0, hold)
-    series = _series(cell, rows, np.full(len(time), cell.initial_temperature_k))
+        soc0 = _soc_from_rest(model, active, rest_voltage_v)
+    rows, extra, fault_at, fault = _core(model, record, soc0, hold)
+    series = _series(model.cell, rows, time) | extra
     if fault_at >= 0:
         if on_depletion == "raise":
             raise SimulationError(_depletion(cell, time, fault_at, fault))
         series["depleted"] = (np.arange(len(time)) >= fault_at).astype(float)
     elif on_depletion == "clip":
         series["depleted"] = np.zeros(len(time))
-    return Run(time, current, rows[0], series)
+    voltage = _voltage_effects(model, active, record, rows[0], series, hold)
+    return Run(time, current, voltage, series)
+
+
+def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:
+    """The model of `cell` after what the effects do to it."""
+    return _model_with(cell, tuple(effects))
+
+
+@lru_cache(maxsize=128)
+def _model_with(cell: Cell, effects: tuple[ActiveEffect, ...]) -> EspmModel:
+    model = EspmModel(cell)
+    for active in effects:
+        if active.effect.on_model is not None:
+            model = active.effect.on_model(model, **active.parameters)
+    return model
+
+
+def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
+    """What was recorded has to be set right before the cell can answer to it."""
+    return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
+
+
+def _core(
+    model: EspmModel, record: Record, soc0: float, hold: Hold
+) -> tuple[Array, dict[str, Array], int, int]:
+    time, current = record.time_s, record.current_a
+    temperature = record.temperature_k
+    if temperature is not None and np.ptp(temperature) == 0.0:
+        model = model.with_cell(initial_temperature_k=float(temperature[0]))
+        if model.heat is None:
+            temperature = None
+    if model.is_plain and temperature is None:
+        rows, fault_at, fault = run_plain(model, time, current, soc0, hold)
+        kelvin = np.full(len(time), model.cell.initial_temperature_k)
+        return rows, {"temperature_k": kelvin}, fault_at, fault
+    from aesi.physics.extended import run_extended
+
+    return run_extended(model, time, current, temperature, soc0, hold)
+
+
+def _voltage_effects(
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    record: Record,
+    voltage: Array,
+    series: dict[str, Array],
+    hold: Hold,
+) -> Array:
+    for active in effects:
+        if active.effect.on_voltage is not None:
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
+            added = active.effect.on_voltage(trace, **active.parameters)
+            voltage = voltage + added.voltage_v
+            series.update(added.series)
+    for active in effects:
+        if active.effect.on_reading is not None:
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
+            voltage = active.effect.on_reading(trace, **active.parameters)
+    return voltage
 
 
 def _checked_record(time_s: Array, current_a: Array) -> tuple[Array, Array]:
@@ -86,10 +153,28 @@ def _checked_record(time_s: Array, current_a: Array) -> tuple[Array, Array]:
     return time, current
 
 
-def _soc_from_rest(cell: Cell, rest_voltage_v: float | None) -> float:
+def _kelvin(temperature_degc: Array | float | None, time: Array) -> Array | None:
+    if temperature_degc is None:
+        return None
+    kelvin = np.asarray(temperature_degc, dtype=float) + ZERO_CELSIUS_K
+    if kelvin.shape not in ((), time.shape) or not np.isfinite(kelvin).all() or not (kelvin > 0).all():
+        raise DataError(
+            f"temperature_degc has to be one value or {len(time)} finite ones, above -273.15 degC."
+        )
+    return np.ascontiguousarray(np.broadcast_to(kelvin, time.shape))
+
+
+def _soc_from_rest(model: EspmModel, effects: Sequence[ActiveEffect], rest_voltage_v: float | None) -> float:
+    """State of charge from the rest voltage, freed of what instrument faults add to it."""
     if rest_voltage_v is None:
         raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
-    return initial_soc(cell, rest_voltage_v)
+    true = np.array([rest_voltage_v])
+    one = np.zeros(1)
+    for active in effects:
+        if active.effect.on_reading is not None:
+            trace = Trace(model, one, one, np.array([rest_voltage_v]), {})
+            true = true - (active.effect.on_reading(trace, **active.parameters) - rest_voltage_v)
+    return initial_soc(model.cell, float(true[0]))
 
 
 def _depletion(cell: Cell, time: Array, at: int, fault: int) -> str:
@@ -103,7 +188,7 @@ def _depletion(cell: Cell, time: Array, at: int, fault: int) -> str:
     )
 
 
-def _series(cell: Cell, rows: Array, temperature_k: Array) -> dict[str, Array]:
+def _series(cell: Cell, rows: Array, time: Array) -> dict[str, Array]:
     n, p = cell.negative, cell.positive
     return {
         "c_sp": rows[2] * p.c_max_mol_m3,
@@ -111,73 +196,4 @@ def _series(cell: Cell, rows: Array, temperature_k: Array) -> dict[str, Array]:
         "c_e0": rows[3],
         "c_eL": rows[4],
         "soc": (rows[5] - n.theta_min) / (n.theta_max - n.theta_min),
-        "temperature_k": temperature_k,
     }
-
-
-def _run(model: EspmModel, time: Array, current: Array, soc0: float, hold: Hold) -> tuple[Array, int, int]:
-    from aesi.physics.kernels import run_linear
-
-    out = np.empty((7, len(time)))
-    theta0 = np.array(model.cell.stoichiometries(soc0))
-    arguments = _linear_arguments(model)
-    fault_at, fault = run_linear(time, current, hold == "backward", theta0, *arguments, out)  # type: ignore[call-arg]
-    return out, fault_at, fault
-
-
-def _solid_scales(cell: Cell, electrode: Electrode) -> float:
-    """Stoichiometry a coulomb and unit of surface gain: j / (F R c_max) for one ampere."""
-    area = cell.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
-    return 1.0 / (area * FARADAY_C_MOL * electrode.particle_radius_m * electrode.c_max_mol_m3)
-
-
-@lru_cache(maxsize=64)
-def _linear_arguments(model: EspmModel) -> tuple[Any, ...]:
-    cell = model.cell
-    n, s, p, e = cell.negative, cell.separator, cell.positive, cell.electrolyte
-    sphere = sphere_modes(model.solid_order)
-    d_n, d_p = (float(x.diffusivity(np.array([0.5]))[0]) for x in (n, p))
-    rates = np.array(
-        [
-            sphere.lam[1:] * d_n / n.particle_radius_m**2,
-            sphere.lam[1:] * d_p / p.particle_radius_m**2,
-        ]
-    )
-    scale = np.array([_solid_scales(cell, n), _solid_scales(cell, p)])
-    gains = scale[:, None] * sphere.gain[None, 1:]
-    stack = stack_modes(
-        (n.thickness_m, s.thickness_m, p.thickness_m),
-        (n.porosity, s.porosity, p.porosity),
-        (n.transport_efficiency, s.transport_efficiency, p.transport_efficiency),
-        model.electrolyte_order,
-    )
-    diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)
-    thermal_v = GAS_CONSTANT_J_MOL_K * cell.initial_temperature_k / FARADAY_C_MOL
-    scalars = np.array(
-        [
-            cell.total_area_m2,
-            e.c0_mol_m3,
-            diffusion.top,
-            n.area_per_volume_1_m * n.thickness_m,
-            p.area_per_volume_1_m * p.thickness_m,
-            FARADAY_C_MOL * n.rate_constant,
-            FARADAY_C_MOL * p.rate_constant,
-            thermal_v,
-            2.0 * (1.0 - e.transference) * thermal_v,
-            n.thickness_m / (3.0 * n.transport_efficiency)
-            + s.thickness_m / s.transport_efficiency
-            + p.thickness_m / (3.0 * p.transport_efficiency),
-            (n.thickness_m / n.conductivity_s_m + p.thickness_m / p.conductivity_s_m) / 3.0,
-            cell.contact_resistance_ohm,
-        ]
-    )
-    return (
-        rates, gains, 3.0 * scale,
-        stack.lam * diffusion.d0,
-        stack.gain * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2),
-        stack.to_nodes, np.ascontiguousarray(stack.project.T), stack.gauss, stack.mean,
-        diffusion.psi, 1.0 / diffusion.d0, not diffusion.linear, model.substep_s,
-        ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive"),
-        conductivity_table(e.conductivity, e.c0_mol_m3),
-        scalars,
-    )  # fmt: skip

@@ -5,30 +5,86 @@ Frozen and hashable by value: effects return changed copies, and everything deri
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from aesi.physics.cell import Cell
+from aesi.physics.relations import Constant
 
-DEFAULT_SOLID_ORDER = 12
+DEFAULT_SOLID_ORDER = 10
 DEFAULT_ELECTROLYTE_ORDER = 4
 DEFAULT_SUBSTEP_S = 2.0
 
 
 @dataclass(frozen=True)
-class EspmModel:
-    """The extended single-particle model of a cell.
+class Plating:
+    """Lithium metal on the negative electrode: rate (m/s) and transfer coefficient of plating."""
 
+    rate_m_s: float
+    transfer_coefficient: float = 0.65
+
+
+@dataclass(frozen=True)
+class Interface:
+    """What happens at the particles of one electrode, beyond what the cell file says.
+
+    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per
+    reactive area.
+    bins : (share of the reactive area, radius over the declared radius), one pair a particle size.
+    """
+
+    transfer_coefficient: float = 0.5
+    double_layer_f_m2: float = 0.0
+    bins: tuple[tuple[float, float], ...] = ((1.0, 1.0),)
+    plating: Plating | None = None
+
+
+@dataclass(frozen=True)
+class HeatBalance:
+    """The cell as one lump: heat capacity (J/K), conductance to its surroundings (W/K)."""
+
+    heat_capacity_j_k: float
+    conductance_w_k: float
+
+
+PLAIN = Interface()
+
+
+@dataclass(frozen=True)
+class EspmModel:
+    """The extended single-particle model of a cell, and its extensions.
+
+    regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
+    heat : None for a temperature that is given or constant.
     solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
-    substep_s : longest step of the concentration-dependent part of diffusion; the rest is stepped exactly.
+    substep_s : longest step of whatever is not stepped exactly.
     """
 
     cell: Cell
+    negative: Interface = PLAIN
+    positive: Interface = PLAIN
+    regions: int = 1
+    heat: HeatBalance | None = None
     solid_order: int = DEFAULT_SOLID_ORDER
     electrolyte_order: int = DEFAULT_ELECTROLYTE_ORDER
     substep_s: float = DEFAULT_SUBSTEP_S
-    extras: tuple[Any, ...] = field(default=())
+
+    def of(self, cell: Cell) -> EspmModel:
+        """The same model of another cell."""
+        return replace(self, cell=cell)
 
     def with_cell(self, **changes: Any) -> EspmModel:
         """A copy whose cell has the given fields replaced."""
         return replace(self, cell=replace(self.cell, **changes))
+
+    @property
+    def is_plain(self) -> bool:
+        """True where solid diffusion is linear and the kinetics have a closed form, at one temperature."""
+        solids = (self.cell.negative.diffusivity, self.cell.positive.diffusivity)
+        return (
+            self.negative == PLAIN
+            and self.positive == PLAIN
+            and self.regions == 1
+            and self.heat is None
+            and all(isinstance(d, Constant) for d in solids)
+        )

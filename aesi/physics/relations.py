@@ -100,7 +100,22 @@ class Product:
         return self.first(x) * self.second(x)
 
 
-Relation = Constant | Expression | Table | Scaled | Sum | Product
+@dataclass(frozen=True)
+class PowerSeries:
+    """c0 + c1 x + c2 x**2 + ..."""
+
+    coefficients: tuple[float, ...]
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) the polynomial at x."""
+        x = np.asarray(x, dtype=float)
+        out = np.full_like(x, self.coefficients[-1])
+        for c in self.coefficients[-2::-1]:
+            out = out * x + c
+        return out
+
+
+Relation = Constant | Expression | Table | PowerSeries | Scaled | Sum | Product
 
 
 def scaled(relation: Relation, factor: float) -> Relation:
@@ -160,6 +175,8 @@ def _as_text(item: Relation) -> str | None:
             return f"({text})"
         case Table():
             return None
+        case PowerSeries(coefficients):
+            return "(" + " + ".join(f"({c!r}) * x ** {k}" for k, c in enumerate(coefficients)) + ")"
         case Scaled(base, factor):
             inner = _as_text(base)
             return None if inner is None else f"({factor!r} * {inner})"
@@ -174,9 +191,15 @@ def _joined(first: Relation, sign: str, second: Relation) -> str | None:
     return None if left is None or right is None else f"({left}{sign}{right})"
 
 
+@lru_cache(maxsize=16)
+def _grid(low: float, high: float, points: int) -> Array:
+    return np.linspace(low, high, points)
+
+
 @lru_cache(maxsize=64)
 def _leaf_values(item: Relation, low: float, high: float, points: int) -> Array:
-    values = item(np.linspace(low, high, points))
+    values = item(_grid(low, high, points))
+    values = np.array(values)
     values.flags.writeable = False
     return values
 
@@ -190,5 +213,7 @@ def tabulated(item: Relation, low: float, high: float, points: int) -> Array:
             return tabulated(first, low, high, points) + tabulated(second, low, high, points)
         case Product(first, second):
             return tabulated(first, low, high, points) * tabulated(second, low, high, points)
+        case PowerSeries():
+            return item(_grid(low, high, points))
         case _:
             return _leaf_values(item, low, high, points)

@@ -1,0 +1,80 @@
+"""Electrode balance: stoichiometry windows after lithium or active material was lost.
+
+Full and empty are defined by the rest voltages of the declared windows, or by an electrode that is full or
+empty before they are reached. At both, the lithium in the two electrodes
+together is what is left of it; at full the loss of active material leaves the stoichiometries where they are
+(the material goes with the lithium it holds when the cell is full), the loss of lithium does not.
+Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq
+
+from aesi.errors import SimulationError
+from aesi.physics.cell import Cell
+
+EDGE = 1e-6
+
+
+def without_lithium(cell: Cell, fraction: float) -> Cell:
+    """The cell with `fraction` of its cyclable lithium gone; same electrodes, new windows.
+
+    Raises SimulationError where no window satisfies the voltages.
+    """
+    if fraction == 0.0:
+        return cell
+    q_n, q_p = cell.electrode_capacity_ah(cell.negative), cell.electrode_capacity_ah(cell.positive)
+    lithium = q_n * cell.negative.theta_max + q_p * cell.positive.theta_min - fraction * cell.capacity_ah
+    full, empty = (float(cell.rest_voltage_v(s)[0]) for s in (1.0, 0.0))
+    return _with_windows(cell, _at(cell, lithium, full), _at(cell, lithium, empty))
+
+
+def with_active_material(cell: Cell, negative: float, positive: float) -> Cell:
+    """The cell with fractions of its active material left (1 = all), full at the same stoichiometries."""
+    if negative == 1.0 and positive == 1.0:
+        return cell
+    empty = float(cell.rest_voltage_v(0.0)[0])
+    n, p = cell.negative, cell.positive
+    aged = cell.with_negative(area_per_volume_1_m=n.area_per_volume_1_m * negative)
+    aged = aged.with_positive(area_per_volume_1_m=p.area_per_volume_1_m * positive)
+    q_n, q_p = aged.electrode_capacity_ah(aged.negative), aged.electrode_capacity_ah(aged.positive)
+    lithium = q_n * n.theta_max + q_p * p.theta_min
+    return _with_windows(aged, (n.theta_max, p.theta_min), _at(aged, lithium, empty))
+
+
+def _at(cell: Cell, lithium_ah: float, voltage_v: float) -> tuple[float, float]:
+    """Stoichiometries (negative, positive) that hold `lithium_ah` together and rest at `voltage_v`."""
+    q_n, q_p = cell.electrode_capacity_ah(cell.negative), cell.electrode_capacity_ah(cell.positive)
+
+    def positive(theta_n: float) -> float:
+        return (lithium_ah - q_n * theta_n) / q_p
+
+    def excess(theta_n: float) -> float:
+        u_p, u_n = cell.positive.ocp, cell.negative.ocp
+        return float((u_p(np.array([positive(theta_n)])) - u_n(np.array([theta_n])))[0]) - voltage_v
+
+    low = max(EDGE, (lithium_ah - q_p * (1.0 - EDGE)) / q_n)
+    high = min(1.0 - EDGE, (lithium_ah - q_p * EDGE) / q_n)
+    theta_n = _root(excess, low, high, cell.name)
+    return theta_n, positive(theta_n)
+
+
+def _root(excess: Callable[[float], float], low: float, high: float, name: str) -> float:
+    if not low < high:
+        raise SimulationError(
+            f"{name}: after this loss no stoichiometries are left; a smaller loss is needed."
+        )
+    if excess(low) >= 0.0:
+        return low
+    if excess(high) <= 0.0:
+        return high
+    return float(brentq(excess, low, high, xtol=1e-13))
+
+
+def _with_windows(cell: Cell, full: tuple[float, float], empty: tuple[float, float]) -> Cell:
+    aged = cell.with_negative(theta_min=empty[0], theta_max=full[0])
+    return aged.with_positive(theta_min=full[1], theta_max=empty[1])

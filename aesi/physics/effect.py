@@ -1,0 +1,156 @@
+"""What an effect is: what it says about itself, and the pure functions by which it acts.
+
+An effect acts at one or more of four places, each a function of plain values that returns changed copies:
+
+    on_model    the cell and the constitutive choices of the model          (EspmModel, **parameters) ->
+    EspmModel on_record   time, current and temperature that the cell really saw      (Record, **parameters)
+    -> Record on_voltage  a voltage in series with the cell, and states of its own    (Trace, **parameters)
+    -> Contribution on_reading  the voltage as the instrument wrote it                      (Trace,
+    **parameters) -> (n,) V
+
+Nothing in the core knows an effect by name: a new one is a file, a line of registration and a test, or a
+file of the user's own that `load_effect` reads.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from aesi.numerics.typing import Array
+from aesi.parameters import Parameter, checked
+from aesi.physics.model import EspmModel
+
+Kind = Literal["physics", "parameter", "instrument"]
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """What the cell saw: (n,) s, (n,) A discharge positive, (n,) K or None where the model finds it."""
+
+    time_s: Array
+    current_a: Array
+    temperature_k: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A finished simulation as voltage effects see it.
+
+    time_s, current_a : what the cell saw.  voltage_v : (n,) V so far.  series : states by name, see `Run`.
+    backward : True where a row's current holds since the row before.
+    """
+
+    model: EspmModel
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+    series: Mapping[str, Array]
+    backward: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Contribution:
+    """Voltage to add (n,) V, and states to report by name."""
+
+    voltage_v: Array
+    series: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Effect:
+    """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source."""
+
+    id: str
+    kind: Kind
+    doc: str
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    on_model: Callable[..., EspmModel] | None = None
+    on_record: Callable[..., Record] | None = None
+    on_voltage: Callable[..., Contribution] | None = None
+    on_reading: Callable[..., Array] | None = None
+    file: str | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        from aesi.physics.effects import find_effect
+
+        return find_effect, (self.id, self.file)
+
+    def activate(self, **values: float) -> ActiveEffect:
+        """This effect with the given parameters, defaults elsewhere.
+
+        Raises ParameterError for an unknown name or a value out of bounds.
+        """
+        return ActiveEffect(self, tuple(checked(self.parameters, values).items()))
+
+    @property
+    def summary(self) -> str:
+        """First sentence of the file."""
+        return self._paragraphs[0].replace("\n", " ").rstrip(".")
+
+    @property
+    def equation(self) -> str:
+        """The indented block: equation and sign convention."""
+        return "\n".join(p for p in self._paragraphs if p.startswith("    "))
+
+    @property
+    def validity(self) -> str:
+        """What is left out and where it holds."""
+        return " ".join(
+            p.replace("\n", " ") for p in self._paragraphs if p.startswith(("Leaves out", "Holds"))
+        )
+
+    @property
+    def source(self) -> str:
+        """Where it is from."""
+        found = [p for p in self._paragraphs if p.startswith("Source:")]
+        return found[0].removeprefix("Source:").replace("\n", " ").strip() if found else ""
+
+    @property
+    def _paragraphs(self) -> list[str]:
+        return [p.rstrip() for p in inspect.cleandoc(self.doc).split("\n\n") if p.strip()]
+
+
+@dataclass(frozen=True)
+class ActiveEffect:
+    """An effect with values for all of its parameters: what `simulate` takes."""
+
+    effect: Effect
+    values: tuple[tuple[str, float], ...]
+
+    @property
+    def id(self) -> str:
+        """The effect's id."""
+        return self.effect.id
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values by name."""
+        return dict(self.values)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ActiveEffect) and (self.key == other.key)
+
+    def __hash__(self) -> int:
+        return hash(self.key)
+
+    @property
+    def key(self) -> tuple[str, str | None, tuple[tuple[str, float], ...]]:
+        """What identifies it: id, file of a user's own effect, values."""
+        return self.effect.id, self.effect.file, self.values
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-ready; `from_dict` gives it back."""
+        out: dict[str, Any] = {"effect": self.effect.id, "parameters": self.parameters}
+        if self.effect.file is not None:
+            out["file"] = self.effect.file
+        return out
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> ActiveEffect:
+        """Inverse of `to_dict`.  Raises InputError for an unknown effect, ParameterError for its values."""
+        from aesi.physics.effects import find_effect
+
+        return find_effect(str(content["effect"]), content.get("file")).activate(**content["parameters"])

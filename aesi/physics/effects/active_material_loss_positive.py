@@ -1,0 +1,35 @@
+"""Active material of the positive electrode is lost: less capacity, and more current on what is left.
+
+    a = (1 - loss) a_declared        a reactive area per volume, at the declared particle radius
+
+The full cell keeps its stoichiometries (the material goes with the lithium it holds then); empty follows
+from the declared rest voltage and the lithium left; soc0 counts in the new window.
+
+Leaves out the change of porosity and conductivity. Holds for isolated or cracked-off particles.
+
+Source: Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
+"""
+
+from aesi.parameters import Parameter
+from aesi.physics.balance import with_active_material
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel
+
+PARAMETERS = {
+    "loss": Parameter(
+        0.1,
+        "dimensionless",
+        bounds=(-0.3, 0.5),
+        neutral=0.0,
+        source="an electrode declared too small by 30 % to half of it gone",
+        description="share of the declared active material",
+    )
+}
+
+
+def lose_material(model: EspmModel, *, loss: float) -> EspmModel:
+    """The model with less active material in the positive electrode."""
+    return model.of(with_active_material(model.cell, 1.0, 1.0 - loss))
+
+
+EFFECT = Effect("active_material_loss_positive", "parameter", __doc__, PARAMETERS, on_model=lose_material)

@@ -1,0 +1,58 @@
+"""The cell and its surroundings are at another temperature than declared.
+
+    T = T_declared + dT;   D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
+
+Leaves out gradients within the cell. Holds where the cell file declares activation energies; refused where
+it does not. A measured temperature is shifted too.
+
+Source: Arrhenius' law as BPX defines it, bpxstandard.com.
+"""
+
+from aesi.errors import CellError
+from aesi.parameters import Parameter
+from aesi.physics.cell import Cell
+from aesi.physics.effect import Effect, Record
+from aesi.physics.model import EspmModel
+
+PARAMETERS = {
+    "shift_k": Parameter(
+        -10.0,
+        "K",
+        bounds=(-40.0, 40.0),
+        neutral=0.0,
+        source="a climatic chamber from -15 to 65 degC against 25 degC",
+        description="true minus declared temperature",
+    )
+}
+
+
+def shift_cell(model: EspmModel, *, shift_k: float) -> EspmModel:
+    """The model at the shifted temperature.  Raises CellError where nothing in the cell depends on it."""
+    cell = model.cell
+    if shift_k and not depends_on_temperature(cell):
+        raise CellError(
+            f"{cell.name} declares no activation energy, so a temperature has no effect; add them."
+        )
+    return model.with_cell(
+        initial_temperature_k=cell.initial_temperature_k + shift_k,
+        ambient_temperature_k=cell.ambient_temperature_k + shift_k,
+    )
+
+
+def shift_record(record: Record, *, shift_k: float) -> Record:
+    """The record at the shifted temperature, where it has one."""
+    if record.temperature_k is None:
+        return record
+    return Record(record.time_s, record.current_a, record.temperature_k + shift_k)
+
+
+def depends_on_temperature(cell: Cell) -> bool:
+    """True where at least one activation energy is declared."""
+    n, p, e = cell.negative, cell.positive, cell.electrolyte
+    energies = (n.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.diffusivity_ea_j_mol, p.rate_ea_j_mol)
+    return any(energies) or bool(e.conductivity_ea_j_mol) or bool(e.diffusivity_ea_j_mol)
+
+
+EFFECT = Effect(
+    "ambient_temperature", "parameter", __doc__, PARAMETERS, on_model=shift_cell, on_record=shift_record
+)

@@ -1,0 +1,52 @@
+"""The logger's clock runs fast or slow, or its voltage channel lags behind its current channel.
+
+    t_true = t_first + (t_logged - t_first) / (1 + skew),   V_read(t) = V_true(t - lag)
+
+Leaves out jitter of single stamps. Holds for a lag that is short against the record; before the first sample
+the voltage is taken as constant.
+
+Source: definition; range from quartz oscillators (100 ppm) to two unsynchronised loggers.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect, Record, Trace
+
+PARAMETERS = {
+    "skew": Parameter(
+        0.01,
+        "dimensionless",
+        bounds=(-0.1, 0.1),
+        neutral=0.0,
+        source="100 ppm of a quartz to 10 % of a wrong sampling rate",
+        description="relative excess of logged over true time",
+    ),
+    "lag_s": Parameter(
+        0.0,
+        "s",
+        bounds=(-10.0, 10.0),
+        neutral=0.0,
+        source="filters and polling of loggers, up to 10 s",
+        description="delay of the voltage channel behind the current channel",
+    ),
+}
+
+
+def true_time(record: Record, *, skew: float, lag_s: float) -> Record:
+    """The record on the cell's own clock; the lag acts on the reading alone."""
+    first = record.time_s[0]
+    return replace(record, time_s=first + (record.time_s - first) / (1.0 + skew))
+
+
+def delayed(trace: Trace, *, skew: float, lag_s: float) -> Array:
+    """(n,) V, the voltage of `lag_s` earlier."""
+    if lag_s == 0.0:
+        return trace.voltage_v
+    return np.interp(trace.time_s - lag_s, trace.time_s, trace.voltage_v)
+
+
+EFFECT = Effect("clock_skew", "instrument", __doc__, PARAMETERS, on_record=true_time, on_reading=delayed)

@@ -1,0 +1,33 @@
+"""The current sensor reads a multiple of the true current.
+
+    I_read = g I_true
+
+Leaves out nonlinearity and drift of the gain. Holds for a shunt or Hall sensor within its range.
+
+Source: definition; range from accuracy classes of automotive current sensors, 0.5 to 5 %.
+"""
+
+from dataclasses import replace
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect, Record
+
+PARAMETERS = {
+    "gain": Parameter(
+        1.02,
+        "dimensionless",
+        bounds=(0.8, 1.25),
+        log=True,
+        neutral=1.0,
+        source="accuracy classes up to 5 %, and gross errors of scale",
+        description="reading over true current, g",
+    )
+}
+
+
+def undo_gain(record: Record, *, gain: float) -> Record:
+    """The true current behind the reading."""
+    return replace(record, current_a=record.current_a / gain)
+
+
+EFFECT = Effect("current_sensor_gain", "instrument", __doc__, PARAMETERS, on_record=undo_gain)

@@ -1,0 +1,33 @@
+"""The current sensor reads a constant on top of the true current.
+
+    I_read = I_true + offset        I > 0 on discharge
+
+Leaves out drift. Holds for a Hall sensor after a change of magnetisation or temperature. On the inside it
+looks like a leakage_current of the opposite sign; only the ohmic drop of the leads tells them apart.
+
+Source: definition; range from zero-current errors of automotive Hall sensors.
+"""
+
+from dataclasses import replace
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect, Record
+
+PARAMETERS = {
+    "offset_a": Parameter(
+        -0.05,
+        "A",
+        bounds=(-1.0, 1.0),
+        neutral=0.0,
+        source="zero-current error of a 100 A sensor, up to 1 %",
+        description="reading minus true current",
+    )
+}
+
+
+def undo_offset(record: Record, *, offset_a: float) -> Record:
+    """The true current behind the reading."""
+    return replace(record, current_a=record.current_a - offset_a)
+
+
+EFFECT = Effect("current_sensor_offset", "instrument", __doc__, PARAMETERS, on_record=undo_offset)

@@ -1,0 +1,39 @@
+"""The declared electrolyte conductivity or diffusivity is off by a factor.
+
+    kappa = f_kappa kappa_declared(c),   D_e = f_D D_e,declared(c)
+
+Leaves out a wrong dependence on concentration, transference number and tortuosity of a single layer; a
+tortuosity that is wrong everywhere scales both alike. Holds at any rate; below 1C it looks like a resistance.
+
+Source: scatter of tortuosities, Landesfeind et al., J. Electrochem. Soc. 163 (2016) A1373,
+doi:10.1149/2.1141607jes.
+"""
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel
+from aesi.physics.relations import scaled
+
+RANGE = "published tortuosities and electrolytes, a factor of five either way"
+PARAMETERS = {
+    "conductivity_factor": Parameter(
+        0.6, "dimensionless", (0.2, 5.0), RANGE, log=True, neutral=1.0, description="factor of kappa"
+    ),
+    "diffusivity_factor": Parameter(
+        0.6, "dimensionless", (0.2, 5.0), RANGE, log=True, neutral=1.0, description="factor of D_e"
+    ),
+}
+
+
+def scale_transport(model: EspmModel, *, conductivity_factor: float, diffusivity_factor: float) -> EspmModel:
+    """The model with the electrolyte's transport properties scaled."""
+    electrolyte = model.cell.electrolyte
+    return model.of(
+        model.cell.with_electrolyte(
+            conductivity=scaled(electrolyte.conductivity, conductivity_factor),
+            diffusivity=scaled(electrolyte.diffusivity, diffusivity_factor),
+        )
+    )
+
+
+EFFECT = Effect("electrolyte_transport", "parameter", __doc__, PARAMETERS, on_model=scale_transport)

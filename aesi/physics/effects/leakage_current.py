@@ -1,0 +1,34 @@
+"""Self-discharge or a parasitic side current within the cell.
+
+    I_reaction = I + I_leak        I_leak > 0 discharges the cell
+
+Leaves out its dependence on voltage and temperature, and the loss it does not feel in the ohmic drop of the
+leads (it is counted there, an error of I_leak R). Holds over a record, where it is nearly constant.
+
+Source: Roth & Doughty, J. Power Sources 128 (2004) 308, doi:10.1016/j.jpowsour.2003.09.068, for
+self-discharge rates.
+"""
+
+from dataclasses import replace
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect, Record
+
+PARAMETERS = {
+    "leakage_a": Parameter(
+        0.05,
+        "A",
+        bounds=(-1.0, 1.0),
+        neutral=0.0,
+        source="up to a soft short of 1 A; negative would be a source within the cell",
+        description="side current, discharging where positive",
+    )
+}
+
+
+def leak(record: Record, *, leakage_a: float) -> Record:
+    """The current that the electrodes carry."""
+    return replace(record, current_a=record.current_a + leakage_a)
+
+
+EFFECT = Effect("leakage_current", "physics", __doc__, PARAMETERS, on_record=leak)

@@ -1,0 +1,40 @@
+"""The declared model's own discretisation: the same equations on a finer basis and with shorter steps.
+
+    orders of projection times n, longest explicit step divided by n
+
+Leaves out the error of how the current runs between samples, which is the caller's choice (`hold`). Holds
+always: what refining changes is numerics, not physics, and has to be known before any physics is sought.
+
+Source: the orders' effect is measured in the reference tests.
+"""
+
+from dataclasses import replace
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel
+
+PARAMETERS = {
+    "refinement": Parameter(
+        2.0,
+        "dimensionless",
+        bounds=(1.0, 4.0),
+        neutral=1.0,
+        source="a fourfold refinement is converged to round-off",
+        description="n, rounded to halves",
+    )
+}
+
+
+def refine(model: EspmModel, *, refinement: float) -> EspmModel:
+    """The model with finer numerics."""
+    factor = round(2.0 * refinement) / 2.0
+    return replace(
+        model,
+        solid_order=round(model.solid_order * factor),
+        electrolyte_order=round(model.electrolyte_order * factor),
+        substep_s=model.substep_s / factor,
+    )
+
+
+EFFECT = Effect("numerical_error", "instrument", __doc__, PARAMETERS, on_model=refine)

@@ -1,0 +1,32 @@
+"""Ohmic drop in contacts, tabs, leads or a constant film, in series with the whole cell.
+
+    V = V_cell - I R        I > 0 on discharge
+
+Leaves out its dependence on temperature. Holds wherever the drop follows the current without delay.
+
+Source: Ohm's law; the size from Taheri et al., J. Power Sources 196 (2011) 6525,
+doi:10.1016/j.jpowsour.2011.03.056.
+"""
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel
+
+PARAMETERS = {
+    "resistance_ohm": Parameter(
+        1e-3,
+        "ohm",
+        bounds=(0.0, 0.1),
+        neutral=0.0,
+        source="0.1 mohm (large pouch, welded tabs) to 100 mohm (small cylindrical cell in a clamp)",
+        description="resistance added to what the cell file declares",
+    )
+}
+
+
+def add_resistance(model: EspmModel, *, resistance_ohm: float) -> EspmModel:
+    """The model with a larger contact resistance (ohm)."""
+    return model.with_cell(contact_resistance_ohm=model.cell.contact_resistance_ohm + resistance_ohm)
+
+
+EFFECT = Effect("series_resistance", "physics", __doc__, PARAMETERS, on_model=add_resistance)

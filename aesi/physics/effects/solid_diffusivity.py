@@ -1,0 +1,39 @@
+"""The declared solid diffusivities are off by a factor.
+
+    D_i = f_i D_i,declared        i negative or positive
+
+Leaves out a change of their dependence on stoichiometry (concentration_dependent_diffusivity) and
+temperature. Holds at any rate; at low rates the data do not determine it.
+
+Source: scatter of published values, Wang et al., Prog. Energy 4 (2022) 032004, doi:10.1088/2516-1083/ac692c.
+"""
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel
+from aesi.physics.relations import scaled
+
+RANGE = "an order of magnitude either way, the scatter of published values"
+PARAMETERS = {
+    name: Parameter(
+        0.5,
+        "dimensionless",
+        (0.1, 10.0),
+        RANGE,
+        log=True,
+        neutral=1.0,
+        description=f"factor, {name[:8]} electrode",
+    )
+    for name in ("negative_factor", "positive_factor")
+}
+
+
+def scale_diffusivities(model: EspmModel, *, negative_factor: float, positive_factor: float) -> EspmModel:
+    """The model with both solid diffusivities scaled."""
+    cell = model.cell
+    cell = cell.with_negative(diffusivity=scaled(cell.negative.diffusivity, negative_factor))
+    cell = cell.with_positive(diffusivity=scaled(cell.positive.diffusivity, positive_factor))
+    return model.of(cell)
+
+
+EFFECT = Effect("solid_diffusivity", "parameter", __doc__, PARAMETERS, on_model=scale_diffusivities)

@@ -1,0 +1,32 @@
+"""The voltmeter reads a constant on top of the true voltage.
+
+    V_read = V_true + offset
+
+Leaves out gain and drift. Holds for any voltmeter. A constant shift of an open-circuit potential looks the
+same.
+
+Source: definition; range from accuracy classes of battery test channels, 0.02 to 1 % of 5 V.
+"""
+
+from aesi.numerics.typing import Array
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect, Trace
+
+PARAMETERS = {
+    "offset_v": Parameter(
+        0.005,
+        "V",
+        bounds=(-0.05, 0.05),
+        neutral=0.0,
+        source="accuracy classes up to 1 % of 5 V",
+        description="reading minus true voltage",
+    )
+}
+
+
+def add_offset(trace: Trace, *, offset_v: float) -> Array:
+    """(n,) V, the reading."""
+    return trace.voltage_v + offset_v
+
+
+EFFECT = Effect("voltage_sensor_offset", "instrument", __doc__, PARAMETERS, on_reading=add_offset)
