@@ -66,7 +66,7 @@ def stack_of(model: EspmModel) -> StackModes:
 def plain_arguments(model: EspmModel) -> tuple[Any, ...]:
     """Everything `kernels.run_linear` takes between the record and the output."""
     cell = model.cell
-    n, s, p, e = cell.negative, cell.separator, cell.positive, cell.electrolyte
+    n, p, e = cell.negative, cell.positive, cell.electrolyte
     temperature, reference = cell.initial_temperature_k, cell.reference_temperature_k
     sphere, stack = sphere_modes(model.solid_order), stack_of(model)
     rates = np.array([sphere.lam[1:] * _solid_rate(x, temperature, reference) for x in (n, p)])
@@ -89,8 +89,8 @@ def plain_arguments(model: EspmModel) -> tuple[Any, ...]:
 
 def _solid_rate(electrode: Electrode, temperature: float, reference: float) -> float:
     d = float(electrode.diffusivity(np.array([0.5]))[0])
-    return d * arrhenius(electrode.diffusivity_ea_j_mol, temperature, reference) /
-    electrode.particle_radius_m**2
+    faster = arrhenius(electrode.diffusivity_ea_j_mol, temperature, reference)
+    return d * faster / electrode.particle_radius_m**2
 
 
 def _scalars(model: EspmModel, temperature: float, top: float) -> Array:
