@@ -1,0 +1,191 @@
+"""From an experiment's data section to error series by role: measure, simulate, subtract, cut.
+
+The physics model runs over each whole record from its own start, so that a piece cut out of the middle keeps
+the states that its history gave it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from aesi.data import read_measurement
+from aesi.data.resample import to_even
+from aesi.errors import ConfigError, DataError
+from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
+from aesi.pipeline.config import DataConfig, ExperimentConfig, RepeatsConfig
+from aesi.records import INPUT_NAMES, ErrorSeries, Hold, Measurement, Run, Split
+
+REST_C_RATE = 0.02
+"""A first current below this C-rate counts as rest, and the first voltage as a rest voltage."""
+
+Role = Literal["train", "valid", "test"]
+ROLES: tuple[Role, ...] = ("train", "valid", "test")
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """What an experiment works on.
+
+    digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
+    about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
+    """
+
+    cell: Cell
+    cell_name: str
+    effects: tuple[ActiveEffect, ...]
+    split: Split
+    soc0: dict[str, float]
+    digests: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def load(config: ExperimentConfig) -> Loaded:
+    """Measurements, simulated and subtracted, by role.
+
+    Raises ConfigError or DataError naming the file and what to do; with a `fallback` section, data that cannot be
+    had are replaced by it and a note says so.
+    """
+    try:
+        return _load(config)
+    except DataError as error:
+        if config.fallback is None or config.data.kind != "catalogue":
+            raise
+        fallback = config.model_copy(
+            update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None}
+        )
+        note = f"Fallback: {error} The same job runs on the bundled virtual cell instead."
+        loaded = _load(fallback)
+        return replace(loaded, notes=(note, *loaded.notes))
+
+
+def error_series(measurement: Measurement, run: Run, dt_s: float) -> ErrorSeries:
+    """The voltage error of a simulation of an evenly sampled measurement, with the inputs of the sparse model."""
+    inputs = np.column_stack([measurement.current_a, *(run.series[name] for name in INPUT_NAMES[1:])])
+    return ErrorSeries(
+        name=measurement.name,
+        dt_s=dt_s,
+        time_s=measurement.time_s,
+        error_v=measurement.voltage_v - run.voltage_v,
+        inputs=inputs,
+        soc=run.series["soc"],
+        model_v=run.voltage_v,
+    )
+
+
+def rest_soc(cell: Cell, measurement: Measurement) -> float:
+    """State of charge from the first voltage of a record that starts at rest.
+
+    Raises DataError where the first current is above `REST_C_RATE`: the voltage then says nothing exact.
+    """
+    limit = REST_C_RATE * cell.capacity_ah
+    first = float(measurement.current_a[0])
+    if abs(first) > limit:
+        raise DataError(
+            f"{measurement.name} starts under {first:.3g} A, not at rest (below {limit:.2g} A), so its first voltage "
+            "does not give the state of charge; give soc0."
+        )
+    return initial_soc(cell, float(measurement.voltage_v[0]))
+
+
+def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
+    """Pieces of a record that repeats a schedule; each training repeat gives its last share to validation."""
+    train, valid = [], []
+    for number in repeats.train:
+        piece = _repeat(series, repeats.period_s, number)
+        cut = round(len(piece) * (1 - repeats.valid_share))
+        train.append(piece.take(slice(0, cut)))
+        valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
+    test = [_repeat(series, repeats.period_s, number) for number in repeats.test]
+    return Split(tuple(train), tuple(valid), tuple(test))
+
+
+def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
+    start = series.time_s[0] + (number - 1) * period_s
+    low, high = np.searchsorted(series.time_s, [start, start + period_s])
+    if high - low < 2:
+        raise DataError(
+            f"{series.name} lasts {series.time_s[-1] - series.time_s[0]:.0f} s and has no repeat {number} of "
+            f"{period_s:g} s; take it out of `repeats`."
+        )
+    return series.take(slice(int(low), int(high)), f"repeat {number}")
+
+
+def _load(config: ExperimentConfig) -> Loaded:
+    cell_path = _cell_path(config)
+    cell = Cell.from_bpx(cell_path)
+    effects = _effects(config)
+    soc0: dict[str, float] = {}
+    digests: dict[str, str] = {}
+    notes: list[str] = []
+    series: dict[str, ErrorSeries] = {}
+    for measurement in _measurements(config, cell_path):
+        name = measurement.name
+        digests[name] = measurement.digest
+        soc0[name] = rest_soc(cell, measurement) if config.cell.soc0 is None else config.cell.soc0
+        even = to_even(measurement, config.data.dt_s)
+        notes.extend(even.notes)
+        run = simulate(
+            cell, even.time_s, even.current_a, soc0[name], effects, even.temperature_degc, config.data.hold
+        )
+        series[name] = error_series(even, run, config.data.dt_s)
+    return Loaded(cell, cell_path.stem, effects, _split(config.data, series), soc0, digests, tuple(notes))
+
+
+def _split(data: DataConfig, series: dict[str, ErrorSeries]) -> Split:
+    if data.repeats:
+        return cut_repeats(next(iter(series.values())), data.repeats)
+    train, valid, test = (tuple(series[_stem(name)] for name in getattr(data, role)) for role in ROLES)
+    return Split(train, valid, test)
+
+
+def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
+    from aesi.physics.effects import CATALOGUE
+
+    unknown = [name for name in config.cell.effects if name not in CATALOGUE]
+    if unknown:
+        raise ConfigError(f"cell.effects: there is no effect {unknown[0]!r}; `aesi effects` lists them.")
+    return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
+
+
+def _cell_path(config: ExperimentConfig) -> Path:
+    if config.cell.bpx != "catalogue":
+        return config.path(config.cell.bpx)
+    from aesi.data.catalogue import locate
+
+    if config.data.set is None:
+        raise ConfigError("cell.bpx: catalogue needs data.set; give the path of a BPX file.")
+    return locate(config.data.set, "cell.bpx.json")
+
+
+def _measurements(config: ExperimentConfig, cell_path: Path) -> Iterator[Measurement]:
+    """Every record the experiment names, once."""
+    data = config.data
+    if data.kind == "virtual":
+        from aesi.pipeline.virtual import virtual_measurements
+
+        yield from virtual_measurements(data, cell_path)
+        return
+    names = [data.record] if data.record else [*data.train, *data.valid, *data.test]
+    where = _locator(config)
+    for name in dict.fromkeys(names):
+        assert name is not None
+        yield read_measurement(where(name), data.columns or None, data.sign)
+
+
+def _locator(config: ExperimentConfig) -> Callable[[str], Path]:
+    if config.data.kind == "files":
+        return config.path
+    from aesi.data.catalogue import locate
+
+    return partial(locate, config.data.set)
+
+
+def _stem(name: str) -> str:
+    """The name under which a reader files a record: the file's name without folder and suffixes."""
+    return Path(name).name.split(".")[0]
