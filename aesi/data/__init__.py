@@ -9,14 +9,17 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from aesi.data.read import read_measurement
     from aesi.data.resample import decimate, to_even
+    from aesi.data.virtual import Laboratory, paper_experiment
 
 _HOME = {
+    "Laboratory": "aesi.data.virtual",
+    "paper_experiment": "aesi.data.virtual",
     "read_measurement": "aesi.data.read",
     "decimate": "aesi.data.resample",
     "to_even": "aesi.data.resample",
 }
 
-__all__ = ["decimate", "read_measurement", "to_even"]
+__all__ = ["Laboratory", "decimate", "paper_experiment", "read_measurement", "to_even"]
 
 
 def __getattr__(name: str) -> Any:

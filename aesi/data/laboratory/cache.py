@@ -1,0 +1,104 @@
+"""Arrays kept on disk under the hash of everything that made them.
+
+The folder is AESI_CACHE where that is set, else the user's cache folder of the platform. An entry is written
+to a temporary file and renamed, so a killed process leaves no half of one; one that does not match its own
+checksum is computed again, and a warning says so.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import warnings
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+
+CHECKSUM = "checksum"
+
+
+def cache_folder() -> Path:
+    """Where data made or fetched are kept; not created here."""
+    chosen = os.environ.get("AESI_CACHE")
+    if chosen:
+        return Path(chosen).expanduser()
+    import pooch
+
+    return Path(pooch.os_cache("aesi"))
+
+
+def key_of(parts: Mapping[str, Any]) -> str:
+    """SHA-256 of plain values and arrays, 24 hexadecimal digits."""
+    sha = hashlib.sha256()
+    for name in sorted(parts):
+        value = parts[name]
+        sha.update(name.encode())
+        if isinstance(value, np.ndarray):
+            sha.update(np.ascontiguousarray(value, dtype=float).tobytes())
+        elif isinstance(value, bytes):
+            sha.update(value)
+        else:
+            sha.update(json.dumps(value, sort_keys=True).encode())
+    return sha.hexdigest()[:24]
+
+
+def remember(kind: str, key: str, make: Callable[[], dict[str, Array]]) -> dict[str, Array]:
+    """The arrays kept under kind and key, made and kept where they are not there yet.
+
+    Raises DataError where the cache folder cannot be written.
+    """
+    path = cache_folder() / kind / f"{key}.npz"
+    kept = _load(path)
+    if kept is not None:
+        return kept
+    arrays = make()
+    _store(path, arrays)
+    return arrays
+
+
+def _digest(arrays: Mapping[str, Array]) -> str:
+    sha = hashlib.sha256()
+    for name in sorted(arrays):
+        sha.update(name.encode())
+        sha.update(np.ascontiguousarray(arrays[name], dtype=float).tobytes())
+    return sha.hexdigest()
+
+
+def _load(path: Path) -> dict[str, Array] | None:
+    if not path.exists():
+        return None
+    try:
+        with np.load(path, allow_pickle=False) as entry:
+            arrays = {name: entry[name] for name in entry.files if name != CHECKSUM}
+            intact = str(entry[CHECKSUM]) == _digest(arrays)
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        intact = False
+    if intact:
+        return arrays
+    warnings.warn(f"The cache entry {path} is damaged; it is computed again.", stacklevel=3)
+    return None
+
+
+def _store(path: Path, arrays: dict[str, Array]) -> None:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                content: dict[str, Any] = {**arrays, CHECKSUM: np.array(_digest(arrays))}
+                np.savez_compressed(stream, **content)
+            os.replace(temporary, path)
+        finally:
+            Path(temporary).unlink(missing_ok=True)
+    except OSError as error:
+        raise DataError(
+            f"The cache folder {path.parent} cannot be written ({error}); set AESI_CACHE to one that can."
+        ) from None

@@ -1,0 +1,295 @@
+"""What may be changed in the laboratory's cell: ids as in the catalogue of effects, physics by PyBaMM.
+
+A change acts by model options, by parameters, on the current that the cell sees, or on its terminal voltage.
+Nothing here is shared with the room that looks for effects; that is what makes a test of it a test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+
+Values = Mapping[str, float]
+SECONDS_PER_HOUR = 3600.0
+KELVIN = 273.15
+
+
+def _nothing(parameters: Any, values: Values) -> None:
+    """Leaves the parameters as they are."""
+
+
+def _same_current(time_s: Array, current_a: Array, values: Values) -> Array:
+    return current_a
+
+
+def _same_voltage(time_s: Array, current_a: Array, voltage_v: Array, values: Values) -> Array:
+    return voltage_v
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change. defaults : its values, at which it is typically seen; units are in their names."""
+
+    id: str
+    defaults: Values
+    options: Mapping[str, Any] = field(default_factory=dict)
+    alter: Callable[[Any, Values], None] = _nothing
+    cell_current: Callable[[Array, Array, Values], Array] = _same_current
+    terminal_voltage: Callable[[Array, Array, Array, Values], Array] = _same_voltage
+
+    def complete(self, values: Values) -> dict[str, float]:
+        """The defaults overlaid with the given values; an unknown name is a DataError."""
+        unknown = sorted(set(values) - set(self.defaults))
+        if unknown:
+            known = ", ".join(self.defaults)
+            raise DataError(f"The change {self.id} has no value {unknown[0]!r}; it has {known}.")
+        return {**self.defaults, **values}
+
+
+def find_change(name: str) -> Change:
+    """A change by id. Raises DataError for an unknown one, with the nearest."""
+    if name not in CHANGES:
+        near = get_close_matches(name, CHANGES, n=1, cutoff=0.5)
+        hint = f"; did you mean {near[0]!r}?" if near else "."
+        raise DataError(f"The laboratory knows no change {name!r}{hint} Known: {', '.join(CHANGES)}.")
+    return CHANGES[name]
+
+
+def _update(parameters: Any, new: Mapping[str, Any]) -> None:
+    parameters.update(dict(new), check_already_exists=False)
+
+
+def _times(function: Any, factor: float) -> Any:
+    if callable(function):
+        return lambda *inputs: factor * function(*inputs)
+    return factor * function
+
+
+def _scale(parameters: Any, name: str, factor: float) -> None:
+    if factor != 1.0:
+        _update(parameters, {name: _times(parameters[name], factor)})
+
+
+def _heat(parameters: Any, values: Values) -> None:
+    _update(parameters, {"Total heat transfer coefficient [W.m-2.K-1]": values["cooling_w_m2_k"]})
+
+
+def _ambient(parameters: Any, values: Values) -> None:
+    for name in ("Ambient temperature [K]", "Initial temperature [K]"):
+        _update(parameters, {name: float(parameters[name]) + values["shift_k"]})
+
+
+def _resistance(parameters: Any, values: Values) -> None:
+    _update(parameters, {"Contact resistance [Ohm]": values["resistance_ohm"]})
+
+
+def _film(time_s: Array, current_a: Array, voltage_v: Array, values: Values) -> Array:
+    """V - R(t) I with R growing with the charge that went through, either way, and with time."""
+    through = np.concatenate(
+        [[0.0], np.cumsum(0.5 * (np.abs(current_a[1:]) + np.abs(current_a[:-1])) * np.diff(time_s))]
+    )
+    resistance = (
+        values["growth_ohm_ah"] * through / SECONDS_PER_HOUR
+        + values["growth_ohm_h"] * time_s / SECONDS_PER_HOUR
+    )
+    return voltage_v - resistance * current_a
+
+
+def _hysteresis(parameters: Any, values: Values) -> None:
+    """Half the gap up on delithiation, down on lithiation, per electrode; one-state as in Axen 2022."""
+    for electrode, gap in (("Negative", values["negative_v"]), ("Positive", values["positive_v"])):
+        middle = parameters[f"{electrode} electrode OCP [V]"]
+        _update(
+            parameters,
+            {
+                f"{electrode} electrode delithiation OCP [V]": _plus(middle, gap),
+                f"{electrode} electrode lithiation OCP [V]": _plus(middle, -gap),
+                f"{electrode} particle hysteresis decay rate": values["decay"],
+                f"{electrode} particle lithiation hysteresis decay rate": values["decay"],
+                f"{electrode} particle delithiation hysteresis decay rate": values["decay"],
+                f"Initial hysteresis state in {electrode.lower()} electrode": values["initial"],
+            },
+        )
+
+
+def _plus(function: Any, shift: float) -> Any:
+    return lambda sto: function(sto) + shift
+
+
+def _ocp(parameters: Any, values: Values) -> None:
+    """A Gaussian bump on either electrode's open-circuit potential."""
+    import pybamm
+
+    for electrode in ("negative", "positive"):
+        height = values[f"{electrode}_v"]
+        if height:
+            name = f"{electrode.capitalize()} electrode OCP [V]"
+            _update(
+                parameters,
+                {
+                    name: _bump(
+                        parameters[name],
+                        height,
+                        values[f"{electrode}_centre"],
+                        values["width"],
+                        pybamm.exp,
+                    )
+                },
+            )
+
+
+def _bump(function: Any, height: float, centre: float, width: float, exp: Any) -> Any:
+    return lambda sto: function(sto) + height * exp(-(((sto - centre) / width) ** 2))
+
+
+def _sloped_diffusivity(parameters: Any, values: Values) -> None:
+    """D(x) = D exp(slope (x - centre)), per electrode."""
+    import pybamm
+
+    for electrode in ("negative", "positive"):
+        slope = values[f"{electrode}_slope"]
+        if slope:
+            name = f"{electrode.capitalize()} particle diffusivity [m2.s-1]"
+            centre = values[f"{electrode}_centre"]
+            _update(parameters, {name: _tilted(parameters[name], slope, centre, pybamm.exp)})
+
+
+def _tilted(function: Any, slope: float, centre: float, exp: Any) -> Any:
+    def tilted(sto: Any, temperature: Any) -> Any:
+        base = function(sto, temperature) if callable(function) else function
+        return base * exp(slope * (sto - centre))
+
+    return tilted
+
+
+def _diffusivity(parameters: Any, values: Values) -> None:
+    _scale(parameters, "Negative particle diffusivity [m2.s-1]", values["negative_factor"])
+    _scale(parameters, "Positive particle diffusivity [m2.s-1]", values["positive_factor"])
+
+
+def _electrolyte(parameters: Any, values: Values) -> None:
+    _scale(parameters, "Electrolyte conductivity [S.m-1]", values["conductivity_factor"])
+    _scale(parameters, "Electrolyte diffusivity [m2.s-1]", values["diffusivity_factor"])
+
+
+def _kinetics(parameters: Any, values: Values) -> None:
+    _scale(parameters, "Negative electrode exchange-current density [A.m-2]", values["negative_factor"])
+    _scale(parameters, "Positive electrode exchange-current density [A.m-2]", values["positive_factor"])
+
+
+def _asymmetry(parameters: Any, values: Values) -> None:
+    _update(
+        parameters,
+        {
+            "Negative electrode Butler-Volmer transfer coefficient": values["negative_alpha"],
+            "Positive electrode Butler-Volmer transfer coefficient": values["positive_alpha"],
+        },
+    )
+
+
+def _double_layer(parameters: Any, values: Values) -> None:
+    _update(
+        parameters,
+        {
+            "Negative electrode double-layer capacity [F.m-2]": values["capacity_f_m2"],
+            "Positive electrode double-layer capacity [F.m-2]": values["capacity_f_m2"],
+        },
+    )
+
+
+def _lost_lithium(parameters: Any, values: Values) -> None:
+    """The negative electrode starts with less lithium than the positive one's state implies."""
+    name = "Initial concentration in negative electrode [mol.m-3]"
+    full = float(parameters["Maximum concentration in negative electrode [mol.m-3]"])
+    _update(parameters, {name: float(parameters[name]) - values["negative_stoichiometry"] * full})
+
+
+def _lost_material(electrode: str) -> Callable[[Any, Values], None]:
+    def alter(parameters: Any, values: Values) -> None:
+        _scale(parameters, f"{electrode} electrode active material volume fraction", 1 - values["share"])
+
+    return alter
+
+
+def _leak(time_s: Array, current_a: Array, values: Values) -> Array:
+    return current_a + values["leak_a"]
+
+
+def _plating(parameters: Any, values: Values) -> None:
+    """Reversible plating, exchange-current densities as in O'Kane et al. 2020, with the set's constants."""
+    import pybamm
+
+    source = pybamm.ParameterValues("OKane2022")
+    wanted = ("plating", "stripping", "plated", "Lithium metal", "SEI", "Dead lithium")
+    extra = {
+        name: source[name]
+        for name in source
+        if any(word.lower() in name.lower() for word in wanted) and name not in parameters
+    }
+    _update(parameters, extra)
+    _update(parameters, {"Lithium plating kinetic rate constant [m.s-1]": values["rate_m_s"]})
+
+
+CHANGES: dict[str, Change] = {
+    change.id: change
+    for change in (
+        Change("self_heating", {"cooling_w_m2_k": 10.0}, {"thermal": "lumped"}, _heat),
+        Change("ambient_temperature", {"shift_k": -5.0}, alter=_ambient),
+        Change("series_resistance", {"resistance_ohm": 5e-4}, {"contact resistance": "true"}, _resistance),
+        Change("film_growth", {"growth_ohm_ah": 0.0, "growth_ohm_h": 0.0}, terminal_voltage=_film),
+        Change(
+            "ocv_hysteresis",
+            {"negative_v": 0.01, "positive_v": 0.0, "decay": 50.0, "initial": 0.0},
+            {"open-circuit potential": "one-state hysteresis"},
+            _hysteresis,
+        ),
+        Change(
+            "ocp_shape",
+            {
+                "negative_v": 0.0,
+                "negative_centre": 0.4,
+                "positive_v": 0.01,
+                "positive_centre": 0.65,
+                "width": 0.1,
+            },
+            alter=_ocp,
+        ),
+        Change(
+            "concentration_dependent_diffusivity",
+            {
+                "negative_slope": 0.0,
+                "negative_centre": 0.5,
+                "positive_slope": 0.0,
+                "positive_centre": 0.6,
+            },
+            alter=_sloped_diffusivity,
+        ),
+        Change("solid_diffusivity", {"negative_factor": 1.0, "positive_factor": 1.0}, alter=_diffusivity),
+        Change(
+            "electrolyte_transport",
+            {"conductivity_factor": 1.0, "diffusivity_factor": 1.0},
+            alter=_electrolyte,
+        ),
+        Change("charge_transfer_kinetics", {"negative_factor": 1.0, "positive_factor": 1.0}, alter=_kinetics),
+        Change(
+            "asymmetric_kinetics",
+            {"negative_alpha": 0.5, "positive_alpha": 0.5},
+            {"intercalation kinetics": "asymmetric Butler-Volmer", "surface form": "algebraic"},
+            _asymmetry,
+        ),
+        Change("double_layer", {"capacity_f_m2": 10.0}, {"surface form": "differential"}, _double_layer),
+        Change("algebraic_surface", {}, {"surface form": "algebraic"}),
+        Change("lithium_inventory_loss", {"negative_stoichiometry": 0.02}, alter=_lost_lithium),
+        Change("active_material_loss_negative", {"share": 0.05}, alter=_lost_material("Negative")),
+        Change("active_material_loss_positive", {"share": 0.05}, alter=_lost_material("Positive")),
+        Change("leakage_current", {"leak_a": 0.1}, cell_current=_leak),
+        Change("lithium_plating", {"rate_m_s": 1e-9}, {"lithium plating": "reversible"}, _plating),
+    )
+}

@@ -1,0 +1,217 @@
+"""One run of PyBaMM's SPMe or DFN on a BPX cell, with changes, under a current profile.
+
+What keeps it honest: the solver is stopped at every edge of the current and kept from long steps, so that no
+pulse is stepped over; the charge of the model is compared with the integral of the current; a run that ends
+early is an error; the mesh of the reduced model is finer than the default, whose 20 radial points move the
+voltage by millivolts.
+"""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from aesi.data.laboratory.cache import key_of, remember
+from aesi.data.laboratory.changes import Change, find_change
+from aesi.data.profile import Profile
+from aesi.errors import DataError, SimulationError
+from aesi.numerics.typing import Array
+
+Model = Literal["SPMe", "DFN"]
+VERSION = 1
+"""Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
+
+SECONDS_PER_HOUR = 3600.0
+EDGE_SHARE = 0.15
+"""A change of the current between two rows by this share of its range is an edge."""
+MOST_EDGES = 400
+MOST_STEPS = 40_000
+CHARGE_TOLERANCE = 2e-4
+"""Of the nominal capacity; at 1e-5 relative tolerance, 3e-5 has been seen."""
+MESH: dict[Model, dict[str, int]] = {
+    "SPMe": {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 60, "r_p": 60},
+    "DFN": {"x_n": 12, "x_s": 8, "x_p": 12, "r_n": 25, "r_p": 25},
+}
+"""10 points across and 20 in radius move a DFN under SC03 and a 5C pulse by 0.35 mV RMS against 20 and 40."""
+TOLERANCE: dict[Model, float] = {"SPMe": 1e-6, "DFN": 1e-5}
+
+
+@dataclass(frozen=True)
+class Applied:
+    """A change by id, with its values."""
+
+    change: str
+    values: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """What the cell did, without noise. voltage_v, temperature_degc, soc : (n,)."""
+
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+    temperature_degc: Array
+    soc: Array
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A cell file, a model, and what is changed in both."""
+
+    bpx: Path
+    model: Model = "DFN"
+    applied: tuple[Applied, ...] = ()
+    radial_points: int | None = None
+
+    def changes(self) -> list[tuple[Change, dict[str, float]]]:
+        """The changes with their values checked and completed."""
+        return [(find_change(a.change), find_change(a.change).complete(a.values)) for a in self.applied]
+
+
+def run(setup: Setup, profile: Profile) -> Trace:
+    """The trace of a set-up under a profile, from the cache where it is there.
+
+    Raises SimulationError where the model stops early or loses charge; DataError for a cell file that cannot
+    be read.
+    """
+    import pybamm
+
+    try:
+        content = setup.bpx.read_bytes()
+    except OSError as error:
+        raise DataError(f"The cell file {setup.bpx} cannot be opened: {error.strerror}.") from None
+    key = key_of(
+        {
+            "version": VERSION,
+            "pybamm": pybamm.__version__,
+            "bpx": content,
+            "model": setup.model,
+            "points": setup.radial_points,
+            "applied": [[a.change, dict(a.values)] for a in setup.applied],
+            "time": profile.time_s,
+            "current": profile.current_a,
+            "soc0": profile.soc0,
+        }
+    )
+    kept = remember("laboratory", key, lambda: _simulate(setup, profile))
+    return Trace(profile.time_s, profile.current_a, kept["voltage_v"], kept["temperature_degc"], kept["soc"])
+
+
+def edges(profile: Profile) -> Array:
+    """Times at which the solver has to stop: the ends, and both sides of every step of the current."""
+    step = np.abs(np.diff(profile.current_a))
+    limit = EDGE_SHARE * max(float(np.ptp(profile.current_a)), 1e-12)
+    rows = np.flatnonzero(step > limit)
+    if len(rows) > MOST_EDGES:
+        rows = np.sort(rows[np.argsort(-step[rows])[:MOST_EDGES]])
+    stops = np.concatenate([[0, len(profile) - 1], rows, rows + 1])
+    return np.asarray(profile.time_s[np.unique(stops)], dtype=float)
+
+
+def parameter_values(bpx: Path, soc0: float) -> Any:
+    """PyBaMM's parameters of a BPX cell at a state of charge, cut-offs out of the way.
+
+    Raises DataError for a file that is no BPX.
+    """
+    import pybamm
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # bpx warns of everything that is optional
+            values = pybamm.ParameterValues.create_from_bpx(str(bpx), target_soc=soc0)
+    except Exception as error:
+        # pydantic, json and bpx raise each their own
+        raise DataError(f"{bpx.name} is no usable BPX file: {str(error).splitlines()[0][:200]}") from None
+    values.update(
+        {"Upper voltage cut-off [V]": 6.0, "Lower voltage cut-off [V]": 0.5}, check_already_exists=False
+    )
+    return values
+
+
+def _simulate(setup: Setup, profile: Profile) -> dict[str, Array]:
+    import pybamm
+
+    os.environ.setdefault("PYBAMM_DISABLE_TELEMETRY", "true")
+    changes = setup.changes()
+    values = parameter_values(setup.bpx, profile.soc0)
+    capacity = float(values["Nominal cell capacity [A.h]"])
+    options = _options([change for change, _ in changes])
+    for change, chosen in changes:
+        change.alter(values, chosen)
+    current = profile.current_a
+    for change, chosen in changes:
+        current = change.cell_current(profile.time_s, current, chosen)
+    values["Current function [A]"] = pybamm.Interpolant(profile.time_s, current, pybamm.t)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        solution = _solve(setup, profile, values, options)
+    time = profile.time_s
+    voltage = np.asarray(solution["Voltage [V]"](time), dtype=float)
+    temperature = np.asarray(solution["Volume-averaged cell temperature [C]"](time), dtype=float)
+    moved = float(solution["Discharge capacity [A.h]"](time[-1]))
+    asked = float(np.trapezoid(current, time)) / SECONDS_PER_HOUR
+    if abs(moved - asked) > CHARGE_TOLERANCE * capacity:
+        raise SimulationError(
+            f"{profile.name}: the model moved {moved:.6g} Ah where the current has {asked:.6g} Ah; "
+            "a pulse was stepped over."
+        )
+    charge = np.concatenate([[0.0], np.cumsum(0.5 * (current[1:] + current[:-1]) * np.diff(time))])
+    for change, chosen in changes:
+        voltage = change.terminal_voltage(time, current, voltage, chosen)
+    if not np.all(np.isfinite(voltage)):
+        raise SimulationError(f"{profile.name}: the model gave no finite voltage.")
+    return {
+        "voltage_v": voltage,
+        "temperature_degc": temperature,
+        "soc": profile.soc0 - charge / SECONDS_PER_HOUR / capacity,
+    }
+
+
+def _options(changes: Sequence[Change]) -> dict[str, Any]:
+    options: dict[str, Any] = {}
+    for change in changes:
+        for name, value in change.options.items():
+            if options.get(name, value) != value:
+                raise DataError(f"Two changes ask for different values of the model option {name!r}.")
+            options[name] = value
+    return options
+
+
+def _solve(setup: Setup, profile: Profile, values: Any, options: dict[str, Any]) -> Any:
+    import pybamm
+
+    model = getattr(pybamm.lithium_ion, setup.model)(options)
+    length = float(profile.time_s[-1])
+    row = float(np.median(np.diff(profile.time_s)))
+    tolerance = TOLERANCE[setup.model]
+    solver = pybamm.IDAKLUSolver(
+        rtol=tolerance,
+        atol=1e-2 * tolerance,
+        options={"dt_max": max(2 * row, 1.0, length / MOST_STEPS)},
+        output_variables=[
+            "Voltage [V]",
+            "Volume-averaged cell temperature [C]",
+            "Discharge capacity [A.h]",
+        ],
+    )
+    mesh = dict(MESH[setup.model])
+    if setup.radial_points:
+        mesh.update(r_n=setup.radial_points, r_p=setup.radial_points)
+    simulation = pybamm.Simulation(model, parameter_values=values, solver=solver, var_pts=mesh)
+    try:
+        solution = simulation.solve(edges(profile), t_interp=profile.time_s)
+    except (pybamm.SolverError, pybamm.ModelError, ValueError) as error:
+        raise SimulationError(f"{profile.name}: {setup.model} cannot be solved: {error}") from None
+    if solution.t[-1] < length * (1 - 1e-9):
+        raise SimulationError(
+            f"{profile.name}: {setup.model} stopped at {solution.t[-1]:.6g} s of {length:.6g} s "
+            f"({solution.termination})."
+        )
+    return solution

@@ -1,0 +1,1 @@
+"""The eight bundled drive schedules; see README.md for their sources."""

@@ -1,0 +1,154 @@
+"""The virtual laboratory: measurements of a cell that exists only as PyBaMM's porous-electrode model.
+
+It stands in where measurements are not public. The cell has all that a DFN has and, on top, effects that an
+extended single-particle model does not know; `DEFAULT_MIX` is what it has unless told otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aesi.data.laboratory.changes import find_change
+from aesi.data.laboratory.instrument import Instrument
+from aesi.data.laboratory.simulator import Applied, Model, Setup, run
+from aesi.data.profile import PULSE_C, Profile, paper_profiles
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+from aesi.records import Measurement
+
+DEFAULT_MIX = ("ocv_hysteresis", "series_resistance")
+"""8 mV of hysteresis on the negative electrode, and contacts that drop 8 mV at 1C."""
+
+DROP_AT_1C_V = 0.008
+PARASITIC_SHARE = 0.005
+INSTRUMENT = Instrument()
+
+STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
+    "self_heating": lambda m, q: {"cooling_w_m2_k": 10.0 / m},
+    "ambient_temperature": lambda m, q: {"shift_k": -5.0 * m},
+    "series_resistance": lambda m, q: {"resistance_ohm": m * DROP_AT_1C_V / q},
+    "film_growth": lambda m, q: {"growth_ohm_ah": m * DROP_AT_1C_V / q**2},
+    "ocv_hysteresis": lambda m, q: {"negative_v": 8e-3 * m, "decay": 50.0},
+    "ocp_shape": lambda m, q: {"positive_v": 0.01 * m},
+    "concentration_dependent_diffusivity": lambda m, q: {"negative_slope": 2.0 * m},
+    "solid_diffusivity": lambda m, q: {"negative_factor": 1.5**-m},
+    "electrolyte_transport": lambda m, q: {"conductivity_factor": 1.5**-m, "diffusivity_factor": 1.5**-m},
+    "charge_transfer_kinetics": lambda m, q: {"negative_factor": 2.0**-m},
+    "asymmetric_kinetics": lambda m, q: {"negative_alpha": 0.5 + 0.15 * m},
+    "double_layer": lambda m, q: {"capacity_f_m2": 10.0 * m},
+    "lithium_inventory_loss": lambda m, q: {"negative_stoichiometry": 0.02 * m},
+    "active_material_loss_negative": lambda m, q: {"share": 0.05 * m},
+    "active_material_loss_positive": lambda m, q: {"share": 0.05 * m},
+    "leakage_current": lambda m, q: {"leak_a": m * PARASITIC_SHARE * q},
+}
+"""Values of a change at a magnitude (1 is typical) in a cell of q ampere-hours."""
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """A cell file, what is changed in it, and the instruments on it.
+
+    effects : ids of changes at `magnitude` times their typical strength.  seed : of the instruments' noise.
+    """
+
+    bpx: Path
+    model: Model = "DFN"
+    effects: tuple[str, ...] = DEFAULT_MIX
+    magnitude: float = 1.0
+    instrument: Instrument = INSTRUMENT
+    seed: int = 0
+
+    @property
+    def capacity_ah(self) -> float:
+        """Nominal capacity of the declared cell."""
+        return nominal_capacity_ah(self.bpx)
+
+    def setup(self) -> Setup:
+        """Model and changes. Raises DataError for an unknown change."""
+        return Setup(self.bpx, self.model, tuple(self._apply(name) for name in self.effects))
+
+    def measure(self, profile: Profile) -> Measurement:
+        """One record: the profile run and written down. The noise depends on the seed and the profile's name.
+
+        Raises DataError or SimulationError as `laboratory.simulator.run` does.
+        """
+        rng = np.random.default_rng([self.seed, *profile.name.encode()])
+        mix = ", ".join(self.effects) or "nothing added"
+        note = f"{profile.name}: virtual, {self.model} of {self.bpx.name} with {mix}; seed {self.seed}."
+        warm = "self_heating" in self.effects
+        trace = run(self.setup(), profile)
+        notes = (note, *self._outside(profile.name, trace.voltage_v))
+        return self.instrument.write(trace, profile.name, rng, warm, notes)
+
+    def _outside(self, name: str, voltage_v: Array) -> tuple[str, ...]:
+        """A note where the voltage leaves the declared window, which a cycler would not let happen."""
+        low, high = voltage_window_v(self.bpx)
+        least, most = float(voltage_v.min()), float(voltage_v.max())
+        if low <= least and most <= high:
+            return ()
+        return (f"{name}: the voltage runs from {least:.3f} to {most:.3f} V, outside {low:g} to {high:g} V.",)
+
+    def _apply(self, name: str) -> Applied:
+        change = find_change(name)
+        if name not in STRENGTHS:
+            raise DataError(
+                f"The change {change.id} has no typical strength; give its values to the simulator."
+            )
+        return Applied(name, STRENGTHS[name](self.magnitude, self.capacity_ah))
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """Records by role; soc0 : state of charge at the first row, by record name."""
+
+    train: tuple[Measurement, ...]
+    valid: tuple[Measurement, ...]
+    test: tuple[Measurement, ...]
+    soc0: dict[str, float]
+
+
+def paper_experiment(laboratory: Laboratory, dt_s: float = 0.1, pulse_c: float = PULSE_C) -> Experiment:
+    """The paper's experiment: 88,200 training rows at the default 10 Hz, 8,820 at 1 Hz.
+
+    Raises DataError or SimulationError as `Laboratory.measure` does.
+    """
+    profiles = paper_profiles(laboratory.capacity_ah, dt_s, pulse_c)
+
+    def measured(role: str) -> tuple[Measurement, ...]:
+        return tuple(laboratory.measure(profile) for profile in profiles[role])
+
+    soc0 = {profile.name: profile.soc0 for role in profiles.values() for profile in role}
+    return Experiment(measured("train"), measured("valid"), measured("test"), soc0)
+
+
+def nominal_capacity_ah(bpx: Path) -> float:
+    """The nominal capacity a BPX file states. Raises DataError where it cannot be read."""
+    return _declared(bpx, "Nominal cell capacity [A.h]")
+
+
+def voltage_window_v(bpx: Path) -> tuple[float, float]:
+    """Lower and upper cut-off a BPX file states. Raises DataError where they cannot be read."""
+    return _declared(bpx, "Lower voltage cut-off [V]"), _declared(bpx, "Upper voltage cut-off [V]")
+
+
+def _declared(bpx: Path, name: str) -> float:
+    import json
+
+    try:
+        content = json.loads(bpx.read_text(encoding="utf-8"))
+        return float(content["Parameterisation"]["Cell"][name])
+    except OSError as error:
+        raise DataError(f"The cell file {bpx} cannot be opened: {error.strerror}.") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{bpx.name} states no {name!r} ({error}).") from None
+
+
+def spans(train: Sequence[Array], test: Sequence[Array]) -> bool:
+    """Whether the range of the training arrays contains that of every test array."""
+    low = min(float(a.min()) for a in train)
+    high = max(float(a.max()) for a in train)
+    return all(low <= float(a.min()) and float(a.max()) <= high for a in test)
