@@ -12,9 +12,17 @@ import pytest
 
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = (
-    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-    "--disable-component-update --disable-sync --remote-debugging-port=0 --remote-allow-origins=*"
-).split()
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--remote-debugging-port=0",
+    "--remote-allow-origins=*",
+)
 START_S = 30.0
 
 
@@ -70,6 +78,22 @@ class Page:
         self.requests.clear()
         self.call("Page.navigate", url=Path(path).resolve().as_uri())
         self.wait_for("document.documentElement?.dataset.plots === 'drawn'")
+
+    def drag(self, element, start, stop):
+        """Press, move and release the mouse over an element, at shares of its width."""
+        self.evaluate(f"{element}.scrollIntoView({{block: 'center'}})")
+        box = self.evaluate(f"(r => [r.x, r.y, r.width, r.height])({element}.getBoundingClientRect())")
+        y = box[1] + box[3] / 2
+        for kind, share in (
+            ("Pressed", start),
+            ("Moved", (start + stop) / 2),
+            ("Moved", stop),
+            ("Released", stop),
+        ):
+            position = {"x": box[0] + share * box[2], "y": y}
+            self.call(
+                "Input.dispatchMouseEvent", type=f"mouse{kind}", button="left", clickCount=1, **position
+            )
 
     def screenshot(self, path):
         picture = self.call("Page.captureScreenshot", captureBeyondViewport=True)

@@ -34,7 +34,11 @@ class Profile:
 
 
 def error_map(current_a: Array, soc: Array, error: Array, bins: int = 24) -> ErrorMap:
-    """Mean of `error` (any unit, sign as given) in bins over (current, SOC); all arguments (n,)."""
+    """Mean of `error` (any unit, sign as given) in bins over (current, SOC); all arguments (n,).
+
+    Rows with a value that is not finite (a simulation that stopped early) are left out.
+    """
+    current_a, soc, error = _finite(current_a, soc, error)
     edges_current, edges_soc = _edges(current_a, bins), _edges(soc, bins)
     box = (edges_soc, edges_current)
     count, _, _ = np.histogram2d(soc, current_a, bins=box)
@@ -46,7 +50,8 @@ def error_map(current_a: Array, soc: Array, error: Array, bins: int = 24) -> Err
 
 
 def profile(x: Array, y: Array, bins: int = 30) -> Profile:
-    """Median and quartiles of `y` in equal bins of `x`; (n,) each."""
+    """Median and quartiles of `y` in equal bins of `x`; (n,) each; rows that are not finite are left out."""
+    x, y = _finite(x, y)
     edges = _edges(x, bins)
     index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
     order = np.argsort(index, kind="stable")
@@ -55,6 +60,11 @@ def profile(x: Array, y: Array, bins: int = 30) -> Profile:
     groups = [y[order[starts[i] : starts[i + 1]]] for i in full]
     low, median, high = (np.array([np.percentile(g, q) for g in groups]) for q in (25, 50, 75))
     return Profile(_centres(edges)[full], low, median, high)
+
+
+def _finite(*columns: Array) -> tuple[Array, ...]:
+    keep = np.all([np.isfinite(c) for c in columns], axis=0)
+    return tuple(c[keep] for c in columns)
 
 
 def _edges(x: Array, bins: int) -> Array:

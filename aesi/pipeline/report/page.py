@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.pipeline.report.embed import Embedded, Store, embed
+from aesi.pipeline.tables import ABSENT
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -81,14 +82,19 @@ def _script_safe(content: Any) -> str:
     return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def _fixed(value: float | None, digits: int = 1, unit: str = "") -> str:
-    if value is None or value != value:
-        return "–"
+def _fixed(value: Any, digits: int = 1, unit: str = "") -> str:
+    if not _known(value):
+        return ABSENT
     return f"{value:,.{digits}f}" + (f"\u00a0{unit}" if unit else "")
 
 
-def _significant(value: float | None, digits: int = 3) -> str:
-    return "–" if value is None or value != value else f"{value:.{digits}g}"
+def _significant(value: Any, digits: int = 3) -> str:
+    return f"{value:.{digits}g}" if _known(value) else ABSENT
+
+
+def _known(value: Any) -> bool:
+    """Whether a cell holds a number; rows may lack a key, which Jinja hands on as an Undefined."""
+    return isinstance(value, int | float) and value == value
 
 
 def _tied(text: str) -> str:

@@ -74,19 +74,29 @@
     return low;
   }
 
+  // All time axes of a figure move together, so one range serves them all; null means the whole record.
+  function zoomed(div) {
+    const axes = Object.keys(div._fullLayout).filter((key) => /^xaxis\d*$/.test(key));
+    const axis = axes.map((key) => div._fullLayout[key]).find((candidate) => !candidate.autorange);
+    return { range: axis ? axis.range.map(Number) : null, axes };
+  }
+
   function refine(div) {
+    const { range, axes } = zoomed(div);
     const update = { x: [], y: [] }, indices = [];
     div.data.forEach((trace, index) => {
       const meta = trace.meta;
       if (!meta || !meta.x) return;
-      const axis = div._fullLayout["xaxis" + (trace.xaxis || "x").slice(1)];
       const x = samples(meta.x), y = samples(meta.y);
-      const low = Math.max(position(x, axis.range[0]) - 1, 0);
-      const high = Math.min(position(x, axis.range[1]) + 1, x.length);
-      const shown = envelope(x, y, low, Math.max(high, low + 1), meta.limit, meta.keep);
+      const low = range ? Math.max(position(x, range[0]) - 1, 0) : 0;
+      const high = range ? Math.min(position(x, range[1]) + 1, x.length) : x.length;
+      const shown = envelope(x, y, Math.min(low, x.length - 1), Math.max(high, low + 1), meta.limit, meta.keep);
       update.x.push(shown.x); update.y.push(shown.y); indices.push(index);
     });
-    if (indices.length) Plotly.restyle(div, update, indices);
+    if (!indices.length) return;
+    const layout = {};
+    if (range) for (const key of axes) layout[key + ".range"] = range;
+    Plotly.update(div, update, layout, indices);
   }
 
   function draw(div) {
@@ -118,7 +128,7 @@
   }
 
   const plots = Array.from(document.querySelectorAll(".plot"));
-  const visible = (div) => div.offsetParent !== null;
+  const visible = (div) => !div.closest("details:not([open])");
 
   // One figure a turn, so that the page can be scrolled while the rest is drawn.
   function drawRest(queue) {

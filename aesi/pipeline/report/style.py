@@ -1,4 +1,4 @@
-"""Colours, sizes and the frame of every figure. The palette is Okabe and Ito's, safe for colour-blind readers.
+"""Colours, sizes and the frame of every figure. Okabe and Ito's palette, safe for colour-blind readers.
 
 Okabe & Ito, "Color Universal Design" (2008), jfly.uni-koeln.de/color. The page swaps INK and a few hues for
 lighter ones on a dark background.

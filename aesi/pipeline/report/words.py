@@ -78,7 +78,10 @@ def discovery_finding(view: DiscoveryView) -> str:
             f"effect of the "
             f"catalogue explains{sure}."
         )
-    return f"The declared model of {view.cell} lacks something real that no effect of the catalogue explains{sure}."
+    return (
+        f"The declared model of {view.cell} lacks something real that no effect of the catalogue "
+        f"explains{sure}."
+    )
 
 
 def discovery_consequence(view: DiscoveryView) -> str:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import BootstrapView, Row
 
@@ -81,8 +80,7 @@ def importance_figure(terms: Sequence[Row]) -> Figure | None:
 
 
 def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
-    """Coefficients of bagging and stability selection, with the inclusion probability as opacity of the "
-    "dot."""
+    """Coefficients of bagging and stability selection, coloured by inclusion."""
     rows = [row for row in terms if row.get("bagging") is not None or row.get("stability") is not None]
     if not rows:
         return None

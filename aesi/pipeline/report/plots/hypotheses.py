@@ -19,7 +19,8 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES][::-1]
     caption = "Score of each hypothesis; higher is better. The placebo has parameters but no physics."
     fig = style.figure("Hypotheses by score", caption, max(240, 110 + 20 * len(rows)), barmode="overlay")
-    for kind in KIND_ORDER:
+    others = sorted({row["kind"] for row in rows} - set(KIND_ORDER))
+    for kind in (*KIND_ORDER, *others):
         shown = [row for row in rows if row["kind"] == kind]
         if shown:
             fig.add_bar(
@@ -28,8 +29,8 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
                 orientation="h",
                 name=kind,
                 marker={
-                    "color": style.KIND_COLOURS[kind],
-                    "pattern": style.KIND_PATTERNS[kind],
+                    "color": style.KIND_COLOURS.get(kind, style.GREY),
+                    "pattern": style.KIND_PATTERNS.get(kind, {}),
                 },
                 customdata=[row.get("test_rmse_mv", float("nan")) for row in shown],
                 hovertemplate="%{y}<br>score %{x:.3g}, test RMSE %{customdata:.2f} mV<extra></extra>",

@@ -224,10 +224,9 @@ def _stack(rows: int, heights: tuple[float, ...] | None = None) -> Figure:
 
 def _mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
     """A dotted line where a record begins, and its name on top where there is room."""
-    for previous, item in zip(placed, placed[1:], strict=False):
-        fig.add_vline(x=float(previous.x[-1]), line={"width": 1, "dash": "dot", "color": style.GREY})
-        del item
-    if 1 < len(placed):
+    for item in placed[:-1]:
+        fig.add_vline(x=float(item.x[-1]), line={"width": 1, "dash": "dot", "color": style.GREY})
+    if len(placed) > 1:
         for item in placed:
             fig.add_annotation(
                 x=float(item.x[0]),

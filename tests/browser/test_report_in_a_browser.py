@@ -1,0 +1,81 @@
+"""The reports in a real browser: drawn, quiet, offline, refined on zoom, legible at both widths."""
+
+import pytest
+
+from aesi.pipeline.report import write_discovery_report, write_run_report
+
+
+@pytest.fixture(scope="module")
+def run_report(views, tmp_path_factory):
+    return write_run_report(tmp_path_factory.mktemp("run") / "report.html", views.run_view(20_000))
+
+
+@pytest.fixture(scope="module")
+def discovery_report(views, tmp_path_factory):
+    return write_discovery_report(tmp_path_factory.mktemp("d") / "report.html", views.discovery_view(20_000))
+
+
+SHOWN = "[...document.querySelectorAll('.plot')].filter(d => !d.closest('details:not([open])'))"
+
+
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (400, False), (1280, True)])
+@pytest.mark.parametrize("report", ["run_report", "discovery_report"])
+def test_all_plots_are_drawn_without_a_word_from_the_console(page, request, report, width, dark):
+    page.open(request.getfixturevalue(report), width, dark=dark)
+    assert page.errors == []
+    assert all(url.startswith(("file:", "data:")) for url in page.requests)
+    assert page.evaluate(f"{SHOWN}.length") >= 8
+    assert page.evaluate(f"{SHOWN}.every(d => d.querySelectorAll('.main-svg').length)")
+    assert page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
+    assert page.evaluate(f"{SHOWN}.every(d => d.querySelector('.main-svg').clientWidth <= d.clientWidth)")
+
+
+def test_text_is_light_on_a_dark_page(page, discovery_report):
+    colour = "getComputedStyle(document.querySelector('.plot .xtick text')).fill"
+    page.open(discovery_report, dark=True)
+    dark = page.evaluate(colour)
+    page.open(discovery_report, dark=False)
+    assert dark != page.evaluate(colour)
+
+
+def test_dragging_shows_the_samples_that_the_overview_left_out(page, run_report):
+    page.open(run_report)
+    div = "document.querySelector('[data-figure=voltage_test]')"
+    index = page.evaluate(f"{div}.data.findIndex(t => t.name === 'measured')")
+    shown = f"{div}.data[{index}].x"
+    overview = page.evaluate(f"{shown}.length")
+    page.drag(f"{div}.querySelector('.nsewdrag')", 0.10, 0.12)
+    page.wait_for(f"{shown}.length < {overview} / 2")
+    low, high = page.evaluate(f"{div}._fullLayout.xaxis.range")
+    inside = page.evaluate(f"{shown}.filter(x => {low} <= x && x <= {high}).length")
+    assert 20 < high - low < 120
+    assert inside == pytest.approx(10 * (high - low), abs=1.5)  # 10 Hz: every sample is there
+    page.evaluate(f"{div}.querySelector('[data-title=\"Reset axes\"]').dispatchEvent(new Event('click'))")
+    page.wait_for(f"{shown}.length === {overview} || {shown}.length > {overview} - 5")
+    assert page.errors == []
+
+
+def test_folded_figures_are_drawn_when_opened(page, run_report):
+    page.open(run_report)
+    div = "document.querySelector('details [data-figure=voltage_train]')"
+    assert page.evaluate(f"{div}.querySelectorAll('.main-svg').length") == 0
+    page.evaluate(f"{div}.closest('details').open = true")
+    page.wait_for(f"{div}.querySelectorAll('.main-svg').length > 0")
+
+
+def test_printing_opens_and_draws_everything(page, run_report):
+    page.open(run_report)
+    assert page.pdf().startswith(b"%PDF")
+    assert page.evaluate("[...document.querySelectorAll('.plot')].every(d => d.querySelector('.main-svg'))")
+
+
+@pytest.mark.slow
+def test_a_hundred_thousand_samples_stay_smooth(page, views, tmp_path):
+    path = write_discovery_report(tmp_path / "r.html", views.discovery_view(100_000))
+    page.open(path)
+    div = "document.querySelector('[data-figure=residual_test]')"
+    zoom = f"""(async () => {{ const start = performance.now();
+        await Plotly.relayout({div}, {{'xaxis.range': [1000, 60000]}});
+        await new Promise(done => setTimeout(done, 61)); await Plotly.relayout({div}, {{}});
+        return performance.now() - start; }})()"""
+    assert page.evaluate(zoom) < 2000

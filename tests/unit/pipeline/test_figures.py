@@ -1,0 +1,134 @@
+"""The figures of the paper."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.pipeline.figures import before_and_after_maps, paper_figures
+from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records
+from aesi.pipeline.report.views import BootstrapView
+
+
+def test_every_figure_of_the_paper_is_there(views):
+    names = set(paper_figures(views.run_view(600)))
+    assert {
+        "bootstrap_coverage",
+        "profile_current",
+        "profile_voltage",
+        "error_map_espm_train",
+        "error_map_espm_valid",
+        "error_map_espm_test",
+        "error_map_before",
+        "error_map_after",
+        "voltage_train",
+        "voltage_valid",
+        "voltage_test",
+        "violin",
+        "ranking",
+        "intervals_1",
+        "intervals_1_zoom",
+        "intervals_2",
+        "intervals_2_zoom",
+    } == names
+
+
+def test_figures_without_data_are_left_out(views):
+    view = replace(views.run_view(600), bootstrap=None, terms=(), traces=views.run_view(600).of("train"))
+    assert set(paper_figures(view)) == {
+        "profile_current",
+        "profile_voltage",
+        "error_map_espm_train",
+        "voltage_train",
+    }
+
+
+def test_compared_maps_share_their_colours(views):
+    figures = before_and_after_maps(views.run_view(600))
+    limits = {fig.data[0].zmax for fig in figures.values()}
+    assert len(limits) == 1
+    before, after = (np.nanmean(fig.data[0].z) for fig in figures.values())
+    assert after < before
+
+
+def test_the_error_is_measured_minus_model_in_millivolts(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    fig = records.voltage_figure([trace], "ESPM + AESI I", "ESPM")
+    error = next(t for t in fig.data if t.name == "ESPM" and t.yaxis == "y2")
+    np.testing.assert_allclose(error.y, 1e3 * (trace.measured_v - trace.physics_v))
+
+
+def test_the_measurement_is_inside_the_drawn_band_exactly_where_it_is_inside_the_band(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    prediction = trace.predictions["ESPM + AESI I"]
+    fig = records.voltage_figure([trace], "ESPM + AESI I", "ESPM")
+    low, high = (t.y for t in fig.data if t.name.startswith("band"))
+    drawn = (low <= 0) & (high >= 0)
+    inside = (prediction.free_run_lower_v <= trace.measured_v) & (
+        trace.measured_v <= prediction.free_run_upper_v
+    )
+    np.testing.assert_array_equal(drawn, inside)
+
+
+def test_records_stand_end_to_end_without_overlap(views):
+    rng = np.random.default_rng(0)
+    placed, unit = records.end_to_end([views.trace(n, "test", 100, rng) for n in "ab"])
+    assert unit == "s"
+    assert placed[0].x[-1] <= placed[1].x[0]
+
+
+def test_long_tests_are_shown_in_hours(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    placed, unit = records.end_to_end([replace(trace, time_s=trace.time_s * 1000)])
+    assert unit == "h"
+    assert placed[0].x[-1] == pytest.approx(49_900 / 3600)
+
+
+def test_the_zoom_finds_the_lively_stretch(views):
+    trace = views.trace("t", "test", 6000, np.random.default_rng(0))
+    calm = trace.current_a.copy()
+    calm[:4000] = 0.0
+    fig = records.interval_figure([replace(trace, current_a=calm)], "ESPM + AESI I", zoom_s=60.0)
+    error = next(t for t in fig.data if t.name == "measured error")
+    late = 1e3 * (trace.measured_v - trace.physics_v)[4000:]
+    assert np.isin(error.y[-100:], late).all()
+
+
+def test_expected_coverage_of_the_bootstrap_matches_a_simulation():
+    rng = np.random.default_rng(0)
+    n, block, resamples = 5000, 100, 400
+    shares = []
+    for _ in range(resamples):
+        hit = np.zeros(n, dtype=bool)
+        for start in rng.integers(0, n - block + 1, -(-n // block)):
+            hit[start : start + block] = True
+        shares.append(hit.mean())
+    expected = ensemble.expected_unique_fraction(n, block)
+    assert abs(np.mean(shares) - expected) < 4 * np.std(shares) / np.sqrt(resamples)
+
+
+def test_the_bootstrap_of_single_samples_is_the_classic_one():
+    assert ensemble.expected_unique_fraction(10_000, 1) == pytest.approx(1 - np.exp(-1), abs=1e-4)
+
+
+def test_the_caption_of_the_bootstrap_states_mean_and_expectation():
+    fig = ensemble.bootstrap_figure(BootstrapView(1000, 10, np.array([0.6, 0.7])))
+    assert "mean 65.0 %" in fig.layout.meta["caption"]
+
+
+def test_hypotheses_are_ranked_and_the_chosen_marked(views):
+    discovery = views.discovery_view(200).discovery
+    fig = hypotheses.ranking_figure(discovery["candidates"], {}, ["self_heating"])
+    assert fig.layout.yaxis.categoryarray[-1] == "★ self heating"
+    assert fig.layout.yaxis.categoryarray[0] == "placebo"
+
+
+def test_a_kind_nobody_foresaw_is_still_shown():
+    fig = hypotheses.ranking_figure([{"effect": "x", "kind": "numerical", "score": 1.0}], {}, [])
+    assert [bar.name for bar in fig.data] == ["numerical"]
+
+
+def test_violin_medians_are_those_of_the_squared_residual():
+    residual = np.random.default_rng(0).standard_normal(20_001) * 1e-3
+    fig = maps.violin_figure({"m": residual}, {"m": "#0072B2"})
+    assert 10 ** np.median(fig.data[0].y) == pytest.approx(np.median((1e3 * residual) ** 2), rel=1e-6)

@@ -1,0 +1,139 @@
+"""The two reports as files: complete, offline, escaped, and thinned without loss."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.pipeline.report import write_discovery_report, write_figures, write_run_report
+from aesi.pipeline.report.embed import STORED, Store, embed
+from aesi.pipeline.report.plots import records
+
+
+def payload(html):
+    return json.loads(re.search(r'id="payload">(.*?)</script>', html, re.DOTALL)[1])
+
+
+def without_plotly(html):
+    head, rest = html.split("<script>", 1)
+    return head + rest.split("</script>", 1)[1]
+
+
+@pytest.fixture(scope="module")
+def run_html(views, tmp_path_factory):
+    return write_run_report(tmp_path_factory.mktemp("run") / "report.html", views.run_view(6000)).read_text(
+        "utf-8"
+    )
+
+
+@pytest.fixture(scope="module")
+def discovery_html(views, tmp_path_factory):
+    path = tmp_path_factory.mktemp("discovery") / "report.html"
+    return write_discovery_report(path, views.discovery_view(6000)).read_text("utf-8")
+
+
+def test_the_finding_comes_before_the_evidence(run_html, discovery_html):
+    assert run_html.index("<h1>") < run_html.index('data-figure="voltage_test"')
+    assert discovery_html.index("lacks self-heating") < discovery_html.index('data-figure="residual_test"')
+
+
+def test_nothing_is_loaded_from_elsewhere(run_html, discovery_html):
+    for html in (run_html, discovery_html):
+        assert not re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"(?!data:)", html)
+        assert html.count("plotly.js v") == 1
+
+
+def test_every_placed_figure_has_its_data_and_the_other_way_round(run_html, discovery_html):
+    for html in (run_html, discovery_html):
+        placed = re.findall(r'data-figure="([^"]+)"', html)
+        assert sorted(placed) == sorted(payload(html)["figures"])
+
+
+def test_every_axis_has_a_title_with_its_unit_or_names(run_html, discovery_html):
+    for html in (run_html, discovery_html):
+        for name, figure in payload(html)["figures"].items():
+            for key, axis in figure["layout"].items():
+                if re.fullmatch(r"[xy]axis\d*", key) and axis.get("showticklabels", True):
+                    title = axis.get("title", {}).get("text", "")
+                    categories = key.startswith("y") or name == "violin"
+                    assert "," in title or categories, (name, key, title)
+
+
+def test_both_regimes_are_named(run_html):
+    text = without_plotly(run_html)
+    assert "Regime: free run" in text
+    assert "Regime: one step ahead" in text
+    assert "persistence" in text.lower()
+
+
+def test_names_from_files_are_escaped(views, tmp_path):
+    nasty = "</script><script>alert(1)</script>"
+    view = views.run_view(300)
+    view = replace(view, experiment=nasty, notes=(nasty,), traces=(replace(view.traces[3], name=nasty),))
+    html = without_plotly(write_run_report(tmp_path / "r.html", view).read_text("utf-8"))
+    assert "<script>alert" not in html
+
+
+def test_a_view_with_nothing_but_the_table_still_makes_a_page(views, tmp_path):
+    view = views.run_view(300)
+    bare = replace(view, traces=(), candidates=(), terms=(), bootstrap=None, notes=(), settings={})
+    html = write_run_report(tmp_path / "r.html", bare).read_text("utf-8")
+    assert "Nothing was dropped" in html
+    assert payload(html)["figures"] == {}
+
+
+@pytest.mark.parametrize("verdict", ["none", "unknown"])
+def test_a_discovery_without_an_effect_makes_a_page(views, tmp_path, verdict):
+    view = views.discovery_view(300, verdict=verdict)
+    bare = replace(view, files=(), dependence=(), experiments=())
+    html = without_plotly(write_discovery_report(tmp_path / "r.html", bare).read_text("utf-8"))
+    assert "What was missing" not in html
+    assert f'class="verdict {verdict}"' in html
+
+
+def test_hypotheses_may_lack_figures(views, tmp_path):
+    view = views.discovery_view(300)
+    bare = {**view.discovery, "candidates": [{"effect": "x", "kind": "physics", "score": 1.0}]}
+    html = write_discovery_report(tmp_path / "r.html", replace(view, discovery=bare)).read_text("utf-8")
+    assert "<td>–</td>" in html
+
+
+def test_the_thinned_figure_says_so_and_keeps_every_sample(views, tmp_path):
+    view = views.run_view(6000)
+    html = write_run_report(tmp_path / "r.html", view).read_text("utf-8")
+    assert "zooming in shows every sample" in html
+    content = payload(html)
+    traces = content["figures"]["voltage_test"]["data"]
+    measured = next(t for t in traces if t["name"] == "measured")
+    stored = content["arrays"][measured["meta"]["y"]]
+    samples = np.frombuffer(base64.b64decode(stored["data"]), dtype="<f4")
+    np.testing.assert_array_equal(samples, view.of("test")[0].measured_v.astype("f4"))
+    assert len(measured["y"]) < len(samples)
+    assert max(measured["y"]) == pytest.approx(samples.max(), rel=1e-6)
+
+
+def test_very_long_records_are_thinned_before_they_are_stored(views):
+    trace = views.trace("long", "test", STORED + 50_000, np.random.default_rng(0))
+    store = Store()
+    embedded = embed(records.profile_figure([trace], "voltage"), store)
+    assert embedded.samples == STORED + 50_000
+    assert embedded.kept <= STORED
+    assert embedded.drawn < 5000
+
+
+def test_the_same_array_is_stored_once():
+    store = Store()
+    assert store.add(np.arange(5.0)) == store.add(np.arange(5.0))
+    assert len(store.arrays) == 1
+
+
+def test_an_interrupted_write_leaves_the_old_report(views, tmp_path, monkeypatch):
+    path = tmp_path / "r.html"
+    path.write_text("old")
+    monkeypatch.setattr("pathlib.Path.replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        write_figures(path, "t", {})
+    assert path.read_text() == "old"

@@ -1,0 +1,62 @@
+"""Findings in plain words: they say what the numbers say, also when that is unwelcome."""
+
+from dataclasses import replace
+
+import pytest
+
+from aesi.pipeline.report import words
+
+
+def test_a_gain_is_told_with_both_errors_and_the_regime(views):
+    text = words.run_finding(views.run_view(200))
+    assert "13.2 mV to 4.1 mV" in text
+    assert "without any measured voltage" in text
+
+
+def test_a_harmful_correction_is_called_harmful(views):
+    view = views.run_view(200)
+    worse = {"name": view.chosen, "free_run": {"test_mser_pct": -42.0, "test_rmse_mv": 15.7}}
+    text = words.run_finding(replace(view, models=(view.models[0], worse)))
+    assert "does not help" in text
+    assert "13.2 mV to 15.7 mV" in text
+
+
+def test_one_step_that_loses_to_persistence_is_said_to_lose():
+    assert "no better than" in words.persistence_finding(
+        {"one_step": {"test_rmse_mv": 4.5, "persistence_rmse_mv": 4.03}}
+    )
+    assert ", better than" in words.persistence_finding(
+        {"one_step": {"test_rmse_mv": 3.5, "persistence_rmse_mv": 4.03}}
+    )
+    assert words.persistence_finding({}) == ""
+
+
+@pytest.mark.parametrize(
+    ("verdict", "phrase"),
+    [("found", "lacks self-heating"), ("none", "Nothing is missing"), ("unknown", "no effect")],
+)
+def test_each_verdict_has_its_sentence(views, verdict, phrase):
+    text = words.discovery_finding(views.discovery_view(200, verdict=verdict))
+    assert phrase in text
+    assert "97 % confidence" in text
+
+
+def test_a_partial_find_says_that_something_is_left(views):
+    view = views.discovery_view(200, verdict="unknown")
+    partial = replace(view, discovery={**view.discovery, "effects": ["self_heating"]})
+    text = words.discovery_finding(partial)
+    assert "self-heating" in text
+    assert "something more" in text
+
+
+def test_the_refit_stands_apart_from_the_finding(views):
+    text = words.discovery_consequence(views.discovery_view(200))
+    assert [text.index(v) for v in ("9.4 mV", "6.2 mV", "1.1 mV")] == sorted(
+        text.index(v) for v in ("9.4 mV", "6.2 mV", "1.1 mV")
+    )
+
+
+def test_lists_read_as_english():
+    assert words.listed(["a"]) == "a"
+    assert words.listed(["a", "b"]) == "a and b"
+    assert words.listed(["a", "b", "c"]) == "a, b and c"
