@@ -14,10 +14,15 @@ LARGE_SHARE = 0.5
 def run_finding(view: RunView) -> str:
     """What the correction buys on the test records in free run, and what the one-step figure is worth."""
     model, physics = view.model(view.chosen), view.model(view.physics)
-    if model is None or physics is None or "free_run" not in model:
-        return f"No model of the voltage error could be evaluated on {view.cell}."
-    before, after = physics["free_run"]["test_rmse_mv"], model["free_run"]["test_rmse_mv"]
-    reduction = model["free_run"]["test_mser_pct"]
+    before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (physics, model))
+    reduction = _figure(model, "free_run", "test_mser_pct")
+    if before is None or after is None or reduction is None:
+        return f"No model of the voltage error could be evaluated in free run on {view.cell}."
+    if view.chosen == view.physics:
+        return (
+            f"No correction of the voltage error was chosen: the {view.physics} alone errs by {before:.1f} mV "
+            "RMSE on the test records."
+        )
     if reduction <= 0:
         return (
             f"The data-driven correction does not help here: in free run on the test records the error "
@@ -35,8 +40,7 @@ def run_finding(view: RunView) -> str:
 
 def persistence_finding(model: Row) -> str:
     """One step ahead against persistence, in words."""
-    step = model.get("one_step", {})
-    ours, echo = step.get("test_rmse_mv"), step.get("persistence_rmse_mv")
+    ours, echo = (_figure(model, "one_step", key) for key in ("test_rmse_mv", "persistence_rmse_mv"))
     if ours is None or echo is None:
         return ""
     verdict = "better than" if ours < echo else "no better than"
@@ -56,7 +60,7 @@ def interval_finding(model: Row) -> str:
     text = (
         f"{interval['nominal_pct']:.0f} % intervals one step ahead cover {interval['coverage_pct']:.1f} % "
         f"of the "
-        f"test samples with {1e3 * interval['average_width_v']:.2f} mV average width"
+        f"test samples with {1e3 * width:.2f} mV average width"
     )
     worst = interval.get("worst_bin_coverage_pct")
     return text + (f"; {worst:.1f} % in the worst (current, SOC) bin." if worst is not None else ".")
@@ -116,6 +120,14 @@ def listed(names: Sequence[str]) -> str:
     if len(names) < 2:
         return "".join(names)
     return f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _figure(row: Row | None, group: str, key: str) -> float | None:
+    """A value of a row, None where the row, the group or the value is missing."""
+    if row is None:
+        return None
+    value: float | None = (row.get(group) or {}).get(key)
+    return value
 
 
 def _title(titles: Mapping[str, str], effect: str) -> str:

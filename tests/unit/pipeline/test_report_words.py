@@ -21,6 +21,21 @@ def test_a_harmful_correction_is_called_harmful(views):
     assert "13.2 mV to 15.7 mV" in text
 
 
+@pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
+def test_a_model_that_diverged_has_no_figures_to_tell(views, figures):
+    view = views.run_view(200)
+    broken = replace(
+        view, models=(view.models[0], {"name": view.chosen, "intervals": {"coverage_pct": None}, **figures})
+    )
+    assert "could be evaluated" in words.run_finding(broken)
+    assert words.interval_finding(broken.models[1]) == ""
+
+
+def test_choosing_no_correction_is_said_plainly(views):
+    text = words.run_finding(replace(views.run_view(200), chosen="ESPM"))
+    assert text.startswith("No correction")
+
+
 def test_one_step_that_loses_to_persistence_is_said_to_lose():
     assert "no better than" in words.persistence_finding(
         {"one_step": {"test_rmse_mv": 4.5, "persistence_rmse_mv": 4.03}}
