@@ -34,7 +34,8 @@ def dumps(value: Any) -> bytes:
     arrays: dict[str, np.ndarray] = {}
     tree = json.dumps(_encode(value, arrays)).encode()
     buffer = io.BytesIO()
-    np.savez(buffer, **{TREE: np.frombuffer(tree, dtype=np.uint8)}, **arrays)
+    arrays[TREE] = np.frombuffer(tree, dtype=np.uint8)
+    np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
 
 

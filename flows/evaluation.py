@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from aesi.records import Failed
 from flows import codec, fingerprint
 from flows.outcomes import Outcomes
 from flows.pool import Pool
@@ -38,6 +37,7 @@ class Evaluation:
         outcomes: Outcomes,
         study: str,
         say: Callable[[str], None],
+        tally: Tally,
         reuse: bool = True,
     ) -> None:
         self._pool = pool
@@ -46,7 +46,7 @@ class Evaluation:
         self._say = say
         self._reuse = reuse
         self._fresh: set[str] = set()
-        self.tally = Tally()
+        self.tally = tally
 
     def key(self, genome: Any) -> str:
         """Content key of a candidate of this study."""
@@ -101,8 +101,3 @@ class Evaluation:
             # The run itself needs no cache; only a resumed one would evaluate this candidate again.
             self._say(f"cache: candidate {key[:8]} could not be stored ({error.strerror or error}).")
         self._outcomes.release(key)
-
-
-def survived(outcome: Any) -> bool:
-    """True for a candidate, False for a failure."""
-    return not isinstance(outcome, Failed)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import mlflow
 import pandas as pd
+from mlflow.models import set_model
+from mlflow.pyfunc import PythonModel
 
 import aesi
 
 
-class HybridPyfunc(mlflow.pyfunc.PythonModel):  # type: ignore[misc, unused-ignore]
+class HybridPyfunc(PythonModel):
     """`aesi.HybridModel.predict` on tables."""
 
     def load_context(self, context: Any) -> None:
@@ -37,4 +38,4 @@ class HybridPyfunc(mlflow.pyfunc.PythonModel):  # type: ignore[misc, unused-igno
         return prediction.to_frame()[["voltage_v", "lower_v", "upper_v"]]
 
 
-mlflow.models.set_model(HybridPyfunc())
+set_model(HybridPyfunc())

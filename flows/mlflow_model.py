@@ -8,11 +8,12 @@ from pathlib import Path
 import aesi
 
 CODE = Path(__file__).with_name("hybrid_pyfunc.py")
+DEFAULT_SOC0 = 0.5
 NEEDS = ("bpx", "numba", "numpy", "pandas", "pyarrow", "pydantic", "quantile-forest", "scikit-learn", "scipy")
 
 
-def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None, soc0: float) -> None:
-    """Log the model folder under the run and register it. soc0 : what `predict` takes where none is given."""
+def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None) -> None:
+    """Log the model folder under the run, and register it where a name is given."""
     import mlflow
     import pandas as pd
     from mlflow.models import ModelSignature
@@ -20,6 +21,8 @@ def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None, s
 
     if not folder.is_dir():
         raise ValueError(f"the model folder {folder} is gone")
+    hybrid = aesi.HybridModel.load(folder)
+    soc0 = DEFAULT_SOC0 if hybrid.soc0 is None else hybrid.soc0
     signature = ModelSignature(
         inputs=Schema(
             [
@@ -31,9 +34,8 @@ def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None, s
         outputs=Schema([ColSpec("double", name) for name in ("voltage_v", "lower_v", "upper_v")]),
         params=ParamSchema([ParamSpec("soc0", "double", soc0)]),
     )
-    capacity_ah = aesi.HybridModel.load(folder).cell.capacity_ah
     time_s = [float(t) for t in range(10)]
-    example = pd.DataFrame({"time_s": time_s, "current_a": [capacity_ah / 2] * len(time_s)})
+    example = pd.DataFrame({"time_s": time_s, "current_a": [hybrid.cell.capacity_ah / 2] * len(time_s)})
     before = mlflow.get_tracking_uri()
     mlflow.set_tracking_uri(uri)
     mlflow.set_registry_uri(uri)

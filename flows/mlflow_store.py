@@ -166,7 +166,7 @@ class Store:
 
         if again and self._registered(item):
             return
-        log_hybrid(self.uri, item["run_id"], Path(item["path"]), item["registered_as"], item["soc0"])
+        log_hybrid(self.uri, item["run_id"], Path(item["path"]), item["registered_as"])
 
     def _send_end(self, item: Item, again: bool) -> None:
         self.client.set_terminated(item["run_id"], item["status"], item["at_ms"])

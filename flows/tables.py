@@ -131,10 +131,10 @@ def _summary(store: Store, run_id: str) -> dict[str, Any]:
 
     try:
         path = store.client.download_artifacts(run_id, "summary.json")
-        content: dict[str, Any] = json.loads(Path(path).read_text(encoding="utf-8"))
+        content = Path(path).read_text(encoding="utf-8")
+        return dict(json.loads(content))
     except (OSError, ValueError, MlflowException) as error:
         raise InputError(f"run {run_id} carries no readable summary.json ({error}).") from None
-    return content
 
 
 def _copy_figures(store: Store, run_id: str, folder: Path) -> None:

@@ -118,7 +118,7 @@ class Tracker:
         """A JSON artifact of the parent run."""
         self._outbox.put({"kind": "json", "run_id": self.run_id, "name": name, "content": content})
 
-    def model(self, folder: Path, soc0: float) -> None:
+    def model(self, folder: Path) -> None:
         """The chosen model, as a pyfunc that MLflow can serve."""
         name = self._config.name if self._config.tracking.register_model else None
         self._outbox.put(
@@ -127,7 +127,6 @@ class Tracker:
                 "run_id": self.run_id,
                 "path": str(folder),
                 "registered_as": name,
-                "soc0": soc0,
             }
         )
 

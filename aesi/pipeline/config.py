@@ -134,6 +134,7 @@ class SearchConfig(Section):
     block : rows of a bootstrap block.  horizon : rows of a free run inside the losses, None for a block.
     regime : what the losses measure.  weights : gamma of the losses (out-of-bag, validation, sparsity) in the
     scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints.
+    warm_start : begin with a few plain candidates (strong ridge on the whole library).
     timeout_s, memory_mb : what one candidate may take before it counts as failed.
     """
 
@@ -150,6 +151,7 @@ class SearchConfig(Section):
     pearson_train: Annotated[float, Field(ge=-1, le=1)] = 0.5
     pearson_valid: Annotated[float, Field(ge=-1, le=1)] = 0.5
     weights: tuple[float, float, float] = (0.45, 0.45, 0.10)
+    warm_start: bool = True
     timeout_s: Positive = 300.0
     memory_mb: Positive = 6000.0
     workers: Count = 1

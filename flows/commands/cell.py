@@ -31,9 +31,9 @@ def simulate(
         soc0=soc0,
         effects=[options.effect_values(text) for text in effect or []],
         effect_files=effect_file or [],
-        hold=options.one_of("--hold", hold, ("linear", "backward")),
+        hold=hold,
         columns=options.columns(column),
-        sign=options.one_of("--sign", sign, ("discharge-positive", "charge-positive")),
+        sign=sign,
     )
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
     typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)
@@ -60,7 +60,7 @@ def predict(
         measured=measured,
         soc0=soc0,
         columns=options.columns(column),
-        sign=options.one_of("--sign", sign, ("discharge-positive", "charge-positive")),
+        sign=sign,
     )
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)

@@ -47,12 +47,11 @@ def run(
 def worker(
     experiment: Experiment,
     overrides: Overrides = None,
-    wait_s: Annotated[float, typer.Option(help="How long to wait for others' candidates.")] = 3600.0,
 ) -> None:
     """One more process on a shared study: evaluates candidates of an experiment that others also work on."""
     from flows.worker import work
 
-    work(experiment, list(overrides or []), wait_s=wait_s)
+    work(experiment, list(overrides or []))
 
 
 def tables(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -17,7 +17,10 @@ Columns = Annotated[
     list[str] | None,
     typer.Option("--column", help='quantity=name, for other headers: current_a="I[A]".'),
 ]
-Sign = Annotated[str, typer.Option("--sign", help="discharge-positive or charge-positive.")]
+Sign = Annotated[
+    Literal["discharge-positive", "charge-positive"],
+    typer.Option("--sign", help="Which direction of the current is positive."),
+]
 Soc0 = Annotated[
     float | None, typer.Option("--soc0", min=0.0, max=1.0, help="State of charge at the first row.")
 ]
@@ -27,7 +30,9 @@ Effects = Annotated[
 EffectFiles = Annotated[
     list[Path] | None, typer.Option("--effect-file", help="A Python file of yours with an EFFECT in it.")
 ]
-Hold = Annotated[str, typer.Option("--hold", help="How the current runs between rows: linear or backward.")]
+Hold = Annotated[
+    Literal["linear", "backward"], typer.Option("--hold", help="How the current runs between rows.")
+]
 
 
 def columns(pairs: list[str] | None) -> dict[str, str | None]:
@@ -41,18 +46,12 @@ def columns(pairs: list[str] | None) -> dict[str, str | None]:
     return mapping
 
 
-def one_of(option: str, value: str, known: tuple[str, ...]) -> str:
-    """The value, if it is one of the known ones."""
-    if value not in known:
-        raise InputError(f"{option} {value}: has to be {' or '.join(known)}.")
-    return value
-
-
-def measurements(paths: list[Path], pairs: list[str] | None, sign: str) -> tuple[Measurement, ...]:
+def measurements(
+    paths: list[Path], pairs: list[str] | None, sign: Literal["discharge-positive", "charge-positive"]
+) -> tuple[Measurement, ...]:
     """The files as measurements; what the reader dropped or mapped is said on stderr."""
     from aesi.data import read_measurement
 
-    one_of("--sign", sign, ("discharge-positive", "charge-positive"))
     found = tuple(read_measurement(path, columns=columns(pairs), sign=sign) for path in paths)
     for measurement in found:
         for note in measurement.notes:

@@ -1,0 +1,153 @@
+"""What `aesi run` leaves in its folder: report.html, tables.md, tables.tex, model/ and summary.json."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from aesi.pipeline import tables
+from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.evaluate import Evaluation
+from aesi.pipeline.fit import Fitted
+from aesi.pipeline.hybrid import HybridModel
+from aesi.pipeline.load import Loaded
+from aesi.pipeline.report import write_run_report
+from aesi.pipeline.report.views import BootstrapView, RunView
+from aesi.sparse import Candidate, Problem, SparseModel
+
+SCHEMA = "aesi.summary/1"
+VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
+ENSEMBLES = ("AESI I", "AESI II")
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """All that an experiment ended with.
+
+    candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
+    chosen : the candidate the models come from.  run_id : of the tracked run.  seconds : wall time so far.
+    """
+
+    config: ExperimentConfig
+    loaded: Loaded
+    problem: Problem
+    chosen: Candidate
+    candidates: Sequence[Mapping[str, Any]]
+    fitted: Sequence[Fitted]
+    evaluation: Evaluation
+    run_id: str
+    seconds: float
+
+    @property
+    def best(self) -> str:
+        """The ensemble with the lower free-run error on the validation records; the test chooses nothing."""
+        rows = [row for row in self.evaluation.rows if row["name"] in ENSEMBLES]
+        if not rows:
+            return str(self.evaluation.rows[-1]["name"])
+        return str(max(rows, key=lambda row: row["free_run"].get("valid_mser_pct", float("-inf")))["name"])
+
+
+def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
+    """Write everything below `folder`; returns the content of summary.json."""
+    folder.mkdir(parents=True, exist_ok=True)
+    summary = {
+        "schema": SCHEMA,
+        "experiment": result.config.name,
+        "mlflow_run_id": result.run_id,
+        "candidates": len(result.candidates),
+        "chosen": result.best,
+        "seed": result.config.seed,
+        "cell": result.loaded.cell_name,
+        "notes": list(result.loaded.notes),
+        "models": [finite(row) for row in result.evaluation.rows],
+    }
+    hybrid(result).save(folder / "model")
+    for format in ("md", "tex"):
+        (folder / f"tables.{format}").write_text(tables.render(summary["models"], format), encoding="utf-8")
+    write_run_report(folder / "report.html", run_view(result, summary["models"]))
+    text = json.dumps(summary, indent=1, allow_nan=False)
+    (folder / "summary.json").write_text(text, encoding="utf-8")
+    return summary
+
+
+def hybrid(result: Result) -> HybridModel:
+    """The product: physics, effects, the chosen ensemble and its bands."""
+    one = next(fitted for fitted in result.fitted if fitted.model.name == result.best)
+    return HybridModel(
+        cell=result.loaded.cell,
+        effects=result.loaded.effects,
+        correction=one.model if isinstance(one.model, SparseModel) else None,
+        intervals=one.intervals,
+        bands=one.bands,
+        dt_s=result.config.data.dt_s,
+        hold=result.config.data.hold,
+        soc0=next(iter(result.loaded.soc0.values()), None),
+    )
+
+
+def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
+    """What the report shows."""
+    unseen = result.problem.out_of_bag
+    genome = result.chosen.genome
+    options = result.problem.options
+    return RunView(
+        experiment=result.config.name,
+        note=result.config.note,
+        cell=result.loaded.cell_name,
+        chosen=result.best,
+        models=tuple(rows),
+        traces=result.evaluation.traces,
+        candidates=tuple(result.candidates),
+        terms=tuple(_terms(result.chosen)),
+        bootstrap=BootstrapView(
+            n=unseen.shape[1], block=options.block or 0, unique_fraction=1.0 - unseen.mean(axis=1)
+        ),
+        settings={
+            "lambda1": f"{genome.lambda1:.3g}",
+            "lambda2": f"{genome.lambda2:.3g}",
+            "tau": f"{genome.tau:.2f}",
+            "p_c": str(genome.p_c),
+            "d": str(genome.d),
+            "feedback of the error": "yes" if genome.feedback else "no",
+        },
+        notes=(*result.loaded.notes, *result.problem.notes),
+        versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
+        mlflow_run_id=result.run_id,
+        seconds=result.seconds,
+    )
+
+
+def finite(value: Any) -> Any:
+    """The value for JSON: numbers that are not finite become null, tuples lists."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and value - value != 0:
+        return None
+    return value
+
+
+def _terms(chosen: Candidate) -> list[dict[str, Any]]:
+    bagging, stability = chosen.bagging.coefficient_table(), chosen.stability.coefficient_table()
+    inclusion: dict[str, float] = {}
+    for model in (chosen.stability, chosen.bagging):
+        if model.inclusion is not None:
+            inclusion |= dict(zip(model.terms, model.inclusion.tolist(), strict=True))
+    names = dict.fromkeys([*bagging, *stability])
+    return [
+        {
+            "term": name,
+            "bagging": bagging.get(name),
+            "stability": stability.get(name),
+            "inclusion": inclusion.get(name),
+        }
+        for name in names
+    ]
