@@ -1,8 +1,9 @@
-"""Prediction intervals of the voltage error: one step ahead by conformal prediction, online."""
+"""Prediction intervals of the voltage error: one step ahead, online; and free run, by horizon."""
 
 from aesi.conformal.calibrated import Calibrated, Stream
+from aesi.conformal.free_run import WHOLE_DRIVE, FreeRunBands
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.method import Method
 from aesi.conformal.registry import METHODS
 
-__all__ = ["METHODS", "Calibrated", "Intervals", "Method", "Stream"]
+__all__ = ["METHODS", "WHOLE_DRIVE", "Calibrated", "FreeRunBands", "Intervals", "Method", "Stream"]

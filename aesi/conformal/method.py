@@ -217,8 +217,8 @@ def half_width_scores(band: RegressionBand, rows: Array, targets: Array, floor: 
 
 
 def folds(n: int) -> list[BoolArray]:
-    """Rows to hold out in turn, (n,) each: of N_BLOCKS contiguous runs, every fifth. One fold where that holds
-    enough rows; all five, together every row once, where calibration data are short."""
+    """Rows to hold out in turn, (n,) each: of N_BLOCKS contiguous runs, every fifth. One fold where that
+    holds enough rows; all five, together every row once, where calibration data are short."""
     fold = np.arange(n) * N_BLOCKS // max(n, 1) % N_FOLDS
     if n >= ENOUGH_ROWS:
         return [fold == N_FOLDS // 2]
