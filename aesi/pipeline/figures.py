@@ -93,8 +93,9 @@ def violin(view: RunView) -> Figure | None:
 
 
 def predicted_models(view: RunView) -> list[str]:
-    """Names of the models that predicted the test records, the chosen one first."""
+    """Names of the hybrid models that predicted the test records, the chosen one first."""
     names = dict.fromkeys(name for trace in view.of("test") for name in trace.predictions)
+    names.pop(view.physics, None)
     return sorted(names, key=lambda name: name != view.chosen)
 
 

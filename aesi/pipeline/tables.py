@@ -5,7 +5,7 @@ absent; beyond the published schema a row may carry
 
     free_run   {train,valid,test}_{mser_pct,rmse_mv}, diverged (the number of records left behind)
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
-    k_step     {"1": mV, "10": mV, ...}: test RMSE, keyed by the horizon in seconds
+    k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
     intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct (one step ahead)
     free_run_intervals   the same keys, in free run
     spread     {"seeds": n, "test_mser_pct": [low, high]}
@@ -100,9 +100,12 @@ def k_step_table(models: Sequence[Row]) -> Table:
     rows = _having(models, "k_step")
     horizons = sorted({key for row in rows for key in row["k_step"]}, key=float)
     columns = [(f"{horizon} s, mV", _k_step_cell(horizon)) for horizon in horizons]
+    persistence = next((row["k_step_persistence"] for row in rows if row.get("k_step_persistence")), None)
+    if persistence is not None:
+        rows = [*rows, {"name": "persistence", "k_step": persistence}]
     caption = (
         "Voltage RMSE on the test set by horizon. Regime: the measured voltage is given once, the stated "
-        "time before the sample that is predicted, and not again."
+        "time before the sample that is predicted, and not again. Persistence holds that error."
     )
     return _table("k-step", caption, columns, rows)
 

@@ -20,21 +20,18 @@ def run_finding(view: RunView) -> str:
         return f"No model of the voltage error could be evaluated in free run on {view.cell}."
     if view.chosen == view.physics:
         return (
-            f"No correction of the voltage error was chosen: the {view.physics} alone errs by {before:.1f} mV "
-            "RMSE on the test records."
+            f"No correction of the voltage error was chosen: the {view.physics} alone errs by {before:.1f} "
+            "mV RMSE on the test records."
         )
     if reduction <= 0:
         return (
-            f"The data-driven correction does not help here: in free run on the test records the error "
-            f"grows from "
-            f"{before:.1f} mV to {after:.1f} mV. Use the {view.physics} alone."
+            "The data-driven correction does not help here: in free run on the test records the error "
+            f"grows from {before:.1f} mV to {after:.1f} mV. Use the {view.physics} alone."
         )
     return (
         f"On test records that chose nothing, run without any measured voltage, {view.chosen} takes the "
-        f"voltage "
-        f"error from {before:.1f} mV to {after:.1f} mV RMSE: {reduction:.1f} % less mean squared error "
-        f"than the "
-        f"{view.physics} alone."
+        f"voltage error from {before:.1f} mV to {after:.1f} mV RMSE: {reduction:.1f} % less mean squared "
+        f"error than the {view.physics} alone."
     )
 
 
@@ -46,24 +43,22 @@ def persistence_finding(model: Row) -> str:
     verdict = "better than" if ours < echo else "no better than"
     return (
         f"One step ahead, with the measured voltage given, it errs by {ours:.2f} mV, {verdict} repeating "
-        f"the last "
-        f"error (persistence, {echo:.2f} mV): one-step figures flatter, the free run is the figure that "
-        f"counts."
+        f"the last error (persistence, {echo:.2f} mV): one-step figures flatter, the free run is the "
+        "figure that counts."
     )
 
 
 def interval_finding(model: Row) -> str:
     """Coverage against the nominal level, in words."""
-    interval = model.get("intervals", {})
-    if "coverage_pct" not in interval:
+    keys = ("nominal_pct", "coverage_pct", "average_width_v", "worst_bin_coverage_pct")
+    nominal, coverage, width, worst = (_figure(model, "intervals", key) for key in keys)
+    if nominal is None or coverage is None or width is None:
         return ""
     text = (
-        f"{interval['nominal_pct']:.0f} % intervals one step ahead cover {interval['coverage_pct']:.1f} % "
-        f"of the "
-        f"test samples with {1e3 * width:.2f} mV average width"
+        f"{nominal:.0f} % intervals one step ahead cover {coverage:.1f} % of the test samples with "
+        f"{1e3 * width:.2f} mV average width"
     )
-    worst = interval.get("worst_bin_coverage_pct")
-    return text + (f"; {worst:.1f} % in the worst (current, SOC) bin." if worst is not None else ".")
+    return text + ("." if worst is None else f"; {worst:.1f} % in the worst (current, SOC) bin.")
 
 
 def discovery_finding(view: DiscoveryView) -> str:
@@ -78,9 +73,8 @@ def discovery_finding(view: DiscoveryView) -> str:
         return f"Nothing is missing from the declared model of {view.cell} that these data could show{sure}."
     if effects:
         return (
-            f"The declared model of {view.cell} lacks {listed(effects)}, and something more that no "
-            f"effect of the "
-            f"catalogue explains{sure}."
+            f"The declared model of {view.cell} lacks {listed(effects)}, and something more that no effect "
+            f"of the catalogue explains{sure}."
         )
     return (
         f"The declared model of {view.cell} lacks something real that no effect of the catalogue "
@@ -98,10 +92,9 @@ def discovery_consequence(view: DiscoveryView) -> str:
         return ""
     return (
         f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
-        f"same model "
-        f"with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model with the "
-        f"finding "
-        f"added by {values['after']:.1f} mV; the noise floor is {view.discovery['noise_floor_mv']:.1f} mV."
+        f"same model with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model "
+        f"with the finding added by {values['after']:.1f} mV; the noise floor is "
+        f"{view.discovery['noise_floor_mv']:.1f} mV."
     )
 
 

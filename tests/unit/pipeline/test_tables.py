@@ -67,6 +67,11 @@ def test_horizons_are_sorted_as_numbers():
     assert tables.k_step_table(models).header == ("model", "1 s, mV", "10 s, mV", "60 s, mV")
 
 
+def test_persistence_stands_below_the_horizons():
+    models = [{"name": "m", "k_step": {"1": 1.0, "60": 3.0}, "k_step_persistence": {"1": 0.9, "60": 8.0}}]
+    assert tables.k_step_table(models).rows[-1] == ("persistence", "0.90", "8.00")
+
+
 def test_columns_without_any_value_are_left_out():
     assert "time, s" not in tables.free_run_table(MODELS).header
     timed = [dict(HYBRID, seconds=12.34)]

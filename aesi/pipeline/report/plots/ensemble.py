@@ -20,8 +20,8 @@ MOST_TERMS = 30
 def front_figure(candidates: Sequence[Row]) -> Figure:
     """Every candidate of the search: validation against out-of-bag loss, terms as colour."""
     caption = (
-        "One point a candidate. Diamonds form the Pareto front over the three losses; the star is the chosen "
-        "one; crosses miss the correlation constraints."
+        "One point a candidate. Diamonds form the Pareto front over the three losses; the star is the "
+        "chosen one; crosses miss the correlation constraints."
     )
     fig = style.figure("Candidates of the search", caption, 400)
     groups = (
@@ -71,8 +71,8 @@ def importance_figure(terms: Sequence[Row]) -> Figure | None:
         return None
     rows = sorted(rows, key=lambda row: -abs(row["importance"]))
     caption = (
-        "Importance of each term by singular value decomposition of the columns term times coefficient; the "
-        f"intercept is left out.{_cut_note(len(rows))}"
+        "Importance of each term by singular value decomposition of the columns term times coefficient; "
+        f"the intercept is left out.{_cut_note(len(rows))}"
     )
     return _bars(
         rows, [abs(row["importance"]) for row in rows], "Ranking of the terms", caption, "importance, -"
@@ -86,9 +86,8 @@ def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
         return None
     rows = sorted(rows, key=lambda row: -abs(row.get("bagging") or row.get("stability") or 0.0))
     caption = (
-        "Coefficients on scaled variables. The colour is the share of the best resampled models that "
-        "keep the "
-        f"term.{_cut_note(len(rows))}"
+        "Coefficients on scaled variables. The colour is the share of the best resampled models that keep "
+        f"the term.{_cut_note(len(rows))}"
     )
     rows = rows[:MOST_TERMS][::-1]
     fig = style.figure("Coefficients", caption, _tall(len(rows)))
@@ -124,9 +123,8 @@ def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
     share = 100 * np.sort(bootstrap.unique_fraction)
     expected = 100 * expected_unique_fraction(bootstrap.n, bootstrap.block)
     caption = (
-        f"Share of distinct samples in each of {len(share)} resamples of {bootstrap.n:,} samples in "
-        f"blocks of "
-        f"{bootstrap.block}; mean {share.mean():.1f} %, expected {expected:.1f} %."
+        f"Share of distinct samples in each of {len(share)} resamples of {bootstrap.n:,} samples in blocks "
+        f"of {bootstrap.block}; mean {share.mean():.1f} %, expected {expected:.1f} %."
     )
     fig = style.figure("Coverage of the moving block bootstrap", caption, 300, showlegend=False)
     fig.add_scatter(

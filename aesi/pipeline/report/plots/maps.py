@@ -93,8 +93,7 @@ def violin_figure(residuals_v: Mapping[str, Array], colours: Mapping[str, str]) 
     """Distribution of squared residuals in free run, one violin a model, on a logarithmic axis."""
     caption = (
         "Squared residuals of the voltage in free run on the test records, logarithmic axis; the box "
-        "spans the "
-        f"quartiles. Drawn from {QUANTILES} quantiles of all samples."
+        f"spans the quartiles. Drawn from {QUANTILES} quantiles of all samples."
     )
     fig = style.figure("Squared residuals by model", caption, 380, showlegend=False)
     for name, residual in residuals_v.items():

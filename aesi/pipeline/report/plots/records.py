@@ -141,9 +141,8 @@ def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure
     role = traces[0].role
     caption = (
         f"Top: measured voltage, {physics} alone, and {chosen} in free run (no measured voltage after the "
-        f"first "
-        "sample of a record). Bottom: measured minus model; the measurement lies inside the band where the "
-        "band contains zero."
+        "first sample of a record). Bottom: measured minus model; the measurement lies inside the band "
+        "where the band contains zero."
     )
     return style.framed(
         fig, f"Voltage on the {_role_word(role)} records", caption, 560, hovermode="x unified"
@@ -192,9 +191,8 @@ def interval_figure(traces: Sequence[Trace], model: str, zoom_s: float | None = 
     title = f"Prediction intervals of {model}"
     caption = (
         "Regime: one step ahead, the measured voltage of the step before is given. Test records. Top: "
-        "measured "
-        "error of the physics model, its prediction and interval. Bottom: the same with the prediction "
-        "taken off."
+        "measured error of the physics model, its prediction and interval. Bottom: the same with the "
+        "prediction taken off."
     )
     if zoom_s is not None:
         title += ", zoom"
