@@ -13,8 +13,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
+
+CountArray = NDArray[np.uint16]
 
 Span = tuple[int, int]
 """First row, and the row after the last."""
@@ -27,29 +30,29 @@ def block_starts(spans: Sequence[Span], length: int) -> IntArray:
 
 def moving_block_weights(
     spans: Sequence[Span], length: int, resamples: int, rng: np.random.Generator
-) -> Array:
+) -> CountArray:
     """How often each row occurs in each resample.
 
-    spans : consecutive records covering rows 0 to n.  Returns (resamples, n), whole numbers as floats.
+    spans : consecutive records covering rows 0 to n.  Returns (resamples, n).
     """
     n = spans[-1][1]
     ends = np.concatenate([np.full(b - a, b) for a, b in spans])
     starts = block_starts(spans, length)
-    weights = np.empty((resamples, n))
+    weights = np.empty((resamples, n), dtype=np.uint16)
     for row in weights:
-        change = np.zeros(n + 1)
+        change = np.zeros(n + 1, dtype=np.int16)
         drawn = 0
         while drawn < n:
             start = int(starts[rng.integers(len(starts))])
             stop = min(start + length, int(ends[start]), start + n - drawn)
-            change[start] += 1.0
-            change[stop] -= 1.0
+            change[start] += 1
+            change[stop] -= 1
             drawn += stop - start
-        row[:] = np.cumsum(change[:-1])
+        row[:] = np.cumsum(change[:-1], dtype=np.int16)
     return weights
 
 
-def coverage(weights: Array) -> Array:
+def coverage(weights: CountArray) -> Array:
     """(resamples,) the share of rows that each resample holds at least once."""
     return np.asarray((weights > 0).mean(axis=1))
 
@@ -64,11 +67,11 @@ def pieces(spans: Sequence[Span], length: int) -> list[Span]:
     return cut
 
 
-def leave_out_weights(cut: Sequence[Span], n: int) -> Array:
+def leave_out_weights(cut: Sequence[Span], n: int) -> CountArray:
     """(pieces, n): one everywhere but zero on one piece."""
-    weights = np.ones((len(cut), n))
+    weights = np.ones((len(cut), n), dtype=np.uint16)
     for row, (a, b) in zip(weights, cut, strict=True):
-        row[a:b] = 0.0
+        row[a:b] = 0
     return weights
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.linalg import eigh, lapack, qr
 from scipy.linalg.blas import dsyrk, dtrmm
 
+from aesi.numerics.blocks import CountArray
 from aesi.numerics.typing import Array
 
 CELL = 25
@@ -30,26 +31,29 @@ def orthonormal(matrix: Array) -> tuple[Array, Array]:
     return np.ascontiguousarray(q), r
 
 
-def weighted_grams(rows: Array, weights: Array) -> Array:
+def weighted_grams(rows: Array, weights: CountArray) -> Array:
     """rows' diag(w) rows for each weight vector.
 
-    rows : (n, m) stored by rows.  weights : (resamples, n), not negative.  Returns (resamples, m, m).
+    rows : (n, m) stored by rows.  weights : (resamples, n).  Returns (resamples, m, m).
     """
     n, m = rows.shape
     whole = n // CELL * CELL
     by_cell = weights[:, :whole].reshape(len(weights), -1, CELL).min(axis=2)
+    as_float = by_cell.astype(float)
     grams = np.empty((len(weights), m, m))
     cells = rows[:whole].reshape(-1, CELL, m)
     for start in range(0, m, _COLUMNS_AT_ONCE):
         stop = min(start + _COLUMNS_AT_ONCE, m)
-        grams[:, :stop, start:stop] = _upper_columns(cells, by_cell, start, stop)
-    excess = weights - np.pad(np.repeat(by_cell, CELL, axis=1), ((0, 0), (0, n - whole)))
-    for gram, extra in zip(grams, excess, strict=True):
+        grams[:, :stop, start:stop] = _upper_columns(cells, as_float, start, stop)
+    lower = np.tril_indices(m, -1)
+    for gram, weight, smallest in zip(grams, weights, by_cell, strict=True):
+        extra = weight.copy()
+        extra[:whole] -= np.repeat(smallest, CELL)
         some = np.flatnonzero(extra)
         if len(some):
-            scaled = rows[some] * np.sqrt(extra[some])[:, None]
+            scaled = rows[some]
+            scaled *= np.sqrt(extra[some].astype(float))[:, None]
             gram += dsyrk(1.0, scaled.T, lower=0)
-        lower = np.tril_indices(m, -1)
         gram[lower] = gram.T[lower]
     return grams
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.numerics.metrics import pearson
+from aesi.numerics.metrics import mse, pearson
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries, Failed
 from aesi.sparse import free_run
 from aesi.sparse.ensemble import Ensemble, best_members, combine
 from aesi.sparse.genome import Genome
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem, Regime
+from aesi.sparse.problem import Problem
 from aesi.sparse.stridge import STRidge
 
 _ROWS_AT_ONCE = 4096
@@ -53,7 +52,8 @@ class Candidate:
     validation records; where there are none, on the left-out pieces, by fits of all and of the stable terms.
     loss_sparse : number of active terms of AESI I.
     fitness : 1 - (g1 loss_oob + g2 loss_valid + g3 loss_sparse / library size).
-    pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run.
+    pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run (on training
+    rows, started anew with each fold).
     free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (of the fold models
     on the folds where there are none).
     """
@@ -104,7 +104,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     if not alive.any():
         return Failed(f"every coefficient is below lambda2 = {genome.lambda2:g} in every resample")
     losses = np.full(len(fits), np.inf)
-    losses[alive] = _out_of_bag(problem, active, fits[alive], problem.out_of_bag[alive])
+    losses[alive] = _out_of_bag(problem, active, fits[alive], problem.counts[alive] == 0)
     best = best_members(losses, problem.options.best)
     if not len(best):
         return Failed("every resample diverges in free run")
@@ -116,16 +116,16 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     bagging = _model(problem, active, ensemble.bagging, ensemble, "AESI I")
     stability = _model(problem, active, ensemble.stability, ensemble, "AESI II")
     fold_fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.fold_factors])
-    left, by_folds = _folds(problem, active, fold_fits)
+    stable = np.append(ensemble.stability != 0, True)
+    refits = np.zeros_like(fold_fits)
+    refits[:, stable[:-1]] = [
+        solver.fit_factor(factor[:, columns[stable]]) for factor in problem.fold_factors
+    ]
+    runs = _fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
     if problem.split.valid:
         judged = [_on_records(model, problem.split.valid, problem) for model in (bagging, stability)]
     else:
-        stable = np.append(ensemble.stability != 0, True)
-        refits = np.zeros_like(fold_fits)
-        refits[:, stable[:-1]] = [
-            solver.fit_factor(factor[:, columns[stable]]) for factor in problem.fold_factors
-        ]
-        judged = [by_folds, _folds(problem, active, refits)[1]]
+        judged = [_on_folds(problem, runs, column) for column in (0, 1)]
     valid = replace(judged[0], loss=0.5 * (judged[0].loss + judged[1].loss))
     if not np.isfinite(valid.loss):
         return Failed("the model diverges in free run on the validation data")
@@ -138,13 +138,13 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         loss_valid=valid.loss,
         loss_sparse=count,
         fitness=fitness((loss_oob, valid.loss, count), len(problem.library), weights),
-        pearson_train=_train_pearson(problem, active, ensemble.bagging),
+        pearson_train=pearson(problem.target, runs.free_run[:, 2]),
         pearson_valid=valid.pearson,
         free_run_valid_mser_pct=valid.mser_pct,
         one_step_valid_rmse_v=valid.one_step_rmse_v,
         bagging=bagging,
         stability=stability,
-        residuals=_honest(problem, left),
+        residuals=_honest(problem, runs),
         oob_by_resample=losses,
     )
 
@@ -159,84 +159,92 @@ def _out_of_bag(problem: Problem, active: IntArray, fits: Array, unseen: BoolArr
     """(models,) mean squared error of each on the rows it has not seen, relative to the bare model."""
     squared = np.zeros(len(fits))
     bare = np.zeros(len(fits))
-    for rows, prediction in _predictions(problem, active, fits, problem.restart, problem.options.regime):
+    state = np.zeros(len(fits))
+    free = problem.options.regime == "free_run"
+    for a in range(0, len(problem.target), _ROWS_AT_ONCE):
+        rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
+        drive, functions = _drive(problem, active, fits, rows)
+        if free:
+            prediction = _free(problem, drive, functions, rows, problem.restart[rows], state)
+        else:
+            prediction = _one_step(problem, drive, functions, rows)
         mask = unseen[:, rows].T
         target = problem.target[rows, None]
-        with np.errstate(invalid="ignore"):
-            squared += np.where(mask, (target - prediction) ** 2, 0.0).sum(axis=0)
-        bare += (mask * (target - problem.zero) ** 2).sum(axis=0)
+        squared += np.square(target - prediction).sum(axis=0, where=mask)
+        bare += np.square(target[:, 0] - problem.zero) @ mask
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = squared / bare
     return np.where(np.isfinite(ratio), ratio, np.inf)
 
 
-def _predictions(
-    problem: Problem, active: IntArray, fits: Array, restart: BoolArray, regime: Regime
-) -> Iterator[tuple[slice, Array]]:
-    """Yield (rows, (rows, models) scaled predictions), a slice of rows at a time.
-
-    A free run carries its state from slice to slice and restarts from the measured error where told.
-    """
+def _drive(problem: Problem, active: IntArray, fits: Array, rows: slice) -> tuple[Array, IntArray]:
+    """(n_functions, rows, models): for each function of the error, the sum of the input parts; and these functions."""
     feedbacks = problem.library.feedbacks[active]
-    functions = np.unique(feedbacks)
     products = problem.which[active]
-    state = np.zeros(len(fits))
+    functions = np.unique(feedbacks)
+    drive = np.empty((len(functions), rows.stop - rows.start, len(fits)))
+    for part, q in zip(drive, functions, strict=True):
+        mine = feedbacks == q
+        np.matmul(problem.products[products[mine], rows].T, fits[:, mine].T, out=part)
+    return drive, functions
+
+
+def _free(
+    problem: Problem, drive: Array, functions: IntArray, rows: slice, restart: BoolArray, state: Array
+) -> Array:
+    """(rows, models) scaled predictions in free run; `state` carries them from one slice to the next."""
+    if not functions.any():
+        return np.asarray(drive[0])
     clip = problem.options.outside == "clip"
-    for a in range(0, len(problem.target), _ROWS_AT_ONCE):
-        rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
-        drive = np.stack(
-            [
-                problem.products[products[feedbacks == q], rows].T @ fits[:, feedbacks == q].T
-                for q in functions
-            ]
-        )
-        if regime == "one_step" or not functions.any():
-            yield rows, np.einsum("qkj,qk->kj", drive, problem.error_functions[functions, rows])
-        else:
-            yield (
-                rows,
-                free_run.run_many(
-                    drive, functions, problem.error[rows], restart[rows], state, clip, free_run.LIMIT
-                ),
-            )
+    return np.asarray(free_run.run_many(drive, functions, problem.error[rows], restart, state, clip))
 
 
-def _train_pearson(problem: Problem, active: IntArray, coefficients: Array) -> float:
-    runs = _predictions(problem, active, coefficients[None], problem.restart, "free_run")
-    return pearson(problem.target, np.concatenate([prediction[:, 0] for _, prediction in runs]))
+def _one_step(problem: Problem, drive: Array, functions: IntArray, rows: slice) -> Array:
+    return np.einsum("qkj,qk->kj", drive, problem.error_functions[functions, rows])
 
 
-def _folds(problem: Problem, active: IntArray, fits: Array) -> tuple[dict[Regime, Array], _Judged]:
-    """Scaled residuals of each piece by the model fitted on the others, by regime, and how those did."""
-    restart = np.zeros(len(problem.target), dtype=bool)
-    restart[[a for a, _ in problem.folds]] = True
-    own = np.repeat(np.arange(len(fits)), [b - a for a, b in problem.folds])
-    runs: dict[Regime, Array] = {}
-    regimes: tuple[Regime, Regime] = ("one_step", "free_run")
-    for regime in regimes:
-        parts = [
-            prediction[np.arange(len(prediction)), own[rows]]
-            for rows, prediction in _predictions(problem, active, fits, restart, regime)
-        ]
-        runs[regime] = np.concatenate(parts)
-    left = {regime: problem.target - run for regime, run in runs.items()}
+@dataclass(frozen=True, eq=False)
+class _FoldRuns:
+    """(n, 3) scaled predictions, by regime: of the fold's fit, its refit of the stable terms, and AESI I."""
+
+    one_step: Array
+    free_run: Array
+
+
+def _fold_runs(problem: Problem, active: IntArray, fits: Array, refits: Array, bagging: Array) -> _FoldRuns:
+    parts = []
+    for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True):
+        rows = slice(a, b)
+        drive, functions = _drive(problem, active, np.stack([fit, refit, bagging]), rows)
+        restart = np.zeros(b - a, dtype=bool)
+        restart[0] = True
+        free = _free(problem, drive, functions, rows, restart, np.zeros(3))
+        parts.append((_one_step(problem, drive, functions, rows), free))
+    return _FoldRuns(np.vstack([one for one, _ in parts]), np.vstack([free for _, free in parts]))
+
+
+def _on_folds(problem: Problem, runs: _FoldRuns, column: int) -> _Judged:
     bare = float(np.mean((problem.target - problem.zero) ** 2))
-    ratio = {regime: float(np.mean(series**2)) / bare for regime, series in left.items()}
-    return left, _Judged(
-        ratio[problem.options.regime],
-        pearson(problem.target, runs["free_run"]),
-        100.0 * (1.0 - ratio["free_run"]),
-        problem.scaling.error_volts_per_unit * float(np.sqrt(np.mean(left["one_step"] ** 2))),
+    with np.errstate(invalid="ignore"):
+        loss_step = mse(problem.target, runs.one_step[:, column]) / bare
+        loss_free = mse(problem.target, runs.free_run[:, column]) / bare
+    return _Judged(
+        loss_free if problem.options.regime == "free_run" else loss_step,
+        pearson(problem.target, runs.free_run[:, column]),
+        100.0 * (1.0 - loss_free),
+        problem.scaling.error_volts_per_unit * float(np.sqrt(loss_step * bare)),
     )
 
 
-def _honest(problem: Problem, left: dict[Regime, Array]) -> tuple[HonestResiduals, ...]:
+def _honest(problem: Problem, runs: _FoldRuns) -> tuple[HonestResiduals, ...]:
     volts = problem.scaling.error_volts_per_unit
+    one_step = volts * (problem.target - runs.one_step[:, 0])
+    free = volts * (problem.target - runs.free_run[:, 0])
     return tuple(
         HonestResiduals(
             record.name,
-            volts * left["one_step"][a:b],
-            volts * left["free_run"][a:b],
+            one_step[a:b],
+            free[a:b],
             tuple(start - a for start, _ in problem.folds if a <= start < b),
         )
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)

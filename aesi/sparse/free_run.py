@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.sparse.basis import slope, value
+from aesi.sparse.basis import FUNCTIONS, clipped_values, slope, value
 
 LIMIT = 10.0
 """A prediction beyond this many times the trained half-range counts as diverged."""
@@ -42,13 +42,7 @@ def run(drive: Array, functions: IntArray, start: float, clip: bool, limit: floa
 
 @njit(cache=True)
 def run_many(
-    drive: Array,
-    functions: IntArray,
-    measured: Array,
-    restart: BoolArray,
-    state: Array,
-    clip: bool,
-    limit: float,
+    drive: Array, functions: IntArray, measured: Array, restart: BoolArray, state: Array, clip: bool
 ) -> Array:
     """Several models along the same rows, each piece started from its measured error.
 
@@ -58,19 +52,29 @@ def run_many(
     """
     n, models = drive.shape[1], drive.shape[2]
     out = np.empty((n, models))
+    at = np.empty((len(FUNCTIONS), models))
+    x = np.empty(models)
     for k in range(n):
         if restart[k]:
             state[:] = measured[k]
+        if clip:
+            for j in range(models):
+                x[j] = min(1.0, max(-1.0, state[j]))
+            clipped_values(functions, x, at)
+        else:
+            for q in functions:
+                for j in range(models):
+                    at[q, j] = value(q, state[j])
+        following = out[k]
+        following[:] = 0.0
+        for i in range(len(functions)):
+            values, weights = at[functions[i]], drive[i, k]
+            for j in range(models):
+                following[j] += values[j] * weights[j]
         for j in range(models):
-            x = state[j]
-            inside = min(1.0, max(-1.0, x)) if clip else x
-            following = 0.0
-            for q in range(len(functions)):
-                following += value(functions[q], inside) * drive[q, k, j]
-            if not abs(x) <= limit or not abs(following) <= limit:
-                following = np.inf
-            state[j] = following
-            out[k, j] = following
+            if not (abs(state[j]) <= LIMIT and abs(following[j]) <= LIMIT):
+                following[j] = np.inf
+            state[j] = following[j]
     return out
 
 

@@ -23,7 +23,14 @@ from typing import Literal
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.blocks import Span, leave_out_weights, moving_block_weights, pieces, starts_mask
+from aesi.numerics.blocks import (
+    CountArray,
+    Span,
+    leave_out_weights,
+    moving_block_weights,
+    pieces,
+    starts_mask,
+)
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries, Split
@@ -71,7 +78,8 @@ class Problem:
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
     error_functions : (12, n) the functions of the fed-back error.  error, target : (n,) scaled e[k] and
     e[k + 1].
-    out_of_bag : (resamples, n).  factors : (resamples, m + 1, m + 1), fold_factors likewise, and
+    counts : (resamples, n) how often each resample holds a row.
+    factors : (resamples, m + 1, m + 1), fold_factors likewise, and
     full_factor (m + 1, m + 1): F with F' F = [Theta y]' W [Theta y].
     notes : what was left out of the library, and why, one sentence each.
     """
@@ -87,7 +95,7 @@ class Problem:
     error_functions: Array
     error: Array
     target: Array
-    out_of_bag: BoolArray
+    counts: CountArray
     restart: BoolArray
     folds: tuple[Span, ...]
     factors: Array
@@ -147,7 +155,7 @@ class Problem:
             error_functions=error_functions,
             error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
             target=target,
-            out_of_bag=weights == 0,
+            counts=weights,
             restart=starts_mask(pieces(spans, options.horizon or block), n),
             folds=cut,
             factors=every[: len(weights)],
@@ -160,6 +168,10 @@ class Problem:
     def zero(self) -> float:
         """The scaled error at which the physics model is exact."""
         return float(self.scaling.error_to_scaled(np.array(0.0)))
+
+    def weights(self, resample: int) -> Array:
+        """(n,) how often a resample holds each row."""
+        return self.counts[resample].astype(float)
 
     def theta(self, which: IntArray) -> Array:
         """(n_terms, n) the given terms along the training rows."""

@@ -1,0 +1,181 @@
+"""A search whose candidates are ensembles of bootstrap resamples, against PySINDy's STLSQ on the same ones.
+
+Synthetic records of the paper's size: a current with drive-like pulses, states that follow it through
+low-passes and its integral, and an error that they drive besides coloured noise. The library holds the terms
+of lowest degree. Ours is everything a search does, one-off work included: library, factorisation, Gram
+matrices of all resamples, and for each candidate the fits, the out-of-bag errors in free run, and both
+ensembles. The peer is timed on a few resamples and scaled: STLSQ alone, without building the library,
+without out-of-bag errors. Both run in one thread.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator, Sequence
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.records import INPUT_NAMES, ErrorSeries, Failed, Split
+from aesi.sparse import Genome, Library, Options, Problem, STRidge, evaluate
+from aesi.sparse.inputs import low_pass, with_inputs
+
+CASES = ((60, 1e-3), (200, 1e-12), (626, 1e-3), (626, 1e-12))
+"""Terms in the library, lambda1."""
+
+_DT_S = 0.1
+_CAPACITY_AS = 30.0 * 3600.0
+
+
+def run(
+    cases: Sequence[tuple[int, float]] = CASES,
+    n: int = 88_200,
+    candidates: int = 20,
+    resamples: int = 100,
+    peer_models: int = 2,
+    seed: int = 0,
+    **_: Any,
+) -> Iterator[dict[str, Any]]:
+    """One line a case: seconds of ours and of the peer for all candidates, their ratio, errors, memory."""
+    from threadpoolctl import threadpool_limits
+
+    record = synthetic_record(n + 1, seed)
+    with threadpool_limits(1):
+        # Compiled code is loaded, and solvers warm up, before anything is timed.
+        _ours(synthetic_record(2001, seed), 40, 1e-3, 1, 4)
+        for terms, lambda1 in cases:
+            yield _case(record, terms, lambda1, candidates, resamples, peer_models)
+
+
+def synthetic_record(n: int, seed: int) -> ErrorSeries:
+    """A record of n samples at 10 Hz: smooth states, as an ESPM has, and an error they partly explain."""
+    rng = np.random.default_rng(seed)
+    time_s: Array = _DT_S * np.arange(n, dtype=float)
+    raw = np.repeat(rng.normal(0.0, 45.0, n // 40 + 1), 40)[:n]
+    current = np.clip(low_pass(raw, _DT_S, 1.5), -90.0, 150.0)
+    current -= current.mean() - 0.6 * _CAPACITY_AS / time_s[-1]
+    soc = 0.95 - np.cumsum(current) * _DT_S / _CAPACITY_AS
+    slow = {tau: low_pass(current, _DT_S, tau) for tau in (20.0, 40.0, 70.0, 250.0)}
+    inputs = np.column_stack(
+        [
+            current,
+            5e4 * (1.0 - 0.6 * soc) + 25.0 * slow[70.0],
+            3e4 * soc - 20.0 * slow[250.0],
+            1000.0 + 3.0 * slow[20.0] + 0.5 * slow[40.0],
+            1000.0 - 2.8 * slow[40.0],
+        ]
+    )
+    noise = low_pass(rng.normal(0.0, 1.0, n), _DT_S, 30.0) * 0.1
+    drive = 1e-4 * current + 8e-3 * np.tanh(slow[40.0] / 40.0) * soc + 1e-2 * (soc - 0.6) ** 2
+    return ErrorSeries(
+        "synthetic", _DT_S, time_s, low_pass(drive, _DT_S, 5.0) + noise, inputs, soc, 3.7 + 0.4 * soc
+    )
+
+
+def _case(
+    record: ErrorSeries, terms: int, lambda1: float, candidates: int, resamples: int, peer_models: int
+) -> dict[str, Any]:
+    with _PeakMemory() as memory:
+        started = perf_counter()
+        problem, genomes, failed = _ours(record, terms, lambda1, candidates, resamples)
+        ours_s = perf_counter() - started
+    peer_s, peer_error, error = _peer(problem, genomes, peer_models)
+    peer_total_s = peer_s * candidates * resamples
+    return {
+        "bench": "ensemble",
+        "terms": terms,
+        "lambda1": lambda1,
+        "rows": len(problem.target),
+        "candidates": candidates,
+        "failed": failed,
+        "resamples": resamples,
+        "ours_s": round(ours_s, 3),
+        "ours_s_per_candidate": round(ours_s / candidates, 3),
+        "peer": "PySINDy STLSQ",
+        "peer_s": round(peer_total_s, 1),
+        "peer_models_timed": peer_models,
+        "peer_s_per_model": round(peer_s, 3),
+        "ratio": round(peer_total_s / ours_s, 1),
+        "coefficient_error": error,
+        "coefficient_error_reference": "QR of the weighted rows, relative to the largest coefficient",
+        "peer_coefficient_error": peer_error,
+        "peak_mb": round(memory.peak_mb),
+    }
+
+
+def _ours(
+    record: ErrorSeries, terms: int, lambda1: float, candidates: int, resamples: int
+) -> tuple[Problem, list[Genome], int]:
+    names = (*INPUT_NAMES, "soc")
+    every = Library.build(names)
+    library = every.take(np.argsort(every.degrees, kind="stable")[:terms])
+    split = Split((with_inputs(record, names),), (), ())
+    problem = Problem.build(split, Options(resamples=resamples), library)
+    thresholds = np.geomspace(1e-2, 1.0, candidates)
+    genomes = [Genome.whole(library, lambda1, float(t), 0.41) for t in thresholds]
+    outcomes = [evaluate(problem, genome) for genome in genomes]
+    return problem, genomes, sum(isinstance(outcome, Failed) for outcome in outcomes)
+
+
+def _peer(problem: Problem, genomes: Sequence[Genome], models: int) -> tuple[float, float, float]:
+    """Seconds of a model of the peer, its largest coefficient error, and ours, against a QR of the rows."""
+    from pysindy import STLSQ
+
+    theta = problem.theta(np.arange(len(problem.library))).T
+    spent, peer_error, error = 0.0, 0.0, 0.0
+    for k in range(models):
+        genome = genomes[k * (len(genomes) - 1) // max(1, models - 1)]
+        weights = problem.weights(k)
+        rows = np.repeat(np.arange(len(weights)), weights.astype(int))
+        x, y = theta[rows], problem.target[rows]
+        peer = STLSQ(threshold=genome.lambda2, alpha=genome.lambda1, unbias=False)
+        started = perf_counter()
+        with _quiet():
+            peer.fit(x, y[:, None])
+        spent += perf_counter() - started
+        solver = STRidge(genome.lambda1, genome.lambda2)
+        reference = solver.fit(theta, problem.target, weights)
+        scale = max(float(np.abs(reference).max()), np.finfo(float).tiny)
+        error = max(error, float(np.abs(solver.fit_factor(problem.factors[k]) - reference).max()) / scale)
+        peer_error = max(peer_error, float(np.abs(peer.coef_[0] - reference).max()) / scale)
+    return spent / models, peer_error, error
+
+
+def _quiet() -> Any:
+    import warnings
+
+    # STLSQ announces an empty model and an ill-conditioned solve; both are expected here.
+    return warnings.catch_warnings(action="ignore")
+
+
+class _PeakMemory:
+    """Highest resident memory of this process while the block runs, looked at every 20 ms."""
+
+    peak_mb = 0.0
+
+    def __enter__(self) -> _PeakMemory:
+        import psutil
+
+        self._process = psutil.Process()
+        self._done = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._done.set()
+        self._thread.join()
+
+    def _watch(self) -> None:
+        while True:
+            self.peak_mb = max(self.peak_mb, self._process.memory_info().rss / 2**20)
+            if self._done.wait(0.02):
+                return
+
+
+def condition(theta: Array) -> float:
+    """Condition number of a library matrix (n, m), from the singular values of its triangular factor."""
+    values = np.linalg.svd(np.linalg.qr(theta, mode="r"), compute_uv=False)
+    return float(values[0] / values[-1])
