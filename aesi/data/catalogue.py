@@ -1,0 +1,220 @@
+"""Public data sets of measured cells: where they come from, where they are on this machine, how to get them.
+
+Nothing measured is part of the package. One set is fetched from its public address and checked; the others
+lie behind pages that a program cannot follow, so they are listed with their DOI and how to read what one finds
+there.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+
+from aesi.data.fetch import Remote, fetch
+from aesi.data.laboratory.cache import cache_folder
+from aesi.errors import DataError
+
+NEIGHBOUR = Path("..", "shared", "data")
+"""A folder of data beside the project, looked into from the working directory."""
+SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".bpx.json", ".json")
+
+ABOUT_ENERGY = (
+    "https://raw.githubusercontent.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation/"
+    "8efd45a7495ad8d3a4d72b547e657322a4baabd2/NMC/"
+)
+ABOUT_ENERGY_COLUMNS = {"time_s": "Time [s]", "current_a": "I[A]", "voltage_v": "U[V]"}
+
+
+@dataclass(frozen=True)
+class DataSet:
+    """One cell and its tests.
+
+    files : what `get` fetches; empty where a program cannot.  how : to get the set by hand, and to read it.
+    """
+
+    name: str
+    cell: str
+    tests: str
+    source: str
+    licence: str
+    files: tuple[Remote, ...] = ()
+    how: str = ""
+
+
+def _about_energy(name: str, path: str, sha256: str) -> Remote:
+    columns = ABOUT_ENERGY_COLUMNS if name.endswith(".csv") else None
+    return Remote(name, ABOUT_ENERGY + path, sha256, columns, "charge-positive")
+
+
+SETS = (
+    DataSet(
+        "about_energy_nmc",
+        "12.5 Ah NMC111/graphite pouch cell, 25 degC",
+        "C/20, C/2 and 1C discharges; drive cycle at 1 Hz; published porous-electrode parameters (BPX)",
+        "About:Energy, github.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation, commit 8efd45a",
+        "CC BY-SA 4.0",
+        (
+            _about_energy(
+                "C20.csv",
+                "data/validation/NMC_25degC_Co20.csv",
+                "d04bf7f43b92df88fb0c158621f3309380027b181bd6c803f3be709c371b76c4",
+            ),
+            _about_energy(
+                "C2.csv",
+                "data/validation/NMC_25degC_Co2.csv",
+                "0a86a5e9eebfef061b7b0535269837780f391bfa61df09887ba955b635e58275",
+            ),
+            _about_energy(
+                "1C.csv",
+                "data/validation/NMC_25degC_1C.csv",
+                "4dbfdac5a6d4d9aebc1c916a1fd3687049c86d3b191a4210dd0c1d8f90de34a7",
+            ),
+            _about_energy(
+                "drive_cycle.csv",
+                "data/validation/NMC_25degC_DriveCycle.csv",
+                "08b8ecfcd3d38fba5fe3852b518d70188ac5c10e28bf47be9ec45fa0467ccace",
+            ),
+            _about_energy(
+                "cell.bpx.json",
+                "nmc_pouch_cell_BPX.json",
+                "9fea2c5a2748ac1f09e2bb32225fe4810597611a93ea57d68ed84783188f4d03",
+            ),
+        ),
+    ),
+    DataSet(
+        "lg_18650hg2",
+        "LG 18650HG2, 3.0 Ah, NMC/graphite-SiO",
+        "C/20, 1C capacity, US06, LA92 and mixed cycles at 10 Hz, -20 to 40 degC; case temperature",
+        "Kollmeyer, Vidal, Naguib, Skells 2020, doi:10.17632/cp3473x7xv.3",
+        "CC BY 4.0",
+        how="Open the DOI, download the archive and unpack it. Each CSV has a preamble above its header and "
+        "time as h:min:s: keep the rows below, with time in seconds, 'Current', 'Voltage' and 'Temperature' as "
+        "time_s,current_a,voltage_v,temperature_degc, and read with --sign charge-positive.",
+    ),
+    DataSet(
+        "panasonic_ncr18650pf",
+        "Panasonic NCR18650PF, 2.9 Ah, NCA/graphite",
+        "C/20, 1C, pulses (HPPC), US06, HWFET, LA92 and mixed cycles at 10 Hz; case temperature",
+        "Kollmeyer 2018, doi:10.17632/wykht8y7tg.1",
+        "CC BY 4.0",
+        how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas` with "
+        "Time (s), Current (A, positive on charge), Voltage (V) and Battery_Temp_degC: write these as a CSV "
+        "with the columns time_s,current_a,voltage_v,temperature_degc and read it with --sign charge-positive.",
+    ),
+    DataSet(
+        "lg_m50t_w8",
+        "LG INR21700-M50T, 4.85 Ah, NMC811/graphite-SiOx, 23 degC, cell W8 when fresh",
+        "C/20, pulses (HPPC), UDDS from SOC 0.7816 at 1 Hz",
+        "Pozzato, Allam, Onori 2022, Data in Brief, doi:10.1016/j.dib.2022.107995",
+        "CC BY 4.0",
+        how="Open the DOI and follow its data link. The diagnostic tests come as .mat or Excel files with "
+        "time, current and voltage: write these as a CSV with the columns time_s,current_a,voltage_v in "
+        "seconds, amperes and volts, and check the sign of the current (--sign).",
+    ),
+)
+
+
+def list_sets() -> tuple[DataSet, ...]:
+    """All data sets of the catalogue."""
+    return SETS
+
+
+def listing() -> tuple[str, ...]:
+    """The catalogue as lines of text, with where each set is on this machine or how to get it."""
+    lines: list[str] = []
+    for one in SETS:
+        folder = _folder(one.name)
+        if folder is not None:
+            place = f"on this machine: {folder}"
+        elif one.files:
+            place = f"not here yet: aesi data get {one.name}"
+        else:
+            place = f"not here; by hand: {one.how} Put the files into {_own_folder(one.name)}."
+        lines += [
+            f"{one.name}: {one.cell}",
+            f"  {one.tests}",
+            f"  {one.source} ({one.licence})",
+            f"  {place}",
+        ]
+    return tuple(lines)
+
+
+def find_set(name: str) -> DataSet:
+    """A data set by name. Raises DataError for an unknown one, with the nearest."""
+    for one in SETS:
+        if one.name == name:
+            return one
+    near = get_close_matches(name, [one.name for one in SETS], n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else "."
+    raise DataError(f"There is no data set {name!r}{hint} Known: {', '.join(one.name for one in SETS)}.")
+
+
+def get(name: str, out: Path | None = None) -> Path:
+    """The folder of a data set: a copy on this machine, or else fetched, checked and converted.
+
+    out : a folder to put the files into; without it, a copy is used where it is, or fetched into the cache.
+    Raises DataError where the set is unknown, cannot be fetched by a program, or there is no network.
+    """
+    one = find_set(name)
+    here = _folder(name)
+    if here is not None:
+        return here if out is None else _copy(here, out)
+    if not one.files:
+        raise DataError(f"{name} cannot be fetched by a program. {one.how} Source: {one.source}.")
+    folder = _own_folder(name) if out is None else out
+    for remote in one.files:
+        fetch(remote, folder)
+    return folder
+
+
+def locate(name: str, file: str) -> Path:
+    """A file of a data set, with or without its suffix, fetched where it is not on this machine.
+
+    Raises DataError where there is none, naming those that are there, or where the set cannot be had.
+    """
+    folder = get(name)
+    if Path(file).name != file:
+        raise DataError(f"{file!r} is not the name of a file of {name}; give the name alone.")
+    for suffix in SUFFIXES:
+        path = folder / f"{file}{suffix}"
+        if path.is_file():
+            return path
+    there = ", ".join(sorted(path.name for path in folder.iterdir() if path.is_file()))
+    raise DataError(f"{name} has no file {file!r} in {folder}; there are: {there}.")
+
+
+def _own_folder(name: str) -> Path:
+    return cache_folder() / "measured" / name
+
+
+def _folder(name: str) -> Path | None:
+    """The first folder on this machine that holds the set."""
+    roots = [Path(os.environ["AESI_DATA"]).expanduser()] if os.environ.get("AESI_DATA") else []
+    roots.append(NEIGHBOUR)
+    places = [place for root in roots for place in (root / name, root / "measured" / name)]
+    for place in (*places, _own_folder(name)):
+        if place.is_dir() and _complete(name, place):
+            return place
+    return None
+
+
+def _complete(name: str, folder: Path) -> bool:
+    """Whether all files are there that `get` would fetch, or any file where it fetches none."""
+    wanted = [remote.name for remote in find_set(name).files]
+    if wanted:
+        return all((folder / file).is_file() for file in wanted)
+    return any(path.is_file() for path in folder.iterdir())
+
+
+def _copy(source: Path, out: Path) -> Path:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        for path in source.iterdir():
+            if path.is_file():
+                shutil.copyfile(path, out / path.name)
+    except OSError as error:
+        raise DataError(f"{out} cannot be written: {error.strerror}.") from None
+    return out

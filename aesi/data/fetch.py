@@ -1,0 +1,98 @@
+"""One file from its public address: downloaded, checked by its checksum, converted, put in place whole."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aesi.data.read import Sign, read_measurement
+from aesi.errors import DataError
+from aesi.records import Measurement
+
+TIMEOUT_S = 30
+
+
+@dataclass(frozen=True)
+class Remote:
+    """A file at an address.
+
+    name : what it is called here.  sha256 : of the file there.  columns, sign : how to read a measurement that
+    is to be converted to this project's columns; without columns the file is kept as it is.
+    """
+
+    name: str
+    url: str
+    sha256: str
+    columns: Mapping[str, str | None] | None = None
+    sign: Sign = "discharge-positive"
+
+
+def fetch(remote: Remote, folder: Path) -> Path:
+    """The file in the folder, converted.
+
+    Raises DataError, one sentence, where there is no network, the address answers with an error, the content
+    has another checksum, or the folder cannot be written.
+    """
+    target = folder / remote.name
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder, prefix=".part-") as part:
+            raw = _download(remote, Path(part))
+            ready = Path(part) / f"ready-{remote.name}"
+            if remote.columns is None:
+                shutil.copyfile(raw, ready)
+            else:
+                _write(read_measurement(raw, remote.columns, remote.sign, max_rows=None), ready)
+            os.replace(ready, target)
+    except DataError:
+        raise
+    except OSError as error:
+        raise DataError(f"{target} cannot be written: {error.strerror or error}.") from None
+    return target
+
+
+def _download(remote: Remote, folder: Path) -> Path:
+    import logging
+
+    import pooch
+
+    pooch.get_logger().setLevel(logging.WARNING)
+    try:
+        return Path(
+            pooch.retrieve(
+                remote.url,
+                known_hash=f"sha256:{remote.sha256}",
+                fname=f"raw-{remote.name}",
+                path=folder,
+                downloader=pooch.HTTPDownloader(timeout=TIMEOUT_S),
+            )
+        )
+    except ValueError:
+        raise DataError(
+            f"{remote.url} holds another file than expected (its SHA-256 is not {remote.sha256[:12]}...); "
+            "it was not kept."
+        ) from None
+    except OSError as error:
+        # requests' errors are OSErrors
+        reason = type(error).__name__
+        raise DataError(
+            f"{remote.name} cannot be fetched from {remote.url} ({reason}): connect to the network and "
+            "try again, or set AESI_DATA to a folder that holds the data set."
+        ) from None
+
+
+def _write(measurement: Measurement, path: Path) -> None:
+    names = ["time_s", "current_a", "voltage_v"]
+    columns = [measurement.time_s, measurement.current_a, measurement.voltage_v]
+    if measurement.temperature_degc is not None:
+        names.append("temperature_degc")
+        columns.append(measurement.temperature_degc)
+    np.savetxt(
+        path, np.column_stack(columns), fmt="%.10g", delimiter=",", header=",".join(names), comments=""
+    )
