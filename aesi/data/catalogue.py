@@ -1,8 +1,7 @@
 """Public data sets of measured cells: where they come from, where they are on this machine, how to get them.
 
 Nothing measured is part of the package. One set is fetched from its public address and checked; the others
-lie behind pages that a program cannot follow, so they are listed with their DOI and how to read what one finds
-there.
+lie behind pages that a program cannot follow, so they are listed with their DOI and how to read them.
 """
 
 from __future__ import annotations
@@ -91,8 +90,8 @@ SETS = (
         "Kollmeyer, Vidal, Naguib, Skells 2020, doi:10.17632/cp3473x7xv.3",
         "CC BY 4.0",
         how="Open the DOI, download the archive and unpack it. Each CSV has a preamble above its header and "
-        "time as h:min:s: keep the rows below, with time in seconds, 'Current', 'Voltage' and 'Temperature' as "
-        "time_s,current_a,voltage_v,temperature_degc, and read with --sign charge-positive.",
+        "time as h:min:s: keep the rows below, with time in seconds, 'Current', 'Voltage' and 'Temperature' "
+        "as time_s,current_a,voltage_v,temperature_degc, and read with --sign charge-positive.",
     ),
     DataSet(
         "panasonic_ncr18650pf",
@@ -102,7 +101,7 @@ SETS = (
         "CC BY 4.0",
         how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas` with "
         "Time (s), Current (A, positive on charge), Voltage (V) and Battery_Temp_degC: write these as a CSV "
-        "with the columns time_s,current_a,voltage_v,temperature_degc and read it with --sign charge-positive.",
+        "with time_s,current_a,voltage_v,temperature_degc and read it with --sign charge-positive.",
     ),
     DataSet(
         "lg_m50t_w8",

@@ -22,8 +22,8 @@ TIMEOUT_S = 30
 class Remote:
     """A file at an address.
 
-    name : what it is called here.  sha256 : of the file there.  columns, sign : how to read a measurement that
-    is to be converted to this project's columns; without columns the file is kept as it is.
+    name : what it is called here.  sha256 : of the file there.  columns, sign : how to read a measurement
+    to be converted to this project's columns; without columns the file is kept as it is.
     """
 
     name: str
