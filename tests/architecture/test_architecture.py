@@ -1,0 +1,64 @@
+"""The shape of the house: imports point down, the package stands without its platform, help is instant."""
+
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+IMPORT_ALL = """
+import importlib, pkgutil, sys
+
+class Absent:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in {"prefect", "mlflow", "optuna", "dask", "distributed", "flows"}:
+            raise ModuleNotFoundError(name)
+
+sys.meta_path.insert(0, Absent())
+import aesi
+names = [m.name for m in pkgutil.walk_packages(aesi.__path__, "aesi.")]
+for name in names:
+    importlib.import_module(name)
+print(len(names))
+"""
+
+
+def test_the_package_imports_without_orchestrator_tracker_and_optimiser():
+    done = subprocess.run([sys.executable, "-c", IMPORT_ALL], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 30
+
+
+def test_imports_point_down():
+    command = [str(Path(sys.executable).with_name("lint-imports"))]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--help"], ["run", "--help"], ["discover", "--help"], ["data", "--help"]]
+)
+def test_help_answers_within_a_second(arguments):
+    seconds = []
+    for _ in range(3):  # the first may have to read the interpreter's files from disk
+        started = time.perf_counter()
+        done = subprocess.run(
+            [sys.executable, "-m", "flows.cli", *arguments], capture_output=True, check=True
+        )
+        seconds.append(time.perf_counter() - started)
+        assert b"Usage" in done.stdout
+    assert min(seconds) < 1.0
+
+
+def test_help_loads_nothing_heavy():
+    code = "import sys, flows.cli; print([m for m in sys.modules if m in HEAVY])"
+    heavy = (
+        "HEAVY = {'numpy', 'pandas', 'scipy', 'prefect', 'mlflow', 'optuna', 'numba', 'sklearn', 'pydantic'}"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", f"{heavy}; {code}"], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,153 @@
+"""Experiments: what passes, and the one sentence that what does not pass gets."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aesi.errors import ConfigError
+from aesi.pipeline.config import ExperimentConfig, parse_experiment, read_experiment
+
+ROOT = Path(__file__).resolve().parents[3]
+CONTENT = {"name": "x", "data": {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}}
+
+
+def sentence(changes: dict) -> str:
+    with pytest.raises(ConfigError) as caught:
+        parse_experiment({**CONTENT, **changes})
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "experiments").glob("*.yaml")), ids=lambda p: p.stem)
+def test_every_experiment_of_the_project_is_valid_and_says_why(path):
+    assert read_experiment(path).name == path.stem
+    assert path.read_text().startswith("# Why: ")
+
+
+@pytest.mark.parametrize(
+    ("changes", "found", "near"),
+    [
+        ({"serch": {}}, "'serch'", "'search'"),
+        ({"search": {"candidate": 3}}, "'search.candidate'", "'candidates'"),
+        (
+            {"fallback": {"data": {"kind": "virtual", "tran": ["a"]}, "cell": {}}},
+            "'fallback.data.tran'",
+            "'train'",
+        ),
+    ],
+)
+def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
+    message = sentence(changes)
+    assert found in message
+    assert f"Did you mean {near}" in message
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"search": {"candidates": 0}}, "search.candidates = 0"),
+        ({"search": {"lambda1": [1e-1, 1e-3]}}, "[0.1, 0.001] is empty"),
+        ({"search": {"timeout_s": float("nan")}}, "search.timeout_s"),
+        ({"conformal": {"alpha": 1.5}}, "conformal.alpha = 1.5"),
+        ({"data": {"kind": "catalogue", "train": ["a"], "test": ["b"]}}, "needs `set`"),
+        ({"data": {"kind": "files"}}, "give `train` and `test`"),
+        (
+            {
+                "data": {
+                    "kind": "files",
+                    "record": "a.csv",
+                    "repeats": {"period_s": 10, "train": [1], "test": [1]},
+                }
+            },
+            "repeat 1 is in train and in test",
+        ),
+    ],
+)
+def test_an_inadmissible_value_is_named(changes, words):
+    assert words in sentence(changes)
+
+
+@pytest.mark.parametrize("name", ["../escape", "a/b", "", ".hidden", "a" * 200, "x\n"])
+def test_a_name_cannot_leave_the_folder_of_runs(name):
+    with pytest.raises(ConfigError):
+        parse_experiment({**CONTENT, "name": name})
+
+
+def test_overrides_reach_into_sections(tmp_path):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\ndata: {kind: files, train: [a.csv], test: [b.csv]}\n")
+    config = read_experiment(
+        path, ["search.candidates=7", "search.lambda1=[1e-6, 1]", "tracking.uri=http://a"]
+    )
+    assert config.search.candidates == 7
+    assert config.search.lambda1 == (1e-6, 1.0)
+    assert config.tracking.uri == "http://a"
+
+
+@pytest.mark.parametrize(
+    "override", ["seed", "=3", "seed.x=1", "search..x=1", "search.candidates=[", "seed=one"]
+)
+def test_a_bad_override_is_one_sentence(tmp_path, override):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: x\nseed: 1\ndata: {kind: files, train: [a.csv], test: [b.csv]}\n")
+    with pytest.raises(ConfigError) as caught:
+        read_experiment(path, [override])
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_file_names_its_neighbour(tmp_path):
+    (tmp_path / "smoke.yaml").write_text("name: smoke")
+    with pytest.raises(ConfigError, match=r"Did you mean .*smoke\.yaml"):
+        read_experiment(tmp_path / "smok.yaml")
+
+
+def test_yaml_cannot_build_objects(tmp_path):
+    path = tmp_path / "x.yaml"
+    path.write_text("name: !!python/object/apply:os.system ['touch owned']\n")
+    with pytest.raises(ConfigError, match="is not YAML"):
+        read_experiment(path)
+
+
+def test_paths_start_from_the_experiments_folder(tmp_path):
+    config = parse_experiment(CONTENT, base=tmp_path / "experiments")
+    assert config.path("cells/a.json") == tmp_path / "experiments" / "cells" / "a.json"
+    assert config.path("/data/a.json") == Path("/data/a.json")
+
+
+def test_who_computes_and_where_it_is_tracked_is_no_part_of_the_identity():
+    one = parse_experiment(CONTENT)
+    other = parse_experiment(
+        {
+            **CONTENT,
+            "tracking": {"uri": "http://a"},
+            "runner": {"kind": "dask"},
+            "search": {"workers": 2},
+            "note": "n",
+        }
+    )
+    assert one.digest == other.digest
+    assert parse_experiment({**CONTENT, "seed": 1}).digest != one.digest
+    assert parse_experiment({**CONTENT, "seed": 1}).setting == one.setting
+
+
+def test_a_config_survives_json():
+    config = parse_experiment(CONTENT)
+    assert ExperimentConfig.model_validate_json(config.model_dump_json()).digest == config.digest
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.floats() | st.integers() | st.text(max_size=20),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=10), inner, max_size=4),
+        max_leaves=20,
+    )
+)
+def test_any_content_gives_a_config_or_a_config_error(content):
+    mapping = content if isinstance(content, dict) else {"name": content, "data": content}
+    try:
+        parse_experiment({**CONTENT, **mapping})
+    except ConfigError:
+        return
