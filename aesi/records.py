@@ -173,7 +173,10 @@ class FreeRun:
 class ErrorModel(Protocol):
     """What every model of the voltage error offers: sparse ensembles, baselines, the bare ESPM (zero)."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """What tables call it."""
+        ...
 
     def one_step(self, series: ErrorSeries) -> Array:
         """(n,) V: the prediction of error_v[k] given the measured error_v[k - 1]; the first is error_v[0]."""

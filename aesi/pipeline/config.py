@@ -54,25 +54,24 @@ class RepeatsConfig(Section):
 
 
 class VirtualConfig(Section):
-    """How a virtual measurement is made (kind: virtual)."""
+    """How a virtual measurement is made (kind: virtual): the paper's profiles on a cell that has more than the ESPM.
+
+    effects : what the cell has beyond its declared parameters; None for the laboratory's default mix.
+    magnitude : 1 is typical.  pulse_c : C-rate of the charge pulse after each schedule.
+    """
 
     model: Literal["DFN", "SPMe"] = "DFN"
-    effects: tuple[str, ...] = ()
+    effects: tuple[str, ...] | None = None
     magnitude: Positive = 1.0
-    soc0: Annotated[float, Field(gt=0, le=1)] = 0.9
     pulse_c: Annotated[float, Field(ge=0)] = 5.0
-    voltage_noise_v: Annotated[float, Field(ge=0)] = 1e-3
-    current_noise_a: Annotated[float, Field(ge=0)] = 4e-3
-    voltage_step_v: Annotated[float, Field(ge=0)] = 0.0
     seed: int = 0
 
 
 class DataConfig(Section):
     """Records by role, or one record cut by repeats.
 
-    files: paths of measurement files; catalogue: names of records of the data set `set`;
-    virtual: names of bundled drive schedules that the laboratory runs. `repeats` cuts the one file or record
-    `record`.
+    files: paths of measurement files; catalogue: names of records of the data set `set`; virtual: the paper's
+    profiles, which have their roles already. `repeats` cuts the one file or record `record`.
     """
 
     kind: Literal["files", "catalogue", "virtual"]
@@ -92,7 +91,10 @@ class DataConfig(Section):
     def _complete(self) -> DataConfig:
         if self.kind == "catalogue" and not self.set:
             raise ValueError("kind: catalogue needs `set`, the name of a data set (`aesi data list`)")
-        if self.repeats:
+        if self.kind == "virtual":
+            if self.repeats or self.record or self.train or self.valid or self.test:
+                raise ValueError("kind: virtual brings its own records; leave out record, repeats and roles")
+        elif self.repeats:
             if not self.record:
                 raise ValueError("`repeats` needs `record`, the record to cut")
         elif not (self.train and self.test):

@@ -103,7 +103,9 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
     row["k_step_persistence"] = {_seconds(h): _persistence_mv(test, _steps(test, h)) for h in HORIZONS_S}
     if one.intervals is not None:
         residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
-        row["intervals"] = _interval_figures(test, [r.intervals for r in test], residuals, one.intervals.alpha)
+        row["intervals"] = _interval_figures(
+            test, [r.intervals for r in test], residuals, one.intervals.alpha
+        )
     if one.bands is not None:
         residuals = [r.series.error_v - r.free.error_v for r in test]
         row["free_run_intervals"] = _interval_figures(

@@ -201,7 +201,7 @@ class HybridModel:
             error, outside = run.error_v, run.outside
         low = high = np.full(n, np.nan)
         if self.bands is not None:
-            low, high = self.bands.along(n, self.dt_s)
+            low, high = self.bands.along(n, self.dt_s, series.current_a, series.soc)
         alpha = None if self.bands is None else self.bands.alpha
         return _prediction(series, error, low, high, outside, alpha)
 
@@ -232,13 +232,12 @@ class HybridModel:
         return replace(
             prediction,
             time_s=time,
+            voltage_v=physics.model_v + onto(prediction.voltage_v - prediction.physics_v),
+            lower_v=physics.model_v + onto(prediction.lower_v - prediction.physics_v),
+            upper_v=physics.model_v + onto(prediction.upper_v - prediction.physics_v),
             physics_v=physics.model_v,
             soc=physics.soc,
             outside=onto(prediction.outside.astype(float)) > 0,
-            **{
-                name: physics.model_v + onto(getattr(prediction, name) - prediction.physics_v)
-                for name in ("voltage_v", "lower_v", "upper_v")
-            },
         )
 
 

@@ -6,7 +6,7 @@ the states that its history gave it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,7 @@ from aesi.data.resample import to_even
 from aesi.errors import ConfigError, DataError
 from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
 from aesi.pipeline.config import DataConfig, ExperimentConfig, RepeatsConfig
-from aesi.records import INPUT_NAMES, ErrorSeries, Hold, Measurement, Run, Split
+from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run, Split
 
 REST_C_RATE = 0.02
 """A first current below this C-rate counts as rest, and the first voltage as a rest voltage."""
@@ -120,27 +120,68 @@ def _load(config: ExperimentConfig) -> Loaded:
     cell_path = _cell_path(config)
     cell = Cell.from_bpx(cell_path)
     effects = _effects(config)
-    soc0: dict[str, float] = {}
-    digests: dict[str, str] = {}
-    notes: list[str] = []
+    sources = _virtual(config, cell_path) if config.data.kind == "virtual" else _sources(config)
     series: dict[str, ErrorSeries] = {}
-    for measurement in _measurements(config, cell_path):
-        name = measurement.name
-        digests[name] = measurement.digest
-        soc0[name] = rest_soc(cell, measurement) if config.cell.soc0 is None else config.cell.soc0
+    soc0: dict[str, float] = {}
+    notes: list[str] = []
+    for name, (measurement, known_soc0) in sources.records.items():
+        declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
+        soc0[name] = rest_soc(cell, measurement) if declared is None else declared
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         run = simulate(
             cell, even.time_s, even.current_a, soc0[name], effects, even.temperature_degc, config.data.hold
         )
         series[name] = error_series(even, run, config.data.dt_s)
-    return Loaded(cell, cell_path.stem, effects, _split(config.data, series), soc0, digests, tuple(notes))
+    return Loaded(
+        cell=cell,
+        cell_name=cell_path.stem,
+        effects=effects,
+        split=_split(config.data, series, sources.roles),
+        soc0=soc0,
+        digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
+        notes=tuple(notes),
+    )
 
 
-def _split(data: DataConfig, series: dict[str, ErrorSeries]) -> Split:
+@dataclass(frozen=True, eq=False)
+class _Sources:
+    """Every record once, with its state of charge at the start where that is known; and names by role."""
+
+    records: dict[str, tuple[Measurement, float | None]]
+    roles: dict[Role, tuple[str, ...]]
+
+
+def _sources(config: ExperimentConfig) -> _Sources:
+    data = config.data
+    where = _locator(config)
+    roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
+    names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
+    records: dict[str, tuple[Measurement, float | None]] = {
+        name: (read_measurement(where(name), data.columns or None, data.sign), None)
+        for name in dict.fromkeys(names)
+    }
+    return _Sources(records, roles)
+
+
+def _virtual(config: ExperimentConfig, cell_path: Path) -> _Sources:
+    from aesi.data.virtual import DEFAULT_MIX, Laboratory, paper_experiment
+
+    wanted = config.data.virtual
+    effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
+    laboratory = Laboratory(cell_path, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
+    experiment = paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c)
+    measurements: dict[Role, tuple[Measurement, ...]] = {role: getattr(experiment, role) for role in ROLES}
+    return _Sources(
+        records={m.name: (m, experiment.soc0[m.name]) for role in ROLES for m in measurements[role]},
+        roles={role: tuple(m.name for m in measurements[role]) for role in ROLES},
+    )
+
+
+def _split(data: DataConfig, series: dict[str, ErrorSeries], roles: dict[Role, tuple[str, ...]]) -> Split:
     if data.repeats:
         return cut_repeats(next(iter(series.values())), data.repeats)
-    train, valid, test = (tuple(series[_stem(name)] for name in getattr(data, role)) for role in ROLES)
+    train, valid, test = (tuple(series[name] for name in roles[role]) for role in ROLES)
     return Split(train, valid, test)
 
 
@@ -163,29 +204,10 @@ def _cell_path(config: ExperimentConfig) -> Path:
     return locate(config.data.set, "cell.bpx.json")
 
 
-def _measurements(config: ExperimentConfig, cell_path: Path) -> Iterator[Measurement]:
-    """Every record the experiment names, once."""
-    data = config.data
-    if data.kind == "virtual":
-        from aesi.pipeline.virtual import virtual_measurements
-
-        yield from virtual_measurements(data, cell_path)
-        return
-    names = [data.record] if data.record else [*data.train, *data.valid, *data.test]
-    where = _locator(config)
-    for name in dict.fromkeys(names):
-        assert name is not None
-        yield read_measurement(where(name), data.columns or None, data.sign)
-
-
 def _locator(config: ExperimentConfig) -> Callable[[str], Path]:
     if config.data.kind == "files":
         return config.path
     from aesi.data.catalogue import locate
 
+    assert config.data.set is not None  # the schema of kind: catalogue
     return partial(locate, config.data.set)
-
-
-def _stem(name: str) -> str:
-    """The name under which a reader files a record: the file's name without folder and suffixes."""
-    return Path(name).name.split(".")[0]
