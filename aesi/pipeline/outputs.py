@@ -63,7 +63,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "chosen": result.best,
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
-        "notes": list(result.loaded.notes),
+        "notes": list(notes(result)),
         "models": [finite(row) for row in result.evaluation.rows],
     }
     hybrid(result).save(folder / "model")
@@ -73,6 +73,12 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     text = json.dumps(summary, indent=1, allow_nan=False)
     (folder / "summary.json").write_text(text, encoding="utf-8")
     return summary
+
+
+def notes(result: Result) -> tuple[str, ...]:
+    """What a reader should know: of the data, of terms left out, of intervals that could not be calibrated."""
+    without_intervals = (one.note for one in result.fitted if one.note)
+    return (*result.loaded.notes, *result.problem.notes, *without_intervals)
 
 
 def hybrid(result: Result) -> HybridModel:
@@ -92,7 +98,7 @@ def hybrid(result: Result) -> HybridModel:
 
 def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
     """What the report shows."""
-    unseen = result.problem.out_of_bag
+    counts = result.problem.counts
     genome = result.chosen.genome
     options = result.problem.options
     return RunView(
@@ -105,7 +111,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result.chosen)),
         bootstrap=BootstrapView(
-            n=unseen.shape[1], block=options.block or 0, unique_fraction=1.0 - unseen.mean(axis=1)
+            n=counts.shape[1], block=options.block or 0, unique_fraction=(counts > 0).mean(axis=1)
         ),
         settings={
             "lambda1": f"{genome.lambda1:.3g}",
@@ -115,7 +121,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
             "d": str(genome.d),
             "feedback of the error": "yes" if genome.feedback else "no",
         },
-        notes=(*result.loaded.notes, *result.problem.notes),
+        notes=notes(result),
         versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
         mlflow_run_id=result.run_id,
         seconds=result.seconds,
