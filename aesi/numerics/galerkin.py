@@ -81,12 +81,11 @@ def gauss_lobatto(points: int) -> tuple[Array, Array]:
 class StackModes:
     """Diffusion through negative electrode, separator, positive electrode, by one polynomial a layer.
 
-    q_k :  dq_k/dt = -lam_k (project Phi(c))_k + gain_k i,  c = c0 + to_nodes q, for Phi' = D(c).
-    lam : (n,), lam[0] = 0.  gain : (n,) of a source +i/L_n in the negative and -i/L_p in the positive
-    electrode.
-    to_nodes : (m, n).  project : (n, m).  gauss : (6, m) three Gauss points in the negative and in the
-    positive electrode.  mean : (m,) weights of the average over the whole thickness.  salt : (m,) weights of
-    the salt content.
+    q_k :  dq_k/dt = -lam_k (project Phi(c))_k + (gain^T i)_k,  c = c0 + to_nodes q, for Phi' = D(c).
+    lam : (n,), lam[0] = 0.  gain : (2 regions, n) of a source i_r, spread evenly over a region; regions count from
+    the current collector of the negative electrode, then from that of the positive.
+    to_nodes : (m, n).  project : (n, m).  gauss : (6 regions, m) three Gauss points in each region.
+    mean : (m,) weights of the average over the whole thickness.  salt : (m,) weights of the salt content.
     """
 
     lam: Array
@@ -107,42 +106,65 @@ def stack_modes(
     porosity: tuple[float, float, float],
     efficiency: tuple[float, float, float],
     order: int,
+    regions: int = 1,
 ) -> StackModes:
-    """Modes for layers of given thickness (m), porosity and transport efficiency; `order` is the degree a
-    layer.
+    """Modes for layers of given thickness (m), porosity and transport efficiency.
+
+    order : polynomial degree of a layer.  regions : equal parts of each electrode that carry currents of their own.
     """
     m = 3 * order + 1
-    nodes = gauss_lobatto(order + 1)[0]
     x, w = legendre.leggauss(order + 2)
-    to_coefficients = np.linalg.inv(legendre.legvander(nodes, order))
+    to_coefficients = np.linalg.inv(legendre.legvander(gauss_lobatto(order + 1)[0], order))
     value = legendre.legvander(x, order) @ to_coefficients
     derivative = np.array([legendre.legval(x, legendre.legder(c)) for c in np.eye(order + 1)]).T
     slope = derivative @ to_coefficients
-    mass, stiff = np.zeros((m, m)), np.zeros((m, m))
-    mean, source = np.zeros(m), np.zeros(m)
-    signs = (1.0 / thickness[0], 0.0, -1.0 / thickness[2])
+    mass, stiff, mean = np.zeros((m, m)), np.zeros((m, m)), np.zeros(m)
     for layer in range(3):
         rows = slice(layer * order, layer * order + order + 1)
         half = 0.5 * thickness[layer]
         mass[rows, rows] += porosity[layer] * half * (value.T * w) @ value
         stiff[rows, rows] += efficiency[layer] / half * (slope.T * w) @ slope
-        integral = half * w @ value
-        mean[rows] += integral
-        source[rows] += signs[layer] * integral
+        mean[rows] += half * w @ value
     lam, v = eigh(stiff, mass)
     lam[0] = 0.0
-    gain = v.T @ source
-    gain[0] = 0.0  # what leaves one electrode enters the other; keeps salt exactly
-    gauss = np.zeros((6, m))
-    at_gauss = legendre.legvander(2.0 * GAUSS_3 - 1.0, order) @ to_coefficients
-    gauss[:3, : order + 1] = at_gauss
-    gauss[3:, 2 * order :] = at_gauss
+    source, gauss = np.zeros((2 * regions, m)), np.zeros((6 * regions, m))
+    for side, rows in enumerate((slice(0, order + 1), slice(2 * order, m))):
+        for part in range(regions):
+            at = part if side == 0 else regions - 1 - part  # position from the left
+            row = side * regions + part
+            points = 2.0 * (at + 0.5 * (x + 1.0)) / regions - 1.0
+            source[row, rows] = 0.5 * w @ (legendre.legvander(points, order) @ to_coefficients)
+            points = 2.0 * (at + GAUSS_3) / regions - 1.0
+            gauss[3 * row : 3 * row + 3, rows] = legendre.legvander(points, order) @ to_coefficients
     return StackModes(
         lam=_locked(lam),
-        gain=_locked(gain),
+        gain=_locked(source @ v),
         to_nodes=_locked(v),
         project=_locked(v.T @ mass),
         gauss=_locked(gauss),
         mean=_locked(mean / sum(thickness)),
         salt=_locked(mass.sum(axis=0)),
     )
+
+
+def ohmic_shares(regions: int) -> tuple[Array, Array]:
+    """Mean ohmic drops in an electrode cut into equal regions, per current that reacts in each.
+
+    Currents y_r are counted from the collector. Returns (solid, salt), each (regions, regions), so that L/sigma
+    solid @ y is the drop from the collector to the mean of each region's solid, and L/kappa salt @ y that from the
+    mean of each region's electrolyte to the separator. One region: 1/3 and 1/3.
+    """
+    total = np.ones(regions)
+    ionic = np.tril(
+        np.ones((regions + 1, regions)), -1
+    )  # ionic current at each interface, from the collector
+    solid_current = total - ionic
+    solid, salt = np.zeros((regions, regions)), np.zeros((regions, regions))
+    for r in range(regions):
+        solid[r] = solid_current[r] / 3.0 + solid_current[r + 1] / 6.0
+        salt[r] = ionic[r] / 6.0 + ionic[r + 1] / 3.0
+        for before in range(r):
+            solid[r] += 0.5 * (solid_current[before] + solid_current[before + 1])
+        for after in range(r + 1, regions):
+            salt[r] += 0.5 * (ionic[after] + ionic[after + 1])
+    return _locked(solid / regions), _locked(salt / regions)

@@ -55,6 +55,7 @@ class EspmModel:
     """The extended single-particle model of a cell, and its extensions.
 
     regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
+    region_contrast : factor of what differs between the regions of an electrode in ohmic drop and in salt.
     heat : None for a temperature that is given or constant.
     solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
     substep_s : longest step of whatever is not stepped exactly.
@@ -64,6 +65,7 @@ class EspmModel:
     negative: Interface = PLAIN
     positive: Interface = PLAIN
     regions: int = 1
+    region_contrast: float = 1.0
     heat: HeatBalance | None = None
     solid_order: int = DEFAULT_SOLID_ORDER
     electrolyte_order: int = DEFAULT_ELECTROLYTE_ORDER

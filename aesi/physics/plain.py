@@ -59,7 +59,15 @@ def stack_of(model: EspmModel) -> StackModes:
         (n.porosity, s.porosity, p.porosity),
         (n.transport_efficiency, s.transport_efficiency, p.transport_efficiency),
         model.electrolyte_order,
+        model.regions,
     )
+
+
+def _salt_gain(stack: StackModes) -> Array:
+    """Gain of a current that enters one electrode and leaves the other, its mean exactly zero."""
+    gain = stack.gain[0] - stack.gain[1]
+    gain[0] = 0.0
+    return gain
 
 
 @lru_cache(maxsize=64)
@@ -78,7 +86,7 @@ def plain_arguments(model: EspmModel) -> tuple[Any, ...]:
     return (
         rates, scale[:, None] * sphere.gain[None, 1:], 3.0 * scale,
         stack.lam * diffusion.d0 * faster,
-        stack.gain * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2),
+        _salt_gain(stack) * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2),
         stack.to_nodes, np.ascontiguousarray(stack.project.T), stack.gauss, stack.mean,
         diffusion.psi, 1.0 / diffusion.d0, not diffusion.linear, model.substep_s,
         ocp_table(shifted_ocp(n, rise), "negative"), ocp_table(shifted_ocp(p, rise), "positive"),

@@ -1,0 +1,70 @@
+"""Solid diffusivity that depends on stoichiometry.
+
+    D(x) = D_declared(x) exp(b1 (s - 1/2) + b2 ((2 s - 1)**2 - 1/3)),   s = (x - x_min) / (x_max - x_min)
+
+so that b1 is the natural logarithm of full over empty of lithium, b2 that of the ends over the middle, less 1/3.
+
+Leaves out staging, hysteresis of D and the thermodynamic factor's own fine structure. Holds within the declared
+stoichiometry limits; a tenth of their span beyond, D stays constant.
+
+Source: measured D(x): Ecker et al., J. Electrochem. Soc. 162 (2015) A1836, doi:10.1149/2.0551509jes.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from aesi.parameters import Parameter
+from aesi.physics.cell import Electrode
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel
+from aesi.physics.relations import Constant, Product, Table, scaled
+
+POINTS = 129
+BEYOND_LIMITS = 0.1
+RANGE = "two orders of magnitude over the range of stoichiometry"
+
+
+def _parameter(default: float, side: str, what: str) -> Parameter:
+    return Parameter(default, "dimensionless", (-4.0, 4.0), RANGE, neutral=0.0, description=f"{what}, {side}")
+
+
+PARAMETERS = {
+    "negative_slope": _parameter(-2.0, "negative", "b1"),
+    "negative_curvature": _parameter(0.0, "negative", "b2"),
+    "positive_slope": _parameter(-2.0, "positive", "b1"),
+    "positive_curvature": _parameter(0.0, "positive", "b2"),
+}
+
+
+def vary_diffusivities(
+    model: EspmModel,
+    *,
+    negative_slope: float,
+    negative_curvature: float,
+    positive_slope: float,
+    positive_curvature: float,
+) -> EspmModel:
+    """The model with both solid diffusivities depending on stoichiometry."""
+    cell = model.cell
+    return model.with_cell(
+        negative=_varied(cell.negative, negative_slope, negative_curvature),
+        positive=_varied(cell.positive, positive_slope, positive_curvature),
+    )
+
+
+def _varied(electrode: Electrode, slope: float, curvature: float) -> Electrode:
+    if slope == 0.0 and curvature == 0.0:
+        return electrode
+    s = np.linspace(-BEYOND_LIMITS, 1.0 + BEYOND_LIMITS, POINTS)
+    factor = np.exp(slope * (s - 0.5) + curvature * ((2.0 * s - 1.0) ** 2 - 1.0 / 3.0))
+    x = electrode.theta_min + s * (electrode.theta_max - electrode.theta_min)
+    table = Table(tuple(x.tolist()), tuple(factor.tolist()))
+    if isinstance(electrode.diffusivity, Constant):
+        return replace(electrode, diffusivity=scaled(table, electrode.diffusivity.value))
+    return replace(electrode, diffusivity=Product(electrode.diffusivity, table))
+
+
+EFFECT = Effect(
+    "concentration_dependent_diffusivity", "physics", __doc__, PARAMETERS, on_model=vary_diffusivities
+)

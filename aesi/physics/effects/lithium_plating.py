@@ -1,0 +1,39 @@
+"""Lithium metal plates on the negative electrode and strips again.
+
+    j = F k (c_Li exp((1 - a) F phi / R T) - c_e exp(-a F phi / R T)),   dc_Li/dt = -area j / F
+    phi = phi_s - phi_e against Li/Li+, j > 0 strips, a = 0.65, c_Li per volume of electrode
+
+Shares the electrode's current with intercalation: on charge near phi = 0 some of it plates, and strips on the next
+discharge or at rest, which shows as a plateau.
+
+Leaves out lithium that dies and the film it leaves (film_growth, lithium_inventory_loss). Holds for little lithium,
+that does not cover the particles.
+
+Source: O'Kane et al., J. Electrochem. Soc. 167 (2020) 090540, doi:10.1149/1945-7111/ab90ac.
+"""
+
+from dataclasses import replace
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel, Plating
+
+TRANSFER_COEFFICIENT = 0.65
+PARAMETERS = {
+    "rate_m_s": Parameter(
+        1e-9,
+        "m/s",
+        bounds=(1e-12, 1e-7),
+        log=True,
+        source="1e-11 to 1e-9 m/s in O'Kane et al. 2022, doi:10.1039/D2CP00417H, two orders wider",
+        description="rate constant of plating and stripping, k",
+    )
+}
+
+
+def plate(model: EspmModel, *, rate_m_s: float) -> EspmModel:
+    """The model with plating on its negative electrode."""
+    return replace(model, negative=replace(model.negative, plating=Plating(rate_m_s, TRANSFER_COEFFICIENT)))
+
+
+EFFECT = Effect("lithium_plating", "physics", __doc__, PARAMETERS, on_model=plate)

@@ -1,0 +1,52 @@
+"""The cell warms itself: one lump, heated by its losses and by entropy, cooled by its surroundings.
+
+    C dT/dt = sum_u i_u (T dU/dT - U)_u - I V - G (T - T_amb)      i_u > 0 where a particle gives lithium, I discharge
+    D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
+
+Where a temperature was measured it is used as it is, and the balance is not needed.
+
+Leaves out gradients within the cell, heat of mixing and the casing's own heat capacity. Holds for cells whose Biot
+number is small. Needs density, specific heat and volume in the cell file.
+
+Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
+"""
+
+from dataclasses import replace
+
+from aesi.errors import CellError
+from aesi.parameters import Parameter
+from aesi.physics.effect import Effect
+from aesi.physics.model import EspmModel, HeatBalance
+
+PARAMETERS = {
+    "heat_transfer_w_k": Parameter(
+        0.2,
+        "W/K",
+        bounds=(1e-3, 100.0),
+        log=True,
+        source="1 mW/K (a small cell in foam) to 100 W/K (a cold plate)",
+        description="conductance from cell to surroundings, G",
+    ),
+    "heat_capacity_factor": Parameter(
+        1.0,
+        "dimensionless",
+        bounds=(0.5, 2.0),
+        log=True,
+        source="estimated specific heats are off by up to a factor of two",
+        description="heat capacity C over what the cell file declares",
+    ),
+}
+
+
+def warm(model: EspmModel, *, heat_transfer_w_k: float, heat_capacity_factor: float) -> EspmModel:
+    """The model with a heat balance.  Raises CellError where the cell file has no thermal data."""
+    declared = model.cell.heat_capacity_j_k
+    if declared is None:
+        raise CellError(
+            f"{model.cell.name}: self_heating needs 'Density [kg.m-3]', 'Specific heat capacity [J.K-1.kg-1]' and "
+            "'Volume [m3]' in the cell file."
+        )
+    return replace(model, heat=HeatBalance(declared * heat_capacity_factor, heat_transfer_w_k))
+
+
+EFFECT = Effect("self_heating", "physics", __doc__, PARAMETERS, on_model=warm)
