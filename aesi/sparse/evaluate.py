@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from aesi.sparse.problem import Problem
 from aesi.sparse.stridge import STRidge
 
 _ROWS_AT_ONCE = 4096
+_MOST_MEMORY = 0.9999
 
 
 @dataclass(frozen=True)
@@ -113,15 +115,17 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         return Failed(
             f"no term reaches an inclusion probability of tau = {genome.tau:g}, or survives the refit"
         )
-    bagging = _model(problem, active, ensemble.bagging, ensemble, "AESI I")
-    stability = _model(problem, active, ensemble.stability, ensemble, "AESI II")
     fold_fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.fold_factors])
     stable = np.append(ensemble.stability != 0, True)
     refits = np.zeros_like(fold_fits)
     refits[:, stable[:-1]] = [
         solver.fit_factor(factor[:, columns[stable]]) for factor in problem.fold_factors
     ]
-    runs = _fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
+    runs, memory = _fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
+    bagging, stability = (
+        _model(problem, active, coefficients, ensemble, memory, name)
+        for name, coefficients in (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
+    )
     if problem.split.valid:
         judged = [_on_records(model, problem.split.valid, problem) for model in (bagging, stability)]
     else:
@@ -178,7 +182,7 @@ def _out_of_bag(problem: Problem, active: IntArray, fits: Array, unseen: BoolArr
 
 
 def _drive(problem: Problem, active: IntArray, fits: Array, rows: slice) -> tuple[Array, IntArray]:
-    """(n_functions, rows, models): for each function of the error, the sum of the input parts; and these functions."""
+    """(n_functions, rows, models) sums of the input parts of the terms of each function of e; these functions."""
     feedbacks = problem.library.feedbacks[active]
     products = problem.which[active]
     functions = np.unique(feedbacks)
@@ -211,16 +215,42 @@ class _FoldRuns:
     free_run: Array
 
 
-def _fold_runs(problem: Problem, active: IntArray, fits: Array, refits: Array, bagging: Array) -> _FoldRuns:
+def _fold_runs(
+    problem: Problem, active: IntArray, fits: Array, refits: Array, bagging: Array
+) -> tuple[_FoldRuns, float]:
+    """Runs over each piece by models fitted on the others; the memory of the residual where none has feedback."""
+    drives = [
+        _drive(problem, active, np.stack([fit, refit, bagging]), slice(a, b))
+        for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)
+    ]
+    remembers = not any(functions.any() for _, functions in drives)
+    memory = _memory(problem, [drive[0][:, 0] for drive, _ in drives]) if remembers else 0.0
     parts = []
-    for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True):
+    for (a, b), (drive, functions) in zip(problem.folds, drives, strict=True):
         rows = slice(a, b)
-        drive, functions = _drive(problem, active, np.stack([fit, refit, bagging]), rows)
-        restart = np.zeros(b - a, dtype=bool)
-        restart[0] = True
-        free = _free(problem, drive, functions, rows, restart, np.zeros(3))
-        parts.append((_one_step(problem, drive, functions, rows), free))
-    return _FoldRuns(np.vstack([one for one, _ in parts]), np.vstack([free for _, free in parts]))
+        if remembers:
+            columns = drive[0].T
+            one = np.column_stack(
+                [free_run.remember_ahead(given, memory, problem.error[rows], 1) for given in columns]
+            )
+            free = np.column_stack([free_run.remember(given, memory, problem.error[a]) for given in columns])
+        else:
+            one = _one_step(problem, drive, functions, rows)
+            restart = np.zeros(b - a, dtype=bool)
+            restart[0] = True
+            free = _free(problem, drive, functions, rows, restart, np.zeros(3))
+        parts.append((one, free))
+    return _FoldRuns(np.vstack([one for one, _ in parts]), np.vstack([free for _, free in parts])), memory
+
+
+def _memory(problem: Problem, given: Sequence[Array]) -> float:
+    """The share of an honest residual that is left one step later: its lag-one regression, within [0, 1)."""
+    product, square = 0.0, 0.0
+    for (a, b), prediction in zip(problem.folds, given, strict=True):
+        left = problem.target[a:b] - prediction
+        product += float(left[1:] @ left[:-1])
+        square += float(left[:-1] @ left[:-1])
+    return float(np.clip(product / square, 0.0, _MOST_MEMORY)) if square > 0 else 0.0
 
 
 def _on_folds(problem: Problem, runs: _FoldRuns, column: int) -> _Judged:
@@ -269,7 +299,7 @@ def _on_records(model: SparseModel, records: tuple[ErrorSeries, ...], problem: P
 
 
 def _model(
-    problem: Problem, active: IntArray, coefficients: Array, ensemble: Ensemble, name: str
+    problem: Problem, active: IntArray, coefficients: Array, ensemble: Ensemble, memory: float, name: str
 ) -> SparseModel:
     kept = np.flatnonzero(coefficients)
     return SparseModel(
@@ -278,6 +308,7 @@ def _model(
         coefficients[kept],
         problem.scaling,
         problem.dt_s,
+        memory,
         ensemble.inclusion[kept],
         ensemble.low[kept],
         ensemble.high[kept],

@@ -113,3 +113,20 @@ def gains(drive: Array, functions: IntArray, measured: Array, clip: bool) -> Arr
         for q in range(len(functions)):
             out[k] += slope(functions[q], x) * drive[q, k]
     return out
+
+
+def remember(given: Array, memory: float, start: float) -> Array:
+    """Free run of a model without feedback: (n,) what the inputs give, and what is left of the first error.
+
+    given : (n,) g(U[k]), the prediction of sample k + 1 by the inputs alone.  start : the error at sample 0.
+    """
+    return np.asarray(given + memory ** np.arange(1, len(given) + 1) * (start - given[:1]))
+
+
+def remember_ahead(given: Array, memory: float, measured: Array, steps: int) -> Array:
+    """(n,) as `ahead`, for a model without feedback."""
+    n = len(given)
+    left = measured[:n] - np.append(given[:1], given[:-1])
+    samples = np.arange(1, n + 1)
+    known = np.maximum(samples - steps, 0)
+    return np.asarray(given + memory ** (samples - known) * left[known])

@@ -1,5 +1,14 @@
 """The sparse model of the voltage error, e[k + 1] = Theta(e[k], U[k]) xi, the paper's equation (8).
 
+A model none of whose terms holds the error gives it by the inputs alone, g(U[k]). What it leaves dies away
+slowly, so a measured error still tells something about the next ones; `memory` is the share that is left
+after one step, and then
+
+    e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
+
+which is a feedback of gain `memory` < 1 over the whole range. (At the start of a record g(U[0]) stands for
+what came before.)
+
 It lives in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged
 in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence.
 """
@@ -29,6 +38,7 @@ class SparseModel:
 
     library : the active terms, over the error and the inputs.  coefficients : (m,), none of them zero.
     dt_s : the sampling interval of the training records; the model is a map over one such step.
+    memory : see above; 0 for a model with terms in e.
     inclusion : (m,) share of the ensemble's members that hold each term.
     low, high : (m,) 5th and 95th percentile of each coefficient over the ensemble's members.
     """
@@ -38,6 +48,7 @@ class SparseModel:
     coefficients: Array
     scaling: Scaling
     dt_s: float
+    memory: float = 0.0
     inclusion: Array | None = None
     low: Array | None = None
     high: Array | None = None
@@ -60,21 +71,26 @@ class SparseModel:
         """Term to coefficient."""
         return dict(zip(self.terms, self.coefficients.tolist(), strict=True))
 
+    @property
+    def has_feedback(self) -> bool:
+        """Whether any term holds the error."""
+        return bool(self._functions.any())
+
     def one_step(self, series: ErrorSeries) -> Array:
         """(n,) V: the prediction of error_v[k] given error_v[k - 1]; the first is the measured error_v[0]."""
-        scaled = self.scaling.apply(self._variables(series))
-        prediction = evaluate_terms(self.library.terms, scaled).T @ self.coefficients
-        return np.append(series.error_v[:1], self.scaling.error_to_volts(prediction[:-1]))
+        return self.k_step(series, 1)
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
         """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
         start = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
+        drive = self._drive(variables)[:, :-1]
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
-        prediction, diverged = free_run.run(
-            self._drive(variables)[:, :-1], self._functions, scaled0, self._clip, free_run.LIMIT
-        )
-        error_v = np.append(start, self.scaling.error_to_volts(prediction))
+        if self.has_feedback:
+            scaled, diverged = free_run.run(drive, self._functions, scaled0, self._clip, free_run.LIMIT)
+        else:
+            scaled, diverged = free_run.remember(drive[0], self.memory, scaled0), -1
+        error_v = np.append(start, self.scaling.error_to_volts(scaled))
         variables[:, 0] = error_v
         return FreeRun(error_v, None if diverged < 0 else diverged + 1, self.scaling.is_outside(variables))
 
@@ -84,7 +100,10 @@ class SparseModel:
             raise DataError(f"{self.name}: a prediction {steps} steps ahead is none; give at least 1.")
         drive = self._drive(self._variables(series))[:, :-1]
         measured = self.scaling.error_to_scaled(series.error_v)
-        scaled = free_run.ahead(drive, self._functions, measured, steps, self._clip, free_run.LIMIT)
+        if self.has_feedback:
+            scaled = free_run.ahead(drive, self._functions, measured, steps, self._clip, free_run.LIMIT)
+        else:
+            scaled = free_run.remember_ahead(drive[0], self.memory, measured, steps)
         return np.append(series.error_v[:1], self.scaling.error_to_volts(scaled))
 
     def outside(self, series: ErrorSeries) -> BoolArray:
@@ -93,6 +112,8 @@ class SparseModel:
 
     def gain(self, series: ErrorSeries) -> Array:
         """(n,) slope of the map e[k] -> e[k + 1] along a record; stable where its size is below one."""
+        if not self.has_feedback:
+            return np.full(len(series), self.memory)
         drive = self._drive(self._variables(series))
         measured = self.scaling.error_to_scaled(series.error_v)
         return free_run.gains(drive, self._functions, measured, self._clip)
@@ -108,6 +129,7 @@ class SparseModel:
             "coefficients": self.coefficients.tolist(),
             "scaling": self.scaling.to_dict(),
             "dt_s": self.dt_s,
+            "memory": self.memory,
         } | {
             key: None if values is None else values.tolist()
             for key, values in (("inclusion", self.inclusion), ("low", self.low), ("high", self.high))
@@ -129,6 +151,7 @@ class SparseModel:
             np.array(data["coefficients"], dtype=float),
             Scaling.from_dict(data["scaling"]),
             float(data["dt_s"]),
+            float(data["memory"]),
             **optional,
         )
 
