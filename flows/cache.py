@@ -25,7 +25,7 @@ class Cache:
         A damaged entry is computed again, and said. A result that is no plain data, or that does not fit on
         the disk, is not kept.
         """
-        path = self._folder / f"{stage}-{fingerprint.key(fingerprint.code(), *parts)}.npz"
+        path = self._folder / f"{stage}-{fingerprint.key(fingerprint.code(), *parts)}.bin"
         if self._reuse and path.is_file():
             try:
                 found: T = codec.loads(path.read_bytes())

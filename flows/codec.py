@@ -1,12 +1,13 @@
-"""Records to bytes and back without pickle: one .npz with a JSON tree and the arrays it refers to.
+"""Records to bytes and back without pickle: a checksum, and a .npz of a JSON tree and the arrays it refers to.
 
 Only plain values, numpy arrays and the dataclasses of the `aesi` package pass, so that reading a file can
-build data and nothing else. Its zip checksums make a damaged file an error instead of a wrong result.
+build data and nothing else. The checksum makes a damaged file an error instead of a wrong result.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import io
 import json
 import zipfile
@@ -18,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+MAGIC = b"AESI1"
 TREE = "tree"
 
 
@@ -36,13 +38,18 @@ def dumps(value: Any) -> bytes:
     buffer = io.BytesIO()
     arrays[TREE] = np.frombuffer(tree, dtype=np.uint8)
     np.savez(buffer, allow_pickle=False, **arrays)
-    return buffer.getvalue()
+    body = buffer.getvalue()
+    return MAGIC + hashlib.sha256(body).digest() + body
 
 
 def loads(data: bytes) -> Any:
     """The value that `dumps` wrote. Raises Damaged where the bytes are truncated, altered or foreign."""
+    head = len(MAGIC) + hashlib.sha256().digest_size
+    body = data[head:]
+    if data[:head] != MAGIC + hashlib.sha256(body).digest():
+        raise Damaged("its checksum is wrong")
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+        with np.load(io.BytesIO(body), allow_pickle=False) as archive:
             tree = json.loads(archive[TREE].tobytes())
             arrays = {name: archive[name] for name in archive.files if name != TREE}
         return _decode(tree, arrays)

@@ -16,6 +16,8 @@ import uuid
 from pathlib import Path
 from typing import Any, Protocol
 
+from aesi.errors import InputError
+
 
 class Outcomes(Protocol):
     """A store of results by key; keys are hexadecimal."""
@@ -96,7 +98,7 @@ class FileOutcomes:
             self.release(key)
 
     def _path(self, key: str) -> Path:
-        return self._folder / key[:2] / f"{key}.npz"
+        return self._folder / key[:2] / f"{key}.bin"
 
 
 class DatabaseOutcomes:
@@ -110,7 +112,7 @@ class DatabaseOutcomes:
 
         self._sa = sa
         options: dict[str, Any] = {"connect_args": {"timeout": 60}} if url.startswith("sqlite") else {}
-        self._engine = sa.create_engine(url, pool_pre_ping=True, **options)
+        self._engine = self._connect(url, options)
         self._table = sa.Table(
             "aesi_outcomes",
             sa.MetaData(),
@@ -212,9 +214,17 @@ class DatabaseOutcomes:
             )
         return time.time()
 
-    def _create(self) -> None:
-        from aesi.errors import InputError
+    def _connect(self, url: str, options: dict[str, Any]) -> Any:
+        for scheme in ("postgresql://", "postgres://"):
+            if url.startswith(scheme):  # the driver that the `cluster` extra installs
+                url = f"postgresql+psycopg2://{url.removeprefix(scheme)}"
+        try:
+            return self._sa.create_engine(url, pool_pre_ping=True, **options)
+        except (ImportError, self._sa.exc.ArgumentError) as error:
+            advice = "; pip install 'aesi[cluster]'" if isinstance(error, ImportError) else ""
+            raise InputError(f"runner.storage is no database that can be used: {error}{advice}.") from None
 
+    def _create(self) -> None:
         try:
             self._table.create(self._engine, checkfirst=True)
         except self._sa.exc.SQLAlchemyError as error:
