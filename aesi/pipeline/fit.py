@@ -31,7 +31,7 @@ class Fitted:
     """A model ready to be judged.
 
     terms : active terms (0 where counting them makes no sense).  seconds : what its own fit took.
-    intervals, bands : one step ahead, and in free run; None where they could not be calibrated (`note`).
+    intervals, bands : one step ahead, and in free run; None where they could not be calibrated (`notes`).
     """
 
     model: ErrorModel
@@ -39,7 +39,7 @@ class Fitted:
     seconds: float
     intervals: Calibrated | None = None
     bands: FreeRunBands | None = None
-    note: str = ""
+    notes: tuple[str, ...] = ()
 
 
 def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
@@ -106,14 +106,17 @@ def _conformalised(one: Fitted, problem: Problem, chosen: Candidate, config: Exp
         residuals += [honest.one_step_v for honest in chosen.residuals]
         for honest, series in zip(chosen.residuals, problem.split.train, strict=True):
             pieces += _left_out(honest, series)
+    intervals, bands, notes = None, None, []
     try:
-        intervals = method(config).fit(
-            residuals, conformal.alpha, conformal.window, np.random.default_rng(config.seed)
-        )
+        rng = np.random.default_rng(config.seed)
+        intervals = method(config).fit(residuals, conformal.alpha, conformal.window, rng)
+    except FitError as error:
+        notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
+    try:
         bands = _bands(pieces, problem.dt_s, config)
     except FitError as error:
-        return replace(one, note=f"{one.model.name} has no intervals: {error}")
-    return replace(one, intervals=intervals, bands=bands)
+        notes.append(f"{one.model.name} has no bands in free run: {error}")
+    return replace(one, intervals=intervals, bands=bands, notes=tuple(notes))
 
 
 @dataclass(frozen=True, eq=False)

@@ -77,7 +77,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
 
 def notes(result: Result) -> tuple[str, ...]:
     """What a reader should know: of the data, of terms left out, of intervals that could not be calibrated."""
-    without_intervals = (one.note for one in result.fitted if one.note)
+    without_intervals = (note for one in result.fitted for note in one.notes)
     return (*result.loaded.notes, *result.problem.notes, *without_intervals)
 
 
