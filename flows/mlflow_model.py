@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import aesi
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+    from mlflow.models.model import ModelInfo
 
 CODE = Path(__file__).with_name("hybrid_pyfunc.py")
 DEFAULT_SOC0 = 0.5
@@ -41,7 +46,7 @@ def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None) -
     mlflow.set_registry_uri(uri)
     try:
         with mlflow.start_run(run_id=run_id, log_system_metrics=False):
-            mlflow.pyfunc.log_model(
+            logged = mlflow.pyfunc.log_model(
                 name="model",
                 python_model=str(CODE),
                 artifacts={"model": str(folder)},
@@ -49,7 +54,20 @@ def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None) -
                 pip_requirements=[f"{name}=={version(name)}" for name in NEEDS],
                 signature=signature,
                 input_example=example,
-                registered_model_name=registered_as,
             )
     finally:
         mlflow.set_tracking_uri(before)
+    if registered_as:
+        _register(mlflow.MlflowClient(uri, uri), registered_as, run_id, logged)
+
+
+def _register(client: MlflowClient, name: str, run_id: str, logged: ModelInfo) -> None:
+    """A new version of the registered model; the name is made where it is new."""
+    from mlflow.exceptions import MlflowException
+
+    try:
+        client.create_registered_model(name)
+    except MlflowException as error:
+        if error.error_code != "RESOURCE_ALREADY_EXISTS":
+            raise
+    client.create_model_version(name, logged.model_uri, run_id, model_id=logged.model_id)

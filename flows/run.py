@@ -84,7 +84,11 @@ def _experiment(order: Order, run: Any, console: Console) -> Path:
     console.say(f"{config.name}: {config.note}" if config.note else config.name)
     store = Store(config.tracking.uri)
     with _working_on(config, store, order.resume, console) as tracker:
-        return _stages(config, order, tracker, run, console, started)
+        folder = _stages(config, order, tracker, run, console, started)
+    console.say(f"Finished in {duration(time.monotonic() - started)}.")
+    console.say(f"Report: {_shown(folder / 'report.html')}")
+    console.say(f"Runs:   aesi ui        Tables: aesi tables {config.name}")
+    return folder
 
 
 def _stages(
@@ -120,9 +124,6 @@ def _stages(
     )
     summary = run("report", lambda: write_outputs(folder, result))
     track_result(tracker, folder, summary, found.number, result.best)
-    console.say(f"Finished in {duration(time.monotonic() - started)}.")
-    console.say(f"Report: {_shown(folder / 'report.html')}")
-    console.say(f"Runs:   aesi ui        Tables: aesi tables {config.name}")
     return folder
 
 
