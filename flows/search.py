@@ -28,7 +28,8 @@ from optuna.trial import FrozenTrial, TrialState
 from aesi.errors import ConfigError, FitError
 from aesi.records import Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate, fitness
-from flows.term_sampler import INDEX, GenomeSpace, TermSampler, genome_of, violation
+from aesi.sparse.genome_space import GenomeSpace
+from flows.term_sampler import INDEX, TermSampler, genome_of, violation
 
 Outcome = Candidate | Failed
 EvaluateMany = Callable[[Sequence[Genome]], Iterable[tuple[int, Outcome]]]
@@ -157,7 +158,7 @@ def search(
     The same seed gives the same candidates, interrupted or not, as long as one process searches.
     Exceptions of the evaluation are bugs: the trial is marked as failed and they propagate.
     """
-    space = space or GenomeSpace(len(problem.library))
+    space = space or GenomeSpace.of(problem.library)
     if space.size != len(problem.library):
         raise ConfigError(f"the genome space has {space.size} terms, the library {len(problem.library)}.")
     constraints = constraints or Constraints()

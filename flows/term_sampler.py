@@ -15,7 +15,6 @@ for as a whole.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,76 +23,26 @@ from optuna.samplers import NSGAIISampler
 from optuna.study import Study
 from optuna.trial import FrozenTrial, Trial
 
-from aesi.sparse.genome import Genome, pack
+from aesi.sparse.genome import Genome
+from aesi.sparse.genome_space import GenomeSpace
+
+__all__ = ["GenomeSpace", "TermSampler", "distributions", "genome_of", "violation"]
 
 TERMS = "terms"
 INDEX = "index"
 """The user attributes that hold the mask, and the index of the candidate in the search."""
 
-Range = tuple[float, float]
 
-
-@dataclass(frozen=True)
-class GenomeSpace:
-    """Ranges of the genes; `size` is the number of library terms.
-
-    The paper searches lambda1 in 1e-13 to 1e-1. On measured cells at 1 Hz the best ridge is near 10, so the
-    upper end is wider here; the paper's range is one argument away.
-    """
-
-    size: int
-    lambda1: Range = (1e-13, 1e3)
-    lambda2: Range = (1e-3, 5.0)
-    tau: Range = (0.3, 0.7)
-    p_c: tuple[int, int] = (0, 5)
-    d: tuple[int, int] = (1, 5)
-
-    def distributions(self) -> dict[str, BaseDistribution]:
-        """As Optuna describes them."""
-        return {
-            "lambda1": FloatDistribution(*self.lambda1, log=True),
-            "lambda2": FloatDistribution(*self.lambda2, log=True),
-            "tau": FloatDistribution(*self.tau),
-            "p_c": IntDistribution(*self.p_c),
-            "d": IntDistribution(*self.d),
-            "feedback": CategoricalDistribution((False, True)),
-        }
-
-    def random(self, rng: np.random.Generator) -> Genome:
-        """Genes at random, and a mask of random density: libraries of all sizes take part from the start."""
-        return Genome.of(
-            rng.random(self.size) < rng.uniform(0.05, 1.0),
-            _log_uniform(rng, self.lambda1),
-            _log_uniform(rng, self.lambda2),
-            float(rng.uniform(*self.tau)),
-            int(rng.integers(self.p_c[0], self.p_c[1] + 1)),
-            int(rng.integers(self.d[0], self.d[1] + 1)),
-            bool(rng.integers(2)),
-        )
-
-    def child(self, mother: Genome, father: Genome, rng: np.random.Generator) -> Genome:
-        """Each gene and each term from either parent, then mutation."""
-        parents = (mother.to_dict(), father.to_dict())
-        mixed = Genome(**{gene: parents[rng.integers(2)][gene] for gene in parents[0]})
-        masks = mother.mask(self.size), father.mask(self.size)
-        mask = np.where(rng.random(self.size) < 0.5, *masks)
-        rate = _log_uniform(rng, (1.0 / self.size, 0.2)) if self.size > 5 else 0.2
-        mask ^= rng.random(self.size) < rate
-        return self._mutated(replace(mixed, terms=pack(mask)), rng)
-
-    def _mutated(self, genome: Genome, rng: np.random.Generator) -> Genome:
-        changes: dict[str, Any] = {}
-        for gene, bounds in (("lambda1", self.lambda1), ("lambda2", self.lambda2), ("tau", self.tau)):
-            if rng.random() < 0.3:
-                low, high = np.log(bounds)
-                moved = np.log(getattr(genome, gene)) + 0.1 * (high - low) * rng.normal()
-                changes[gene] = float(np.clip(np.exp(moved), *bounds))
-        for gene, (low, high) in (("p_c", self.p_c), ("d", self.d)):
-            if rng.random() < 0.2:
-                changes[gene] = int(np.clip(getattr(genome, gene) + rng.choice([-1, 1]), low, high))
-        if rng.random() < 0.05:
-            changes["feedback"] = not genome.feedback
-        return replace(genome, **changes)
+def distributions(space: GenomeSpace) -> dict[str, BaseDistribution]:
+    """The genes that are Optuna parameters."""
+    return {
+        "lambda1": FloatDistribution(*space.lambda1, log=True),
+        "lambda2": FloatDistribution(*space.lambda2, log=True),
+        "tau": FloatDistribution(*space.tau),
+        "p_c": IntDistribution(*space.p_c),
+        "d": IntDistribution(*space.d),
+        "feedback": CategoricalDistribution((False, True)),
+    }
 
 
 class TermSampler(NSGAIISampler):
@@ -113,13 +62,13 @@ class TermSampler(NSGAIISampler):
     def ask(self, study: Study, index: int) -> tuple[Trial, Genome]:
         """The trial of the candidate with this index, and its genome."""
         self._index = index
-        trial = study.ask(self._space.distributions())
+        trial = study.ask(distributions(self._space))
         trial.set_user_attr(TERMS, self._terms)
         trial.set_user_attr(INDEX, index)
         return trial, Genome(terms=self._terms, **trial.params)
 
     def infer_relative_search_space(self, study: Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
-        return self._space.distributions()
+        return distributions(self._space)
 
     def get_trial_generation(self, study: Study, trial: FrozenTrial) -> int:
         generation = self._index // self.size
@@ -161,7 +110,3 @@ def _beats(a: FrozenTrial, b: FrozenTrial) -> bool:
         return violation(a) < violation(b)
     pairs = list(zip(a.values, b.values, strict=True))
     return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)
-
-
-def _log_uniform(rng: np.random.Generator, bounds: Range) -> float:
-    return float(np.exp(rng.uniform(*np.log(bounds))))

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.numerics.metrics import mse, pearson
+from aesi.numerics.metrics import pearson
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.records import ErrorSeries, Failed
-from aesi.sparse import free_run
+from aesi.records import Failed
 from aesi.sparse.ensemble import Ensemble, best_members, combine
 from aesi.sparse.genome import Genome
+from aesi.sparse.judge import (
+    FoldRuns,
+    drive_of,
+    fold_runs,
+    free_predictions,
+    on_validation,
+    one_step_predictions,
+)
 from aesi.sparse.model import SparseModel
 from aesi.sparse.problem import Problem
 from aesi.sparse.stridge import STRidge
 
 _ROWS_AT_ONCE = 4096
-_MOST_MEMORY = 0.9999
 
 
 @dataclass(frozen=True)
@@ -80,14 +85,6 @@ class Candidate:
         return self.loss_oob, self.loss_valid, float(self.loss_sparse)
 
 
-@dataclass(frozen=True)
-class _Judged:
-    loss: float
-    pearson: float
-    mser_pct: float
-    one_step_rmse_v: float
-
-
 def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = None) -> Candidate | Failed:
     """Fit, judge and combine one candidate.
 
@@ -121,16 +118,12 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     refits[:, stable[:-1]] = [
         solver.fit_factor(factor[:, columns[stable]]) for factor in problem.fold_factors
     ]
-    runs, memory = _fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
+    runs, memory = fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
     bagging, stability = (
-        _model(problem, active, coefficients, ensemble, memory, name)
+        sparse_model(problem, active, coefficients, ensemble, memory, name)
         for name, coefficients in (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
     )
-    if problem.split.valid:
-        judged = [_on_records(model, problem.split.valid, problem) for model in (bagging, stability)]
-    else:
-        judged = [_on_folds(problem, runs, column) for column in (0, 1)]
-    valid = replace(judged[0], loss=0.5 * (judged[0].loss + judged[1].loss))
+    valid = on_validation(problem, runs, (bagging, stability))
     if not np.isfinite(valid.loss):
         return Failed("the model diverges in free run on the validation data")
     weights = weights or FitnessWeights()
@@ -167,11 +160,11 @@ def _out_of_bag(problem: Problem, active: IntArray, fits: Array, unseen: BoolArr
     free = problem.options.regime == "free_run"
     for a in range(0, len(problem.target), _ROWS_AT_ONCE):
         rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
-        drive, functions = _drive(problem, active, fits, rows)
+        drive, functions = drive_of(problem, active, fits, rows)
         if free:
-            prediction = _free(problem, drive, functions, rows, problem.restart[rows], state)
+            prediction = free_predictions(problem, drive, functions, rows, problem.restart[rows], state)
         else:
-            prediction = _one_step(problem, drive, functions, rows)
+            prediction = one_step_predictions(problem, drive, functions, rows)
         mask = unseen[:, rows].T
         target = problem.target[rows, None]
         squared += np.square(target - prediction).sum(axis=0, where=mask)
@@ -181,92 +174,7 @@ def _out_of_bag(problem: Problem, active: IntArray, fits: Array, unseen: BoolArr
     return np.where(np.isfinite(ratio), ratio, np.inf)
 
 
-def _drive(problem: Problem, active: IntArray, fits: Array, rows: slice) -> tuple[Array, IntArray]:
-    """(n_functions, rows, models) sums of the input parts of the terms of each function of e; these functions."""
-    feedbacks = problem.library.feedbacks[active]
-    products = problem.which[active]
-    functions = np.unique(feedbacks)
-    drive = np.empty((len(functions), rows.stop - rows.start, len(fits)))
-    for part, q in zip(drive, functions, strict=True):
-        mine = feedbacks == q
-        np.matmul(problem.products[products[mine], rows].T, fits[:, mine].T, out=part)
-    return drive, functions
-
-
-def _free(
-    problem: Problem, drive: Array, functions: IntArray, rows: slice, restart: BoolArray, state: Array
-) -> Array:
-    """(rows, models) scaled predictions in free run; `state` carries them from one slice to the next."""
-    if not functions.any():
-        return np.asarray(drive[0])
-    clip = problem.options.outside == "clip"
-    return np.asarray(free_run.run_many(drive, functions, problem.error[rows], restart, state, clip))
-
-
-def _one_step(problem: Problem, drive: Array, functions: IntArray, rows: slice) -> Array:
-    return np.einsum("qkj,qk->kj", drive, problem.error_functions[functions, rows])
-
-
-@dataclass(frozen=True, eq=False)
-class _FoldRuns:
-    """(n, 3) scaled predictions, by regime: of the fold's fit, its refit of the stable terms, and AESI I."""
-
-    one_step: Array
-    free_run: Array
-
-
-def _fold_runs(
-    problem: Problem, active: IntArray, fits: Array, refits: Array, bagging: Array
-) -> tuple[_FoldRuns, float]:
-    """Runs over each piece by models fitted on the others; the memory of the residual where none has feedback."""
-    drives = [
-        _drive(problem, active, np.stack([fit, refit, bagging]), slice(a, b))
-        for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)
-    ]
-    remembers = not any(functions.any() for _, functions in drives)
-    memory = _memory(problem, [drive[0][:, 0] for drive, _ in drives]) if remembers else 0.0
-    parts = []
-    for (a, b), (drive, functions) in zip(problem.folds, drives, strict=True):
-        rows = slice(a, b)
-        if remembers:
-            columns = drive[0].T
-            one = np.column_stack(
-                [free_run.remember_ahead(given, memory, problem.error[rows], 1) for given in columns]
-            )
-            free = np.column_stack([free_run.remember(given, memory, problem.error[a]) for given in columns])
-        else:
-            one = _one_step(problem, drive, functions, rows)
-            restart = np.zeros(b - a, dtype=bool)
-            restart[0] = True
-            free = _free(problem, drive, functions, rows, restart, np.zeros(3))
-        parts.append((one, free))
-    return _FoldRuns(np.vstack([one for one, _ in parts]), np.vstack([free for _, free in parts])), memory
-
-
-def _memory(problem: Problem, given: Sequence[Array]) -> float:
-    """The share of an honest residual that is left one step later: its lag-one regression, within [0, 1)."""
-    product, square = 0.0, 0.0
-    for (a, b), prediction in zip(problem.folds, given, strict=True):
-        left = problem.target[a:b] - prediction
-        product += float(left[1:] @ left[:-1])
-        square += float(left[:-1] @ left[:-1])
-    return float(np.clip(product / square, 0.0, _MOST_MEMORY)) if square > 0 else 0.0
-
-
-def _on_folds(problem: Problem, runs: _FoldRuns, column: int) -> _Judged:
-    bare = float(np.mean((problem.target - problem.zero) ** 2))
-    with np.errstate(invalid="ignore"):
-        loss_step = mse(problem.target, runs.one_step[:, column]) / bare
-        loss_free = mse(problem.target, runs.free_run[:, column]) / bare
-    return _Judged(
-        loss_free if problem.options.regime == "free_run" else loss_step,
-        pearson(problem.target, runs.free_run[:, column]),
-        100.0 * (1.0 - loss_free),
-        problem.scaling.error_volts_per_unit * float(np.sqrt(loss_step * bare)),
-    )
-
-
-def _honest(problem: Problem, runs: _FoldRuns) -> tuple[HonestResiduals, ...]:
+def _honest(problem: Problem, runs: FoldRuns) -> tuple[HonestResiduals, ...]:
     volts = problem.scaling.error_volts_per_unit
     one_step = volts * (problem.target - runs.one_step[:, 0])
     free = volts * (problem.target - runs.free_run[:, 0])
@@ -281,26 +189,10 @@ def _honest(problem: Problem, runs: _FoldRuns) -> tuple[HonestResiduals, ...]:
     )
 
 
-def _on_records(model: SparseModel, records: tuple[ErrorSeries, ...], problem: Problem) -> _Judged:
-    truth = np.concatenate([record.error_v[1:] for record in records])
-    one_step = np.concatenate([model.one_step(record)[1:] for record in records])
-    runs = [model.free_run(record) for record in records]
-    free = np.concatenate([run.error_v[1:] for run in runs])
-    bare = float(np.mean(truth**2))
-    diverged = any(run.diverged_at is not None for run in runs)
-    loss_free = np.inf if diverged else float(np.mean((truth - free) ** 2)) / bare
-    loss_step = float(np.mean((truth - one_step) ** 2)) / bare
-    return _Judged(
-        loss_free if problem.options.regime == "free_run" else loss_step,
-        pearson(truth, free),
-        100.0 * (1.0 - loss_free),
-        float(np.sqrt(loss_step * bare)),
-    )
-
-
-def _model(
+def sparse_model(
     problem: Problem, active: IntArray, coefficients: Array, ensemble: Ensemble, memory: float, name: str
 ) -> SparseModel:
+    """The model of the coefficients that are not zero."""
     kept = np.flatnonzero(coefficients)
     return SparseModel(
         name,

@@ -1,0 +1,42 @@
+"""Plain ridge regression on the whole library: no thresholding, no ensemble.
+
+lambda1, p_c, d and whether the error is fed back come from a grid, judged as candidates of the search are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from aesi.errors import FitError
+from aesi.sparse.baselines.single import Single, evaluate_single
+from aesi.sparse.evaluate import FitnessWeights
+from aesi.sparse.genome import Genome
+from aesi.sparse.model import SparseModel
+from aesi.sparse.problem import Problem
+from aesi.sparse.stridge import STRidge
+
+# Sparsity is no aim here.
+_WEIGHTS = FitnessWeights(0.5, 0.5, 0.0)
+
+
+def plain_ridge(problem: Problem, seed: int = 0) -> SparseModel:
+    """The best of the grid; nothing is random. Raises FitError where all of them diverge."""
+    outcomes = [
+        evaluate_single(problem, genome, STRidge(genome.lambda1, 0.0).fit_factor, "ridge", _WEIGHTS)
+        for genome in _grid(problem)
+    ]
+    singles = [outcome for outcome in outcomes if isinstance(outcome, Single)]
+    if not singles:
+        raise FitError(f"none of {len(outcomes)} ridge models runs freely without diverging.")
+    return max(singles, key=lambda single: single.fitness).model
+
+
+def _grid(problem: Problem) -> Iterator[Genome]:
+    orders = range(1, int(problem.library.orders.max()) + 1)
+    for p_c in orders:
+        for d in range(p_c, int(problem.library.degrees.max()) + 1):
+            for feedback in (False, True):
+                for lambda1 in np.geomspace(1e-6, 1e3, 10):
+                    yield Genome.whole(problem.library, float(lambda1), 0.0, 0.5, p_c, d, feedback)

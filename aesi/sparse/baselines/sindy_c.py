@@ -1,0 +1,77 @@
+"""SINDy with control, tuned by evolution, no ensemble: the paper's baseline, solved by PySINDy's own STLSQ.
+
+The rows are handed to PySINDy as a triangular factor R with R' R = [Theta y]' [Theta y]. That poses STLSQ the
+identical problem, |R_y - R_Theta xi|**2 = |y - Theta xi|**2 + const., in as many rows as there are terms.
+
+Tuning: the genome, its ranges, operators, losses and fitness of the AESI search, with generations of 20 of
+which the better half are parents. Without resamples the loss on left-out pieces stands in for out-of-bag.
+
+da Silva et al., arXiv:2411.12935.
+"""
+
+from __future__ import annotations
+
+import warnings
+from functools import partial
+
+import numpy as np
+
+from aesi.errors import FitError
+from aesi.numerics.typing import Array
+from aesi.records import Failed
+from aesi.sparse.baselines.single import Single, evaluate_single
+from aesi.sparse.genome import Genome
+from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.model import SparseModel
+from aesi.sparse.problem import Problem
+
+NAME = "SINDy-C"
+
+
+def tuned_sindy_c(
+    problem: Problem,
+    seed: int = 0,
+    candidates: int = 200,
+    population: int = 20,
+    space: GenomeSpace | None = None,
+) -> SparseModel:
+    """The fittest of `candidates` models. Raises FitError where none survives."""
+    space = space or GenomeSpace.of(problem.library)
+    rng = np.random.default_rng([seed, 1])
+    alive: list[Single] = []
+    reason = ""
+    for start in range(0, candidates, population):
+        for _ in range(min(population, candidates - start)):
+            outcome = evaluate_sindy_c(problem, _proposal(space, alive, population, rng))
+            if isinstance(outcome, Failed):
+                reason = outcome.reason
+            else:
+                alive.append(outcome)
+        alive.sort(key=lambda single: -single.fitness)
+    if not alive:
+        raise FitError(f"none of {candidates} SINDy-C candidates survives (the last one: {reason}).")
+    return alive[0].model
+
+
+def evaluate_sindy_c(problem: Problem, genome: Genome) -> Single | Failed:
+    """One candidate of the baseline."""
+    return evaluate_single(problem, genome, partial(_stlsq, genome.lambda1, genome.lambda2), NAME)
+
+
+def _proposal(space: GenomeSpace, alive: list[Single], population: int, rng: np.random.Generator) -> Genome:
+    parents = alive[: population // 2]
+    if len(parents) < 2:
+        return space.random(rng)
+    one, other = rng.choice(len(parents), size=2, replace=False)
+    return space.child(parents[one].genome, parents[other].genome, rng)
+
+
+def _stlsq(lambda1: float, lambda2: float, factor: Array) -> Array:
+    from pysindy import STLSQ
+
+    solver = STLSQ(threshold=lambda2, alpha=lambda1, unbias=False)
+    with warnings.catch_warnings():
+        # STLSQ warns of empty models and of ill-conditioned solves; the verdict on the model says as much.
+        warnings.simplefilter("ignore")
+        solver.fit(factor[:, :-1], factor[:, -1:])
+    return np.asarray(solver.coef_[0], dtype=float)

@@ -1,0 +1,55 @@
+"""One model instead of an ensemble, judged as candidates of the search are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.records import Failed
+from aesi.sparse.ensemble import Ensemble
+from aesi.sparse.evaluate import FitnessWeights, fitness, sparse_model
+from aesi.sparse.genome import Genome
+from aesi.sparse.judge import Judged, fold_runs, on_validation
+from aesi.sparse.model import SparseModel
+from aesi.sparse.problem import Problem
+
+Fit = Callable[[Array], Array]
+"""Coefficients (m,) from a factor (any, m + 1) of the problem, see `STRidge.fit_factor`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Single:
+    """A single fit: its fitness, the model, and how it did on validation."""
+
+    genome: Genome
+    fitness: float
+    model: SparseModel
+    valid: Judged
+
+
+def evaluate_single(
+    problem: Problem, genome: Genome, fit: Fit, name: str, weights: FitnessWeights | None = None
+) -> Single | Failed:
+    """Fit all training rows at once, and judge.
+
+    Without resamples there are no out-of-bag rows; the loss on pieces left out of the fit takes their place.
+    """
+    active = np.flatnonzero(genome.active(problem.library))
+    columns = np.append(active, len(problem.library))
+    coefficients = fit(problem.full_factor[:, columns]) if len(active) else np.zeros(0)
+    if not coefficients.any():
+        return Failed("no term is left")
+    fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
+    runs, memory = fold_runs(problem, active, fits, fits, coefficients)
+    own = (coefficients != 0).astype(float)
+    ensemble = Ensemble(coefficients[None], coefficients, own, coefficients, coefficients, coefficients)
+    model = sparse_model(problem, active, coefficients, ensemble, memory, name)
+    folds, valid = runs.judge(problem, 0), on_validation(problem, runs, (model,))
+    if not np.isfinite(folds.loss + valid.loss):
+        return Failed("the model diverges in free run")
+    losses = (folds.loss, valid.loss, int(np.count_nonzero(coefficients)))
+    score = fitness(losses, len(problem.library), weights or FitnessWeights())
+    return Single(genome, score, model, valid)
