@@ -1,1 +1,5 @@
-"""."""
+"""The loop closed on measured data: calibration, competing hypotheses, selection, verdict."""
+
+from aesi.tracer.discovery import Discovery, discover
+
+__all__ = ["Discovery", "discover"]

@@ -1,0 +1,80 @@
+"""What a case has to be before it is worth a hypothesis: one sentence each where it is not."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell
+from aesi.physics.constants import SECONDS_PER_HOUR
+from aesi.records import Measurement
+from aesi.tracer.records import Record
+
+VOLTAGE_MARGIN_V = 0.3
+SOC_MARGIN = 0.12
+FEWEST_SAMPLES = 200
+SHORTEST_S = 300.0
+LEAST_C_RATE = 0.02
+FOREIGN_CELL_V = 0.25
+"""A model of the right chemistry, however badly parametrised, is closer than this to the voltage in the
+median."""
+
+
+def check_measurement(cell: Cell, data: Measurement) -> None:
+    """Raises DataError where the voltage leaves what the cell file admits."""
+    low, high = cell.lower_voltage_v - VOLTAGE_MARGIN_V, cell.upper_voltage_v + VOLTAGE_MARGIN_V
+    outside = np.flatnonzero((data.voltage_v < low) | (data.voltage_v > high))
+    if len(outside):
+        row = int(outside[0])
+        raise DataError(
+            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s (row {row}) is outside "
+            "the range of "
+            f"{cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to "
+            "another cell, or "
+            "the voltage is not in volts."
+        )
+
+
+def check_record(cell: Cell, record: Record) -> None:
+    """Raises DataError for a record that is too short, or that asks for more charge than the cell has."""
+    thin = record.thin
+    until = min(record.fit_until_s, thin.time_s[-1])
+    duration = float(until - thin.time_s[0])
+    if (record.n_fit < FEWEST_SAMPLES and duration < 10 * SHORTEST_S) or duration < SHORTEST_S:
+        raise DataError(
+            f"{record.name}: {record.n_fit} samples over {duration:.0f} s are too little to decide "
+            "anything; give at "
+            f"least {FEWEST_SAMPLES} samples over {SHORTEST_S:.0f} s for the fit."
+        )
+    rate = float(np.max(np.abs(thin.current_a[: record.n_fit]))) / cell.nominal_capacity_ah
+    if rate < LEAST_C_RATE:
+        raise DataError(
+            f"{record.name}: the current never exceeds {rate:.2g} C, so the cell does not respond and nothing can be "
+            "decided; give data with load steps."
+        )
+    charge = record.soc0 - _discharged_ah(record.data) / cell.capacity_ah
+    wrong = (charge < -SOC_MARGIN) | (charge > 1.0 + SOC_MARGIN)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        at, soc, start = record.data.time_s[row], 100.0 * charge[row], 100.0 * record.soc0
+        raise DataError(
+            f"{record.name}: the charge moved takes the cell to a state of charge of {soc:.0f} % at {at:g} s "
+            f"(row {row}), from {start:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; check the cell file, "
+            "soc0 and the sign and unit of the current."
+        )
+
+
+def _discharged_ah(data: Measurement) -> Array:
+    steps = 0.5 * (data.current_a[1:] + data.current_a[:-1]) * np.diff(data.time_s)
+    return np.concatenate([[0.0], np.cumsum(steps)]) / SECONDS_PER_HOUR
+
+
+def check_same_cell(name: str, residual_v: Array, cell: Cell) -> None:
+    """Raises DataError where the declared model is so far off that the data must come from another cell."""
+    typical = float(np.median(np.abs(residual_v)))
+    if typical > FOREIGN_CELL_V:
+        raise DataError(
+            f"{name}: the model of {cell.name} is {1e3 * typical:.0f} mV off in the median, which no single effect "
+            "does; the file seems to come from another cell, or soc0 is wrong."
+        )

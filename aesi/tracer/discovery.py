@@ -1,0 +1,190 @@
+"""Close the loop on one case: which effect does the declared model lack, and what does adding it bring?"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect, Effect
+from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement, Run
+from aesi.tracer.candidates import Candidate, ranking
+from aesi.tracer.checks import check_measurement, check_record, check_same_cell
+from aesi.tracer.explain import Explained, explain
+from aesi.tracer.fit import Fit, fit_hypothesis
+from aesi.tracer.knobs import SOC0
+from aesi.tracer.outcome import FileOutcome, States, outcomes, polarisation_v, simulated, test_rmse_v
+from aesi.tracer.problem import Problem
+from aesi.tracer.records import Record, noise_floor_v, prepare, prepare_all
+from aesi.tracer.search import Admission, Archive, Scored, Search, context_of, select
+from aesi.tracer.tell_apart import experiment
+from aesi.tracer.verdict import Verdict, judge
+
+NUMERICS = "numerical_error"
+NUMERICS_SHARE = 0.1
+"""Numerics that move the voltage by more than this share of the noise are refined for every hypothesis."""
+OWN_PARAMETERS = ("solid_diffusivity", "charge_transfer_kinetics", "electrolyte_transport")
+"""What a recalibration of the declared model, without any new physics, may move."""
+
+Progress = Callable[[str, Scored, Admission | None], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """The outcome of one case.
+
+    model_effects : what `after` simulates with: the effects found, and the tolerated parameters where they
+    settled.
+    soc0 : of the first record, fitted.  files : errors by file and part.  explained_before/after : what the
+    residual
+    depends on.  experiments : group of look-alikes -> what would tell them apart.
+    """
+
+    cell: Cell
+    verdict: Verdict
+    candidates: tuple[Candidate, ...]
+    files: tuple[FileOutcome, ...]
+    noise_floor_v: float
+    explained_before: Explained
+    explained_after: Explained
+    model_effects: tuple[ActiveEffect, ...]
+    soc0: float
+    experiments: tuple[tuple[tuple[str, ...], str], ...]
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+    simulations: int = 0
+    settings: Mapping[str, object] = field(default_factory=dict)
+
+
+def discover(
+    cell: Cell,
+    measurements: Sequence[Measurement],
+    tests: Sequence[Measurement] = (),
+    *,
+    soc0: float | None = None,
+    holdout: float = 0.3,
+    max_effects: int = 3,
+    seed: int = 0,
+    effects: Mapping[str, Effect] = CATALOGUE,
+    archive: Path | None = None,
+    progress: Progress | None = None,
+) -> Discovery:
+    """Find what `cell` lacks to explain the measurements.
+
+    measurements : what may be looked at, less the last `holdout` share of each where no `tests` are given.
+    tests : files that choose nothing.  soc0 : state of charge at the first sample; None takes it from the
+    rest voltage.
+    effects : what may be tried.  archive : a file that keeps fits, so that an interrupted search resumes.
+
+    Raises DataError where the data cannot decide anything or do not belong to the cell.
+    """
+    began = time.perf_counter()
+    if not measurements:
+        raise DataError("give at least one measurement to look at.")
+    for data in (*measurements, *tests):
+        check_measurement(cell, data)
+    records = prepare_all(cell, measurements, soc0, 0.0 if tests else holdout)
+    for record in records:
+        check_record(cell, record)
+    tested = tuple(prepare(cell, data, soc0, 0.0) for data in tests)
+    tried = {name: effect for name, effect in effects.items() if name != NUMERICS}
+    problem = _refined(Problem(cell, records, tried), effects.get(NUMERICS))
+    _check_cells(problem, tested)
+    problem = _with_noise_of_residual(problem)
+    search = Search(problem, np.random.default_rng(seed), Archive(archive, context_of(problem)))
+    if progress is not None:
+        search.report = lambda scored, admission: progress("+".join(scored.hypothesis), scored, admission)
+    steps = select(search, max_effects)
+    if steps is None:
+        raise DataError(
+            f"the model of {cell.name} cannot be simulated on {records[0].name}; check the cell file."
+        )
+    verdict = judge(search, steps, _noise_v(problem), polarisation_v(problem, steps[-1].fit))
+    return _told(search, steps, verdict, tested, time.perf_counter() - began)
+
+
+def _refined(problem: Problem, numerics: Effect | None) -> Problem:
+    """The problem with finer numerics in every simulation, where the declared ones move the voltage at
+    all."""
+    if numerics is None:
+        return problem
+    finer = (numerics.activate(),)
+    moved, noise = [], _noise_v(problem)
+    for record in problem.records:
+        seen = record.thin.take(slice(0, record.n_fit))
+        coarse = problem.voltage(seen, record.soc0, (), record.hold)
+        moved.append(problem.voltage(seen, record.soc0, finer, record.hold) - coarse)
+    shift = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
+    return replace(problem, fixed=finer) if shift > NUMERICS_SHARE * noise else problem
+
+
+def _check_cells(problem: Problem, tests: Sequence[Record]) -> None:
+    for record in (*problem.records, *tests):
+        run = simulated(problem, None, record, None, thin=True)
+        check_same_cell(record.name, record.thin.voltage_v - run.voltage_v, problem.cell)
+
+
+def _with_noise_of_residual(problem: Problem) -> Problem:
+    """The noise floor again from the residual of the empty hypothesis: no load steps blur it there."""
+    base = fit_hypothesis(problem, ())
+    if base is None:
+        return problem
+    records = []
+    for rows, record in zip(problem.slices, problem.records, strict=True):
+        noise = noise_floor_v(base.residual_v[rows], record.thin.current_a[: record.n_fit])
+        records.append(replace(record, noise_v=min(record.noise_v, noise)))
+    return replace(problem, records=tuple(records))
+
+
+def _noise_v(problem: Problem) -> float:
+    return float(np.sqrt(np.mean([r.noise_v**2 for r in problem.records])))
+
+
+def _recalibrated(problem: Problem, base: Fit) -> Fit:
+    """The declared model with its own parameters free, and as many starts and steps as a hypothesis gets."""
+    own = tuple(name for name in OWN_PARAMETERS if name in problem.effects)
+    return fit_hypothesis(problem, own) or base
+
+
+def _told(
+    search: Search, steps: Sequence[Scored], verdict: Verdict, tested: Sequence[Record], seconds: float
+) -> Discovery:
+    problem = search.problem
+    chosen = steps[-1] if verdict.effects else steps[0]
+    own = _recalibrated(problem, steps[0].fit)
+    fits: States = {"before": None, "recalibrated": own, "after": chosen.fit}
+    values = chosen.fit.values
+    kinds = {k: str(e.kind) for k, e in problem.effects.items()}
+
+    return Discovery(
+        cell=problem.cell,
+        verdict=verdict,
+        candidates=ranking(search, steps, verdict, lambda fit: test_rmse_v(problem, fit, tested)),
+        files=outcomes(problem, fits, tested, search.rng),
+        noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in problem.records]))),
+        explained_before=_explained(problem, None),
+        explained_after=_explained(problem, chosen.fit),
+        model_effects=problem.active(values),
+        soc0=values[SOC0]["0"],
+        experiments=tuple((g, experiment(g, kinds)) for g in verdict.groups),
+        notes=tuple(n for r in (*problem.records, *tested) for n in r.notes) + tuple(search.notes),
+        seconds=seconds,
+        simulations=sum(s.fit.simulations for s in search.scored.values() if s is not None),
+    )
+
+
+def _explained(problem: Problem, fit: Fit | None) -> Explained:
+    runs, residuals = [], []
+    for index, record in enumerate(problem.records):
+        run = simulated(problem, fit, record, index, thin=True)
+        keep = slice(0, record.n_fit)
+        series = {name: column[keep] for name, column in run.series.items()}
+        runs.append(Run(run.time_s[keep], run.current_a[keep], run.voltage_v[keep], series))
+        residuals.append((record.thin.voltage_v - run.voltage_v)[keep])
+    return explain(runs, residuals)

@@ -1,0 +1,114 @@
+"""What a residual depends on, and how much of it a flexible model of the states could still explain
+unseen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.records import Run
+
+MEMORIES_S = (10.0, 60.0, 300.0, 1800.0)
+FOLDS = 5
+BLOCKS_PER_FOLD = 5
+RIDGES = (1e-4, 1e-2, 1.0, 1e2, 1e4)
+SATURATION = 0.5
+"""Share of the current's RMS at which the saturating feature bends."""
+
+
+@dataclass(frozen=True)
+class Explained:
+    """Out of sample: how much of a residual its possible causes explain.
+
+    total_v : V, root mean square that all features together explain.  shares : family -> share of the
+    variance that
+    the family explains alone, 0 to 1.
+    """
+
+    total_v: float
+    shares: Mapping[str, float]
+
+
+def features(run: Run) -> dict[str, Array]:
+    """Family -> (n, k) columns of one record: what a residual may depend on."""
+    t, current = run.time_s, run.current_a
+    scale = float(np.sqrt(np.mean(current**2))) + 1e-12
+    i = current / scale
+    soc = run.series["soc"]
+    z = 2.0 * (soc - soc.min()) / max(np.ptp(soc), 1e-6) - 1.0
+    slow = [_filtered(t, i, tau) for tau in MEMORIES_S]
+    heat = _filtered(t, i**2, MEMORIES_S[-1])
+    turn = [_filtered(t, np.sign(i) * (np.abs(i) > 0.02), tau) for tau in (120.0, 900.0)]
+    throughput = np.concatenate([[0.0], np.cumsum(np.abs(current[1:]) * np.diff(t))])
+    throughput /= throughput[-1] + 1e-12
+    electrolyte = run.series["c_e0"] - run.series["c_eL"]
+    surface = [run.series[n] for n in ("c_sn", "c_sp")]
+    return {
+        "current": np.column_stack([i, np.tanh(i / SATURATION), i * z, i * z**2]),
+        "sign of current": np.column_stack([np.sign(i) * (np.abs(i) > 0.02)]),
+        "state of charge": np.polynomial.chebyshev.chebvander(z, 6)[:, 1:],
+        "electrolyte": np.column_stack([electrolyte, electrolyte * z]),
+        "particle surfaces": np.column_stack(surface),
+        "recent current": np.column_stack([*slow[:2], slow[0] * z, slow[1] * z]),
+        "history": np.column_stack([*slow[2:], *turn]),
+        "heat": np.column_stack([heat, heat * i]),
+        "throughput": np.column_stack([throughput, throughput * i]),
+        "time": np.column_stack([(t - t[0]) / max(t[-1] - t[0], 1.0)]),
+    }
+
+
+def _filtered(time_s: Array, signal: Array, tau_s: float) -> Array:
+    from scipy.signal import lfilter
+
+    gap = float(np.median(np.diff(time_s)))
+    keep = float(np.exp(-gap / tau_s))
+    return lfilter([1.0 - keep], [1.0, -keep], signal)
+
+
+def explain(runs: Sequence[Run], residuals: Sequence[Array]) -> Explained:
+    """Explained by ridge regression on features of the states, judged on blocks that it was not fitted on.
+
+    runs, residuals : one a record, (n,) V measured - model.
+    """
+    families = [features(r) for r in runs]
+    names = list(families[0])
+    target = np.concatenate([e - 0.0 for e in residuals])
+    folds = np.concatenate([_folds(len(e)) for e in residuals])
+    tables = {n: _standard(np.concatenate([f[n] for f in families])) for n in names}
+    whole = np.column_stack(list(tables.values()))
+    variance = float(np.mean((target - target.mean()) ** 2)) + 1e-30
+    shares = {n: max(0.0, 1.0 - _unseen(tables[n], target, folds) / variance) for n in names}
+    left = _unseen(whole, target, folds)
+    return Explained(float(np.sqrt(max(np.mean(target**2) - left, 0.0))), shares)
+
+
+def _standard(table: Array) -> Array:
+    centred = table - table.mean(axis=0)
+    return centred / (centred.std(axis=0) + 1e-12)
+
+
+def _folds(n: int) -> Array:
+    """Fold of each row: contiguous blocks dealt out in turn, so that each fold spans the record."""
+    blocks = np.minimum(np.arange(n) * FOLDS * BLOCKS_PER_FOLD // max(n, 1), FOLDS * BLOCKS_PER_FOLD - 1)
+    return blocks % FOLDS
+
+
+def _unseen(table: Array, target: Array, folds: Array) -> float:
+    """Smallest mean square over the ridges of the error on rows that were left out."""
+    design = np.column_stack([np.ones(len(table)), table])
+    errors = np.zeros(len(RIDGES))
+    for fold in range(FOLDS):
+        out = folds == fold
+        if not out.any() or out.all():
+            continue
+        x, y = design[~out], target[~out]
+        gram, moment = x.T @ x, x.T @ y
+        for j, ridge in enumerate(RIDGES):
+            penalty = ridge * np.eye(len(gram))
+            penalty[0, 0] = 0.0
+            weights = np.linalg.solve(gram + penalty + 1e-9 * np.eye(len(gram)), moment)
+            errors[j] += float(np.sum((target[out] - design[out] @ weights) ** 2))
+    return float(errors.min() / len(target))

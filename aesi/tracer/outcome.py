@@ -1,0 +1,153 @@
+"""Errors as declared, recalibrated and with the effects added, on every file as it was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from aesi.errors import AesiError
+from aesi.numerics.typing import Array
+from aesi.records import Run
+from aesi.tracer.fit import Fit
+from aesi.tracer.knobs import SOC0
+from aesi.tracer.problem import Problem
+from aesi.tracer.records import Record
+
+State = Literal["before", "recalibrated", "after"]
+Part = Literal["fit", "test"]
+States = Mapping[State, Fit | None]
+"""The fit behind each state; None is the model as declared."""
+
+RESAMPLES = 400
+BOOTSTRAP_BLOCK_S = 300.0
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of a voltage, V: root mean square, mean absolute, largest."""
+
+    rmse_v: float
+    mae_v: float
+    max_v: float
+
+    @classmethod
+    def of(cls, residual_v: Array) -> Errors:
+        """From residuals (n,) V."""
+        size = np.abs(residual_v)
+        return cls(float(np.sqrt(np.mean(size**2))), float(size.mean()), float(size.max()))
+
+
+@dataclass(frozen=True, eq=False)
+class FileOutcome:
+    """One part of one file.
+
+    voltages : state -> (n,) V.  gain_v : RMSE recalibrated minus after, with its 95 % block-bootstrap
+    interval.
+    """
+
+    name: str
+    part: Part
+    time_s: Array
+    current_a: Array
+    soc: Array
+    measured_v: Array
+    voltages: Mapping[State, Array]
+    gain_v: tuple[float, float, float]
+
+    def residual_v(self, state: State) -> Array:
+        """(n,) V, measured - model."""
+        return self.measured_v - self.voltages[state]
+
+    def errors(self, state: State) -> Errors:
+        """Errors of a state."""
+        return Errors.of(self.residual_v(state))
+
+
+def simulated(problem: Problem, fit: Fit | None, record: Record, index: int | None, thin: bool) -> Run:
+    """One record under a fit (None: as declared).
+
+    index : place of the record among those of the fit, or None for one that the fit has not seen; its state
+    of
+    charge is then the one given, or the one at which the fitted model rests at its first voltage.
+    """
+    data = record.thin if thin else record.data
+    if fit is None:
+        return problem.run(data, record.soc0, problem.fixed, record.hold)
+    values = fit.values
+    effects = problem.active(values)
+    if index is not None:
+        return problem.run(data, values[SOC0][str(index)], effects, record.hold)
+    if record.soc0_given or record.rest_voltage_v is None:
+        return problem.run(data, record.soc0, effects, record.hold)
+    try:
+        return problem.run(data, None, effects, record.hold, record.rest_voltage_v)
+    except AesiError:
+        return problem.run(data, record.soc0, effects, record.hold)
+
+
+def outcomes(
+    problem: Problem, states: States, tests: Sequence[Record], rng: np.random.Generator
+) -> tuple[FileOutcome, ...]:
+    """Every file, cut into the part that fits have seen and the part that chose nothing."""
+    out = []
+    for index, record in enumerate(problem.records):
+        runs = {s: simulated(problem, fit, record, index, thin=False) for s, fit in states.items()}
+        cut = record.fit_rows_full
+        out.append(_outcome(record, "fit", slice(0, cut), runs, rng))
+        if cut < len(record.data):
+            out.append(_outcome(record, "test", slice(cut, len(record.data)), runs, rng))
+    for record in tests:
+        runs = {s: simulated(problem, fit, record, None, thin=False) for s, fit in states.items()}
+        out.append(_outcome(record, "test", slice(0, len(record.data)), runs, rng))
+    return tuple(out)
+
+
+def _outcome(
+    record: Record, part: Part, rows: slice, runs: Mapping[State, Run], rng: np.random.Generator
+) -> FileOutcome:
+    data = record.data.take(rows)
+    voltages = {s: run.voltage_v[rows] for s, run in runs.items()}
+    gain = rmse_difference(
+        data.voltage_v - voltages["recalibrated"], data.voltage_v - voltages["after"], data.time_s, rng
+    )
+    soc = runs["after"].series["soc"][rows]
+    return FileOutcome(record.name, part, data.time_s, data.current_a, soc, data.voltage_v, voltages, gain)
+
+
+def rmse_difference(
+    first_v: Array, second_v: Array, time_s: Array, rng: np.random.Generator
+) -> tuple[float, float, float]:
+    """RMSE of `first_v` minus that of `second_v`, with the 95 % interval of a moving-block bootstrap, V."""
+    n = len(first_v)
+    spacing = (time_s[-1] - time_s[0]) / max(n - 1, 1)
+    block = int(np.clip(BOOTSTRAP_BLOCK_S / max(spacing, 1e-9), 1, max(n // 4, 1)))
+    sums = [np.concatenate([[0.0], np.cumsum(e**2)]) for e in (first_v, second_v)]
+    starts = rng.integers(0, n - block + 1, size=(RESAMPLES, -(-n // block)))
+    means = [(s[starts + block] - s[starts]).sum(axis=1) / (starts.shape[1] * block) for s in sums]
+    differences = np.sqrt(means[0]) - np.sqrt(means[1])
+    low, high = np.quantile(differences, [0.025, 0.975])
+    value = Errors.of(first_v).rmse_v - Errors.of(second_v).rmse_v
+    return value, float(low), float(high)
+
+
+def test_rmse_v(problem: Problem, fit: Fit, tests: Sequence[Record]) -> float:
+    """RMSE on what the fits have not seen (on the fit part where there is nothing else), thinned, V."""
+    parts = [r.thin.voltage_v - simulated(problem, fit, r, None, thin=True).voltage_v for r in tests]
+    for index, record in enumerate(problem.records):
+        if not tests and record.n_fit < len(record.thin):
+            run = simulated(problem, fit, record, index, thin=True)
+            parts.append((record.thin.voltage_v - run.voltage_v)[record.n_fit :])
+    return float(np.sqrt(np.mean(np.concatenate(parts or [fit.residual_v]) ** 2)))
+
+
+def polarisation_v(problem: Problem, fit: Fit) -> float:
+    """Root mean square distance of the modelled voltage from equilibrium on the fit part, V."""
+    parts = []
+    for index, record in enumerate(problem.records):
+        run = simulated(problem, fit, record, index, thin=True)
+        rest = problem.cell.rest_voltage_v(run.series["soc"])
+        parts.append((run.voltage_v - rest)[: record.n_fit])
+    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))

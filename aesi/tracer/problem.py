@@ -1,0 +1,146 @@
+"""What all hypotheses of one case share: the cell, the records, the tolerances, and one way to simulate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aesi.errors import AesiError
+from aesi.numerics.coloured import ColouredNoise, whiten
+from aesi.numerics.typing import Array
+from aesi.parameters import Parameter
+from aesi.physics import simulate
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect, Effect
+from aesi.records import Hold, Measurement, Run
+from aesi.tracer.knobs import SOC0, Knob, free_knobs, soc_knob, tolerated_knob, values_by_owner
+from aesi.tracer.records import Record
+
+TOLERANCES: Mapping[str, Mapping[str, float] | float] = {
+    "solid_diffusivity": 0.03,
+    "voltage_sensor_offset": 4e-4,
+}
+"""What a good parametrisation and a good voltmeter leave open: relative on logarithmic parameters, else in
+the
+parameter's unit. Every hypothesis may use it, so that none is found for it."""
+
+Hypothesis = tuple[str, ...]
+"""Ids of the effects that are in, in the order in which they were added."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """One case.
+
+    effects : id -> Effect, everything that may be tried.  tolerances : see TOLERANCES.  fixed : effects that
+    are in
+    every simulation (finer numerics, where the declared ones do not suffice).
+    """
+
+    cell: Cell
+    records: tuple[Record, ...]
+    effects: Mapping[str, Effect]
+    tolerances: Mapping[str, Mapping[str, float] | float] = field(default_factory=lambda: dict(TOLERANCES))
+    fixed: tuple[ActiveEffect, ...] = ()
+
+    def parameters(self, effect: str) -> Mapping[str, Parameter]:
+        """The declared parameters of an effect."""
+        return self.effects[effect].parameters
+
+    def knobs(self, hypothesis: Hypothesis) -> list[Knob]:
+        """Tolerated knobs first (states of charge, then tolerances), then the free ones of each effect."""
+        knobs = [soc_knob(str(i), r.soc0, r.soc0_sd) for i, r in enumerate(self.records)]
+        for effect, tolerance in self.tolerances.items():
+            if effect in self.effects and effect not in hypothesis:
+                for name, p in self.parameters(effect).items():
+                    sd = tolerance if isinstance(tolerance, float) else tolerance.get(name)
+                    if sd is not None:
+                        knobs.append(tolerated_knob(effect, name, p, sd))
+        for effect in hypothesis:
+            knobs += free_knobs(effect, self.parameters(effect))
+        return knobs
+
+    def active(self, values: Mapping[str, Mapping[str, float]]) -> tuple[ActiveEffect, ...]:
+        """The effects to simulate with, from owner -> name -> value; those at their neutral point are left
+        out."""
+        active = list(self.fixed)
+        for owner, given in values.items():
+            if owner == SOC0:
+                continue
+            declared = self.parameters(owner)
+            neutral = all(
+                declared[n].neutral is not None and v == declared[n].neutral for n, v in given.items()
+            )
+            if given and neutral:
+                continue
+            active.append(self.effects[owner].activate(**given))
+        return tuple(active)
+
+    def predict(self, knobs: Sequence[Knob], x: Array) -> list[Array] | None:
+        """Voltage of every record's fit part, (n_fit,) V each, or None where the model fails."""
+        values = values_by_owner(knobs, x)
+        out = []
+        try:
+            effects = self.active(values)
+            for i, record in enumerate(self.records):
+                seen = record.thin.take(slice(0, record.n_fit))
+                out.append(self.voltage(seen, values[SOC0][str(i)], effects, record.hold))
+        except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
+            return None
+        if not all(np.isfinite(v).all() for v in out):
+            return None
+        return out
+
+    def why_not(self, hypothesis: Hypothesis) -> str:
+        """Why a hypothesis cannot be simulated at its typical values: one sentence."""
+        record = self.records[0]
+        try:
+            effects = tuple(self.effects[name].activate() for name in hypothesis)
+            self.run(record.thin.take(slice(0, record.n_fit)), record.soc0, effects, record.hold)
+        except AesiError as error:
+            return str(error)
+        return "no start of the fit could be simulated."
+
+    def voltage(self, data: Measurement, soc0: float, effects: tuple[ActiveEffect, ...], hold: Hold) -> Array:
+        """(n,) V of one measurement."""
+        return self.run(data, soc0, effects, hold).voltage_v
+
+    def run(
+        self, data: Measurement, soc0: float | None, effects: tuple[ActiveEffect, ...], hold: Hold,
+        rest_voltage_v: float | None = None,
+    ) -> Run:  # fmt: skip
+        """One simulation; stoichiometries that run out are clipped, so that a search is not stopped by
+        them."""
+        return simulate(
+            self.cell,
+            data.time_s,
+            data.current_a,
+            soc0,
+            effects,
+            None,
+            hold,
+            rest_voltage_v=rest_voltage_v,
+            on_depletion="clip",
+        )
+
+    @property
+    def measured(self) -> Array:
+        """(n_fit of all records,) V: what fits see."""
+        return np.concatenate([r.thin.voltage_v[: r.n_fit] for r in self.records])
+
+    @property
+    def slices(self) -> list[slice]:
+        """Rows of each record in `measured`."""
+        ends = np.cumsum([r.n_fit for r in self.records])
+        return [slice(int(e - r.n_fit), int(e)) for e, r in zip(ends, self.records, strict=True)]
+
+    def whiten(self, table: Array, noise: Sequence[ColouredNoise]) -> tuple[Array, float]:
+        """Columns (n, m) whitened record by record, and the log-determinant of their covariance."""
+        parts, total = [], 0.0
+        for rows, record, model in zip(self.slices, self.records, noise, strict=True):
+            part, log_det = whiten(table[rows], record.thin.time_s[: record.n_fit], model)
+            parts.append(part)
+            total += log_det
+        return np.concatenate(parts), total

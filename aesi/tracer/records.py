@@ -1,0 +1,198 @@
+"""Measured records made ready for fits: noise, initial state of charge, the part that may be looked at.
+
+Fits run on a thinned copy (averages over symmetric windows, of current and voltage alike, so that charge and
+the
+linear part of the response are kept); reported errors are always those of the record as measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.errors import DataError, SimulationError
+from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell, initial_soc
+from aesi.records import Hold, Measurement
+
+THIN_STEP_S = 1.0
+"""Fits see at most one sample a second: nothing in the catalogue is faster than a sample and slower than
+noise."""
+FIT_SAMPLES = 12_000
+SLOW_SAMPLING_S = 5.0
+OTHER_STATE = 0.05
+REST_C_RATE = 1.0 / 50.0
+NEAR_REST_C_RATE = 1.0 / 8.0
+SOC_TOLERANCE = 0.0007
+SOC_TOLERANCE_FROM_VOLTAGE = 0.004
+SOC_TOLERANCE_UNDER_LOAD = 0.02
+SMALLEST_NOISE_V = 5e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One measurement as the tracer uses it.
+
+    data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits
+    may see.
+    fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of
+    charge
+    and what it is uncertain by.  noise_v : deviation of the sensor's white noise, in `thin`.
+    """
+
+    data: Measurement
+    thin: Measurement
+    n_fit: int
+    fit_until_s: float
+    soc0: float
+    soc0_sd: float
+    hold: Hold
+    noise_v: float
+    noise_full_v: float
+    rest_voltage_v: float | None = None
+    soc0_given: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The measurement's name."""
+        return self.data.name
+
+    @property
+    def fit_rows_full(self) -> int:
+        """Rows of `data` that belong to the fit part."""
+        return int(np.searchsorted(self.data.time_s, self.fit_until_s))
+
+
+def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
+    """Deviation of the white noise, from second differences where the current is steady.
+
+    voltage_v, current_a : (n,).  The scale is robust to the steps that remain; half the smallest voltage
+    step is
+    the least it can be.
+    """
+    if len(voltage_v) < 8:
+        return SMALLEST_NOISE_V
+    second = voltage_v[2:] - 2.0 * voltage_v[1:-1] + voltage_v[:-2]
+    change = np.abs(np.diff(current_a))
+    change = np.maximum(change[1:], change[:-1])
+    calm = change <= np.quantile(change, 0.3)
+    kept = second[calm]
+    limit = 3.5 * max(np.median(np.abs(kept)) / 0.6745, 1e-9)
+    kept = kept[np.abs(kept) <= limit] if np.count_nonzero(np.abs(kept) <= limit) > 5 else kept
+    steps = np.diff(np.unique(np.round(voltage_v, 6)))
+    quantum = float(steps.min()) if len(steps) else 0.0
+    return max(float(np.sqrt(np.mean(kept**2) / 6.0)), quantum / np.sqrt(12.0), SMALLEST_NOISE_V)
+
+
+def prepare(
+    cell: Cell, data: Measurement, soc0: float | None, holdout: float, step_s: float = THIN_STEP_S
+) -> Record:
+    """A record with its noise, its initial state of charge and its fit part.
+
+    holdout : share of the time, at the end, that fits may not see (0 for none).
+    Raises DataError where the record is too short or its initial state cannot be known.
+    """
+    hold: Hold = (
+        "backward" if float(np.max(np.diff(data.time_s[:]), initial=0.0)) > SLOW_SAMPLING_S else "linear"
+    )
+    thin = thinned(data, step_s)
+    duration = data.time_s[-1] - data.time_s[0]
+    until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
+    n_fit = int(np.searchsorted(thin.time_s, until))
+    start, sd, notes = _initial_state(cell, data, soc0)
+    noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
+    noise_full = noise if thin is data else noise_floor_v(data.voltage_v, data.current_a)
+    rest = rest_voltage_v(cell, data) if at_rest(cell, data) else None
+    given = soc0 is not None and start == soc0
+    return Record(data, thin, n_fit, until, start, sd, hold, noise, noise_full, rest, given, notes)
+
+
+def prepare_all(
+    cell: Cell, measurements: Sequence[Measurement], soc0: float | None, holdout: float
+) -> tuple[Record, ...]:
+    """`prepare` over several measurements, thinned until their sum is within what fits can afford."""
+    step = THIN_STEP_S
+    while True:
+        records = tuple(prepare(cell, m, soc0, holdout, step) for m in measurements)
+        if sum(len(r.thin) for r in records) <= FIT_SAMPLES or step > 30.0:
+            return records
+        step *= 2.0
+
+
+def thinned(data: Measurement, step_s: float) -> Measurement:
+    """At most one sample in `step_s`: centred averages of current, voltage and temperature.
+
+    Records sampled more slowly than 0.75 of `step_s` on average are returned as they are.
+    """
+    t = data.time_s
+    typical = float(np.median(np.diff(t)))
+    factor = round(step_s / typical)
+    if factor < 2:
+        return data
+    half = factor // 2
+    centres = np.arange(half, len(t) - half, factor)
+    width = 2 * half + 1
+    weights = np.ones(width)
+    weights[[0, -1]] = 0.5 if factor % 2 == 0 else 1.0
+    weights /= weights.sum()
+
+    def averaged(column: Array) -> Array:
+        return np.convolve(column, weights, mode="valid")[centres - half]
+
+    temperature = None if data.temperature_degc is None else averaged(data.temperature_degc)
+    first = data.take(slice(0, 1))
+    return replace(
+        data,
+        time_s=np.concatenate([first.time_s, t[centres]]),
+        current_a=np.concatenate([first.current_a, averaged(data.current_a)]),
+        voltage_v=np.concatenate([first.voltage_v, averaged(data.voltage_v)]),
+        temperature_degc=None
+        if temperature is None or first.temperature_degc is None
+        else np.concatenate([first.temperature_degc, temperature]),
+    )
+
+
+def at_rest(cell: Cell, data: Measurement) -> bool:
+    """True where the first sample carries (nearly) no current."""
+    return abs(float(data.current_a[0])) <= REST_C_RATE * cell.nominal_capacity_ah
+
+
+def rest_voltage_v(cell: Cell, data: Measurement) -> float:
+    """Mean voltage of the samples before the current starts, at most sixty."""
+    limit = max(abs(float(data.current_a[0])), REST_C_RATE * cell.nominal_capacity_ah)
+    calm = np.abs(data.current_a[:60]) <= limit
+    n = len(calm) if calm.all() else max(1, int(np.argmin(calm)))
+    return float(np.mean(data.voltage_v[:n]))
+
+
+def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[float, float, tuple[str, ...]]:
+    resting = at_rest(cell, data)
+    if soc0 is not None and not resting:
+        return soc0, SOC_TOLERANCE, ()
+    if soc0 is None and abs(float(data.current_a[0])) > NEAR_REST_C_RATE * cell.nominal_capacity_ah:
+        raise DataError(
+            f"{data.name}: the record starts at {data.current_a[0]:.3g} A, not at rest, so its first "
+            "voltage does "
+            "not give the state of charge; give --soc0, or a record that starts with a rest."
+        )
+    try:
+        inferred = initial_soc(cell, rest_voltage_v(cell, data))
+    except SimulationError as error:
+        if soc0 is None:
+            raise DataError(str(error)) from None
+        inferred = soc0
+    if soc0 is not None and abs(inferred - soc0) <= OTHER_STATE:
+        return soc0, SOC_TOLERANCE, ()
+    notes = []
+    if soc0 is not None:
+        notes.append(
+            f"{data.name}: rests at {100 * inferred:.1f} % state of charge by its voltage, not at the "
+            f"{100 * soc0:.1f} % given; the voltage is believed."
+        )
+    if resting:
+        return inferred, SOC_TOLERANCE_FROM_VOLTAGE, tuple(notes)
+    notes.append(f"{data.name}: no rest at the start; its initial state of charge is fitted within 6 %.")
+    return inferred, SOC_TOLERANCE_UNDER_LOAD, tuple(notes)

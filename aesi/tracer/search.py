@@ -1,0 +1,268 @@
+"""Forward selection over hypotheses, several abreast, every fit kept so that an interrupted search
+resumes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.records import digest
+from aesi.tracer.fit import Fit, as_dict, fit_hypothesis, from_dict
+from aesi.tracer.knobs import starts
+from aesi.tracer.problem import Hypothesis, Problem
+from aesi.tracer.score import held_out_rmse_v, placebo_gain, structured_v
+
+ABREAST = 3
+"""Hypotheses of a size that are grown further: the best single effect need not be half of the best pair."""
+GROWN_FULLY = 6
+"""Effects that are fitted in full on top of each of them, the most promising by a linear estimate."""
+EVIDENCE_NATS = 10.0
+"""What an effect has to bring beyond its own complexity: the price of having tried some twenty others."""
+MATERIAL_SHARE = 0.35
+"""An effect that moves the voltage by less than this share of the noise is not worth a name."""
+PLACEBO_FACTOR = 2.0
+"""An effect brings this many times what a placebo brings, or leaves at most its inverse of what a placebo
+leaves."""
+PLACEBO_MARGIN_SHARE = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Scored:
+    """A fitted hypothesis and what it explains of data it has not seen (V)."""
+
+    fit: Fit
+    held_out_rmse_v: float
+    structured_v: float
+
+    @property
+    def hypothesis(self) -> Hypothesis:
+        """Ids of the effects."""
+        return self.fit.hypothesis
+
+    @property
+    def evidence(self) -> float:
+        """Nats."""
+        return self.fit.log_evidence
+
+
+@dataclass(frozen=True)
+class Admission:
+    """Whether an effect may be added, and why not."""
+
+    admitted: bool
+    reason: str
+    evidence_nats: float
+    gain_v: float
+    placebo_v: float
+
+
+class Archive:
+    """Fits by content, one line each in a file; lines that cannot be read are ignored and fitted again."""
+
+    def __init__(self, path: Path | None, context: str) -> None:
+        self.path, self.context = path, context
+        self.stored: dict[str, dict[str, object]] = {}
+        if path is not None and path.exists():
+            for line in path.read_text(encoding="utf-8").splitlines():
+                try:
+                    entry = json.loads(line)
+                    if entry["context"] == context:
+                        self.stored["+".join(entry["fit"]["hypothesis"])] = entry["fit"]
+                except (ValueError, KeyError, TypeError):
+                    continue
+
+    def get(self, problem: Problem, hypothesis: Hypothesis) -> Fit | None:
+        """The stored fit, evaluated again, or None."""
+        entry = self.stored.get("+".join(hypothesis))
+        try:
+            return None if entry is None else from_dict(problem, entry)
+        except (KeyError, TypeError, ValueError):
+            return None
+
+    def put(self, fit: Fit) -> None:
+        """Append a fit."""
+        if self.path is None:
+            return
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"context": self.context, "fit": as_dict(fit)}) + "\n")
+
+
+def context_of(problem: Problem) -> str:
+    """Changes whenever a stored fit would no longer be the same fit."""
+    pieces = [
+        repr(problem.cell),
+        repr(sorted(problem.effects)),
+        repr(sorted(problem.tolerances.items(), key=str)),
+    ]
+    pieces += [f"{r.data.digest}{r.n_fit}{r.soc0}{r.soc0_sd}{r.noise_v}" for r in problem.records]
+    return digest(np.frombuffer("".join(pieces).encode(), dtype=np.uint8).astype(float))
+
+
+@dataclass
+class Search:
+    """One case's hypotheses, fitted on demand.
+
+    report : called with every newly scored hypothesis and its parent (progress, tracking).
+    """
+
+    problem: Problem
+    rng: np.random.Generator
+    archive: Archive
+    report: Callable[[Scored, Admission | None], None] = lambda scored, admission: None
+    scored: dict[frozenset[str], Scored | None] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    admissions: dict[tuple[frozenset[str], frozenset[str]], Admission] = field(default_factory=dict)
+
+    def fit(self, hypothesis: Hypothesis, warm: Iterable[Array] = ()) -> Scored | None:
+        """Fit once; the order in which effects were added does not matter to the fit."""
+        key = frozenset(hypothesis)
+        if key not in self.scored:
+            found = self.archive.get(self.problem, hypothesis)
+            if found is None:
+                found = fit_hypothesis(self.problem, hypothesis, list(warm))
+                if found is not None:
+                    self.archive.put(found)
+            self.scored[key] = None if found is None else self._score(found)
+            if found is None:
+                self.notes.append(f"{' + '.join(hypothesis)}: not tried; {self.problem.why_not(hypothesis)}")
+        return self.scored[key]
+
+    def _score(self, fit: Fit) -> Scored:
+        return Scored(fit, held_out_rmse_v(self.problem, fit), structured_v(self.problem, fit.residual_v))
+
+    def grow(self, parent: Scored, limit: int | None = None) -> list[Scored]:
+        """Full fits of `parent` plus one effect, for the `limit` most promising effects (None: all)."""
+        names = [n for n in self.problem.effects if n not in parent.hypothesis]
+        if limit is not None:
+            names = self._promising(parent, names)[:limit]
+        children = []
+        for name in names:
+            child = self.fit((*parent.hypothesis, name), self._warm(parent, name))
+            if child is not None:
+                children.append(child)
+                self.report(child, self.admit(parent, child))
+        return children
+
+    def _warm(self, parent: Scored, name: str) -> list[Array]:
+        """Where parent and the effect alone ended, joined: a start beside the standard ones."""
+        alone = self.scored.get(frozenset((name,)))
+        knobs = self.problem.knobs((*parent.hypothesis, name))
+        known = dict(zip((k.key for k in parent.fit.knobs), parent.fit.x, strict=True))
+        single = (
+            {} if alone is None else dict(zip((k.key for k in alone.fit.knobs), alone.fit.x, strict=True))
+        )
+        vectors = []
+        if parent.hypothesis and single:
+            vectors.append(np.array([known.get(k.key, single.get(k.key, 0.0)) for k in knobs]))
+        for start in starts(knobs):
+            vectors += [np.array([known.get(k.key, s) for k, s in zip(knobs, start, strict=True)])]
+        return vectors
+
+    def _promising(self, parent: Scored, names: list[str]) -> list[str]:
+        """Effects by how much of the parent's whitened residual their sensitivities can take up."""
+        fit = parent.fit
+        gains = {}
+        base, _ = self.problem.whiten(np.column_stack([fit.residual_v, fit.jacobian]), fit.noise)
+        for name in names:
+            alone = self.scored.get(frozenset((name,)))
+            if alone is None:
+                continue
+            mine = [j for j, k in enumerate(alone.fit.knobs) if k.owner == name]
+            extra, _ = self.problem.whiten(alone.fit.jacobian[:, mine], fit.noise)
+            columns = np.column_stack([base[:, 1:], extra])
+            scale = np.linalg.norm(columns, axis=0) + 1e-300
+            solution = np.linalg.lstsq(columns / scale, base[:, 0], rcond=1e-8)[0]
+            gains[name] = float(
+                np.sum(base[:, 0] ** 2) - np.sum((base[:, 0] - columns / scale @ solution) ** 2)
+            )
+        return sorted(gains, key=lambda n: -gains[n])
+
+    def without(self, child: Scored, name: str) -> Scored | None:
+        """`child` less one effect, refitted from where the others were."""
+        rest = tuple(n for n in child.hypothesis if n != name)
+        known = dict(zip((k.key for k in child.fit.knobs), child.fit.x, strict=True))
+        return self.fit(rest, [np.array([known.get(k.key, 0.0) for k in self.problem.knobs(rest)])])
+
+    def admit(self, parent: Scored, child: Scored) -> Admission:
+        """May the effect that `child` adds to `parent` be named?"""
+        key = (frozenset(parent.hypothesis), frozenset(child.hypothesis))
+        if key not in self.admissions:
+            self.admissions[key] = self._admission(parent, child)
+        return self.admissions[key]
+
+    def _admission(self, parent: Scored, child: Scored) -> Admission:
+        nats = child.evidence - parent.evidence
+        gain = parent.held_out_rmse_v**2 - child.held_out_rmse_v**2
+        placebo = placebo_gain(self.problem, parent.fit, child.fit, self.rng)
+        noise = float(np.mean([r.noise_v for r in self.problem.records]))
+        left = max(child.held_out_rmse_v**2 - noise**2, (MATERIAL_SHARE * noise) ** 2)
+        left_by_placebo = parent.held_out_rmse_v**2 - placebo - noise**2
+        beaten = gain - placebo >= (PLACEBO_MARGIN_SHARE * noise) ** 2 and (
+            gain >= PLACEBO_FACTOR * placebo or left <= left_by_placebo / PLACEBO_FACTOR
+        )
+        verdict = [
+            (nats < EVIDENCE_NATS, f"brings {nats:.1f} nats, {EVIDENCE_NATS:g} are asked for"),
+            (gain < (MATERIAL_SHARE * noise) ** 2, "moves the voltage by less than the noise hides"),
+            (not beaten, "does not clearly beat a placebo"),
+            (bool(child.fit.at_bounds), f"ends on a bound: {', '.join(child.fit.at_bounds)}"),
+        ]
+        reasons = [reason for failed, reason in verdict if failed]
+        root = float(np.sqrt(max(gain, 0.0)))
+        return Admission(not reasons, "; ".join(reasons), nats, root, float(np.sqrt(placebo)))
+
+
+def select(search: Search, max_effects: int) -> list[Scored] | None:
+    """Add effects one at a time while that is admitted.
+
+    Returns the chosen hypothesis after each addition, the empty one first; None where not even that one can
+    be
+    simulated. Two effects may come in one step, where neither shows without the other.
+    """
+    base = search.fit(())
+    if base is None:
+        return None
+    steps, front = [base], search.grow(base)
+    for size in range(1, max_effects + 1):
+        needed = [s for s in front if _all_needed(search, s)]
+        best = max(needed, key=lambda s: s.evidence, default=None)
+        if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
+            steps.append(best)
+        hopeless = size > 1 and len(steps[-1].hypothesis) < size
+        if size == max_effects or hopeless or _nothing_left(search, steps[-1]):
+            break
+        front = _grown(search, _abreast(front, steps[-1]))
+    return steps
+
+
+def _nothing_left(search: Search, current: Scored) -> bool:
+    """No further effect could be material: less is left than the share of the noise that it would have to
+    move."""
+    noise = float(np.mean([r.noise_v for r in search.problem.records]))
+    return current.structured_v < MATERIAL_SHARE * noise
+
+
+def _grown(search: Search, parents: list[Scored]) -> list[Scored]:
+    children = [c for p in parents for c in search.grow(p, GROWN_FULLY)]
+    return list({frozenset(c.hypothesis): c for c in children}.values())
+
+
+def _abreast(front: list[Scored], current: Scored) -> list[Scored]:
+    ranked = sorted(front, key=lambda s: -s.evidence)[:ABREAST]
+    if current in front and current not in ranked:
+        ranked = [current, *ranked[:-1]]
+    return ranked
+
+
+def _all_needed(search: Search, child: Scored) -> bool:
+    """Every effect of `child` has to earn its place on top of the others."""
+    for name in child.hypothesis:
+        parent = search.without(child, name)
+        if parent is None or not search.admit(parent, child).admitted:
+            return False
+    return True

@@ -1,0 +1,173 @@
+"""Found, none or unknown: what a finished search allows one to say, and how sure one may be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from aesi.tracer.search import EVIDENCE_NATS, MATERIAL_SHARE, PLACEBO_FACTOR, Scored, Search
+
+Word = Literal["found", "none", "unknown"]
+
+NOISE_SHARE = 0.6
+POLARISATION_SHARE = 0.012
+EXPLAINED_SHARE = 0.08
+"""What may be left beyond white noise and still count as explained: this share of the noise, of the
+polarisation
+(no two solvers of the same equations agree better) and of what there was to explain, added as squares."""
+
+LOOK_ALIKE_NATS = 8.0
+LOOK_ALIKE_SHARE = 0.2
+GROUP_SIZE = 3
+SUFFICIENT_SHARE = 0.6
+"""With an unexplained rest, only effects that took up this share of the structured variance are named."""
+
+TEMPERATURE = 4.0
+"""Evidence is divided by this before it becomes a confidence: the noise model is itself a model."""
+
+TOLERATED_EFFECTS = ("reaction_nonuniformity", "numerical_error")
+"""What the order reduction leaves out: a finding of its own, never a reason to doubt another one."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What may be said.
+
+    effects : ids in the order in which they were added.  groups : look-alikes, each group begins with a
+    member of
+    `effects`.  structured_v, tolerance_v : what is left beyond noise, and how much may be.
+    """
+
+    word: Word
+    effects: tuple[str, ...]
+    groups: tuple[tuple[str, ...], ...]
+    confidence: float
+    structured_v: float
+    tolerance_v: float
+    reason: str
+
+
+def tolerance_v(noise_v: float, polarisation_v: float, structured_before_v: float) -> float:
+    """Root mean square beyond white noise that still counts as explained, V."""
+    parts = (
+        NOISE_SHARE * noise_v,
+        POLARISATION_SHARE * polarisation_v,
+        EXPLAINED_SHARE * structured_before_v,
+    )
+    return float(np.sqrt(sum(p**2 for p in parts)))
+
+
+def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_v: float) -> Verdict:
+    """The verdict on a finished search.
+
+    noise_v : white noise of the sensors, V.  polarisation_v : RMS distance of the voltage from equilibrium,
+    V.
+    """
+    base, chosen = steps[0], steps[-1]
+    allowed = tolerance_v(noise_v, polarisation_v, base.structured_v if len(chosen.hypothesis) else 0.0)
+    left = chosen.structured_v
+    if left > allowed:
+        return _unknown(search, steps, left, allowed)
+    if not chosen.hypothesis:
+        confidence = _sigmoid((EVIDENCE_NATS - _best_rival(search, base)) / TEMPERATURE)
+        reason = (
+            f"{1e3 * left:.2f} mV beyond the noise, {1e3 * allowed:.2f} mV are within what a model may miss"
+        )
+        return Verdict("none", (), (), confidence, left, allowed, reason)
+    groups = look_alikes(search, chosen)
+    reason = f"{1e3 * base.structured_v:.2f} mV beyond the noise before, {1e3 * left:.2f} mV after"
+    return Verdict(
+        "found", chosen.hypothesis, groups, _confidence(search, steps, groups), left, allowed, reason
+    )
+
+
+def _unknown(search: Search, steps: Sequence[Scored], left: float, allowed: float) -> Verdict:
+    base, chosen = steps[0], steps[-1]
+    taken = 1.0 - (left / base.structured_v) ** 2
+    named = chosen.hypothesis if taken >= SUFFICIENT_SHARE else ()
+    groups = look_alikes(search, chosen) if named else ()
+    reason = (
+        f"{1e3 * left:.2f} mV of structured residual are left that no effect of the catalogue explains "
+        f"({1e3 * allowed:.2f} mV would be within what a model may miss)"
+    )
+    confidence = _sigmoid(4.0 * float(np.log(left / allowed)))
+    return Verdict("unknown", named, groups, confidence, left, allowed, reason)
+
+
+def look_alikes(search: Search, chosen: Scored) -> tuple[tuple[str, ...], ...]:
+    """Groups of effects that these data cannot tell apart, at most three in a group."""
+    groups = []
+    for name in chosen.hypothesis:
+        rest = frozenset(chosen.hypothesis) - {name}
+        rivals = []
+        for key, other in search.scored.items():
+            if other is None or len(key) != len(chosen.hypothesis) or not rest < key or name in key:
+                continue
+            if _alike(search, chosen, other, rest):
+                rivals.append((other.evidence, next(iter(key - rest))))
+        rivals.sort(reverse=True)
+        if rivals:
+            groups.append((name, *(r for _, r in rivals[: GROUP_SIZE - 1])))
+    return tuple(groups)
+
+
+def _alike(search: Search, chosen: Scored, other: Scored, rest: frozenset[str]) -> bool:
+    if other.fit.at_bounds:
+        return False
+    parent = search.scored.get(rest)
+    if parent is None:
+        return False
+    noise = float(np.mean([r.noise_v for r in search.problem.records]))
+    worse = other.held_out_rmse_v**2 - chosen.held_out_rmse_v**2
+    gain = parent.held_out_rmse_v**2 - chosen.held_out_rmse_v**2
+    if worse > 0.5 * gain:
+        return False
+    close_in_evidence = chosen.evidence - other.evidence < LOOK_ALIKE_NATS
+    close_in_voltage = worse < (LOOK_ALIKE_SHARE * noise) ** 2
+    return close_in_evidence or close_in_voltage
+
+
+def _best_rival(search: Search, base: Scored) -> float:
+    """Evidence, beyond the base, of the best hypothesis that would also be material."""
+    noise = float(np.mean([r.noise_v for r in search.problem.records]))
+    best = -np.inf
+    for other in search.scored.values():
+        if other is not None and other.hypothesis:
+            gain = base.held_out_rmse_v**2 - other.held_out_rmse_v**2
+            if gain > (0.5 * MATERIAL_SHARE * noise) ** 2:
+                best = max(best, other.evidence - base.evidence)
+    return best
+
+
+def _confidence(search: Search, steps: Sequence[Scored], groups: tuple[tuple[str, ...], ...]) -> float:
+    """How far the chosen hypothesis (with its look-alikes) is ahead of everything else, as a probability."""
+    chosen = steps[-1]
+    twins = {g[0]: set(g) for g in groups}
+    lead = chosen.evidence - steps[0].evidence - EVIDENCE_NATS
+    for other in search.scored.values():
+        if other is None or other is chosen or _covered(chosen.hypothesis, other.hypothesis, twins):
+            continue
+        lead = min(
+            lead,
+            chosen.evidence
+            - other.evidence
+            + EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0),
+        )
+    parent = search.without(chosen, chosen.hypothesis[-1])
+    if parent is not None:
+        admission = search.admit(parent, chosen)
+        over_placebo = admission.gain_v**2 / max(PLACEBO_FACTOR * admission.placebo_v**2, 1e-12)
+        lead = min(lead, 10.0 * float(np.log(max(over_placebo, 1.0))) + TEMPERATURE)
+    return _sigmoid(lead / TEMPERATURE)
+
+
+def _covered(chosen: Sequence[str], other: Sequence[str], twins: dict[str, set[str]]) -> bool:
+    """True where `other` is `chosen` up to look-alikes, perhaps with something more."""
+    return all(any(o in twins.get(c, {c}) for o in other) for c in chosen)
+
+
+def _sigmoid(x: float) -> float:
+    return float(1.0 / (1.0 + np.exp(-np.clip(x, -50.0, 50.0))))
