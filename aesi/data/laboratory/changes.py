@@ -237,6 +237,14 @@ def _plating(parameters: Any, values: Values) -> None:
     _update(parameters, {"Lithium plating kinetic rate constant [m.s-1]": values["rate_m_s"]})
 
 
+def _sizes(parameters: Any, values: Values) -> None:
+    """Log-normal particle radii by area, the declared radius as their mean, in both electrodes."""
+    import pybamm
+
+    spread = {"sd_n": values["negative_spread"], "sd_p": values["positive_spread"]}
+    pybamm.get_size_distribution_parameters(parameters, **spread)
+
+
 CHANGES: dict[str, Change] = {
     change.id: change
     for change in (
@@ -290,6 +298,12 @@ CHANGES: dict[str, Change] = {
         Change("active_material_loss_negative", {"share": 0.05}, alter=_lost_material("Negative")),
         Change("active_material_loss_positive", {"share": 0.05}, alter=_lost_material("Positive")),
         Change("leakage_current", {"leak_a": 0.1}, cell_current=_leak),
+        Change(
+            "particle_size_distribution",
+            {"negative_spread": 0.3, "positive_spread": 0.3},
+            {"particle size": "distribution", "surface form": "algebraic"},
+            _sizes,
+        ),
         Change("lithium_plating", {"rate_m_s": 1e-9}, {"lithium plating": "reversible"}, _plating),
     )
 }

@@ -1,0 +1,11 @@
+"""Labelled measurements with an effect that the declared cell file does not contain.
+
+Made by PyBaMM alone, so that whoever looks for the effect cannot meet its own code. `plan` lists the cases,
+`generate` makes one.
+"""
+
+from aesi.data.blind.case import BlindCase, CaseSpec
+from aesi.data.blind.generate import generate
+from aesi.data.blind.plan import plan, small_plan
+
+__all__ = ["BlindCase", "CaseSpec", "generate", "plan", "small_plan"]

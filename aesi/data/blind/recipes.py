@@ -1,0 +1,220 @@
+"""Effects of the catalogue as this generator makes them, scaled by a magnitude m.
+
+A recipe says what is changed in the laboratory, or on the instrument, at m = 1. Where a model option moves the
+voltage by itself (surface form, size distribution), `reference` is the same option without the effect, and the
+difference of the two runs is what is added to the base run, so that one effect is one effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.data.blind.duty import duty, fast_charge
+from aesi.data.laboratory.simulator import Applied
+from aesi.data.profile import Profile
+from aesi.numerics.typing import Array
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Written:
+    """Channels on their way to the file: time_s, current_a, voltage_v, each (n,)."""
+
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+
+
+def _as_is(written: Written, values: Values) -> Written:
+    return written
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One effect.
+
+    values : magnitude m and capacity in Ah -> values of the laboratory's change, or of the instrument's fault.
+    change : the laboratory's change, or None where the fault is the instrument's.
+    also : answers that data of this kind cannot tell from it.
+    """
+
+    label: str
+    values: Callable[[float, float], dict[str, float]]
+    change: str | None = None
+    reference: Callable[[], Applied] | None = None
+    instrument: Callable[[Written, Values], Written] = _as_is
+    also: tuple[str, ...] = ()
+    most: float = 8.0
+    duty: Callable[[float, float, float, np.random.Generator], Profile] = duty
+    radial_points: int | None = None
+
+
+def _algebraic() -> Applied:
+    return Applied("algebraic_surface")
+
+
+def _one_size() -> Applied:
+    return Applied("particle_size_distribution", {"negative_spread": 0.02, "positive_spread": 0.02})
+
+
+def _gain(written: Written, values: Values) -> Written:
+    return Written(written.time_s, values["gain"] * written.current_a, written.voltage_v)
+
+
+def _current_offset(written: Written, values: Values) -> Written:
+    return Written(written.time_s, written.current_a + values["offset_a"], written.voltage_v)
+
+
+def _voltage_offset(written: Written, values: Values) -> Written:
+    return Written(written.time_s, written.current_a, written.voltage_v + values["offset_v"])
+
+
+def _lag(written: Written, values: Values) -> Written:
+    """The voltage channel lags behind the current channel."""
+    late = np.interp(written.time_s - values["lag_s"], written.time_s, written.voltage_v)
+    return Written(written.time_s, written.current_a, late)
+
+
+def _rate(written: Written, values: Values) -> Written:
+    """The clock runs fast: its seconds are shorter, so that rows a second apart on it lie closer in truth."""
+    true_s = written.time_s / (1 + values["skew"])
+    return Written(
+        written.time_s,
+        np.interp(true_s, written.time_s, written.current_a),
+        np.interp(true_s, written.time_s, written.voltage_v),
+    )
+
+
+RECIPES: dict[str, Recipe] = {
+    "self_heating": Recipe(
+        "self_heating", lambda m, q: {"cooling_w_m2_k": 10.0 / m}, "self_heating", most=40.0
+    ),
+    "colder": Recipe("ambient_temperature", lambda m, q: {"shift_k": -3.0 * m}, "ambient_temperature"),
+    "warmer": Recipe("ambient_temperature", lambda m, q: {"shift_k": 4.0 * m}, "ambient_temperature"),
+    "series_resistance": Recipe(
+        "series_resistance",
+        lambda m, q: {"resistance_ohm": m * 8e-3 / q},
+        "series_resistance",
+        also=("electrolyte_transport",),
+    ),
+    "film_growth": Recipe("film_growth", lambda m, q: {"growth_ohm_ah": m * 0.03 / q**2}, "film_growth"),
+    "ocv_hysteresis": Recipe(
+        "ocv_hysteresis", lambda m, q: {"negative_v": 8e-3 * m, "decay": 50.0}, "ocv_hysteresis"
+    ),
+    "positive_hysteresis": Recipe(
+        "ocv_hysteresis", lambda m, q: {"negative_v": 0.0, "positive_v": 8e-3 * m}, "ocv_hysteresis"
+    ),
+    "positive_ocp": Recipe(
+        "ocp_shape",
+        lambda m, q: {"positive_v": 8e-3 * m, "positive_centre": 0.58, "width": 0.08},
+        "ocp_shape",
+    ),
+    "negative_ocp": Recipe(
+        "ocp_shape",
+        lambda m, q: {"positive_v": 0.0, "negative_v": 8e-3 * m, "negative_centre": 0.6, "width": 0.1},
+        "ocp_shape",
+    ),
+    "double_layer": Recipe(
+        "double_layer",
+        lambda m, q: {"capacity_f_m2": 2.0 * m},
+        "double_layer",
+        _algebraic,
+        most=30.0,
+        also=("clock_skew",),
+    ),
+    "negative_sloped_diffusivity": Recipe(
+        "concentration_dependent_diffusivity",
+        lambda m, q: {"negative_slope": -3.0 * m, "negative_centre": 0.3},
+        "concentration_dependent_diffusivity",
+        also=("solid_diffusivity",),
+        most=3.0,
+    ),
+    "positive_sloped_diffusivity": Recipe(
+        "concentration_dependent_diffusivity",
+        lambda m, q: {"positive_slope": 5.0 * m, "positive_centre": 0.8},
+        "concentration_dependent_diffusivity",
+        also=("solid_diffusivity",),
+        most=3.0,
+    ),
+    "negative_diffusivity": Recipe(
+        "solid_diffusivity", lambda m, q: {"negative_factor": 1.5**-m}, "solid_diffusivity", most=5.0
+    ),
+    "positive_diffusivity": Recipe(
+        "solid_diffusivity", lambda m, q: {"positive_factor": 1.5**-m}, "solid_diffusivity", most=5.0
+    ),
+    "particle_size_distribution": Recipe(
+        "particle_size_distribution",
+        lambda m, q: {"negative_spread": min(0.3 * m, 0.9), "positive_spread": min(0.3 * m, 0.9)},
+        "particle_size_distribution",
+        _one_size,
+        most=3.0,
+        also=("solid_diffusivity", "concentration_dependent_diffusivity"),
+        radial_points=25,
+    ),
+    "poor_electrolyte": Recipe(
+        "electrolyte_transport",
+        lambda m, q: {"conductivity_factor": 1.25**-m, "diffusivity_factor": 1.25**-m},
+        "electrolyte_transport",
+        most=5.0,
+    ),
+    "slow_negative_kinetics": Recipe(
+        "charge_transfer_kinetics", lambda m, q: {"negative_factor": 1.3**-m}, "charge_transfer_kinetics"
+    ),
+    "slow_positive_kinetics": Recipe(
+        "charge_transfer_kinetics", lambda m, q: {"positive_factor": 1.3**-m}, "charge_transfer_kinetics"
+    ),
+    "asymmetric_kinetics": Recipe(
+        "asymmetric_kinetics",
+        lambda m, q: {"negative_alpha": min(0.5 + 0.1 * m, 0.85)},
+        "asymmetric_kinetics",
+        _algebraic,
+        most=3.5,
+    ),
+    "lithium_inventory_loss": Recipe(
+        "lithium_inventory_loss", lambda m, q: {"negative_stoichiometry": 0.02 * m}, "lithium_inventory_loss"
+    ),
+    "active_material_loss_negative": Recipe(
+        "active_material_loss_negative",
+        lambda m, q: {"share": 1 - 0.92**m},
+        "active_material_loss_negative",
+    ),
+    "active_material_loss_positive": Recipe(
+        "active_material_loss_positive",
+        lambda m, q: {"share": 1 - 0.95**m},
+        "active_material_loss_positive",
+    ),
+    "leakage_current": Recipe(
+        "leakage_current",
+        lambda m, q: {"leak_a": 0.006 * m * q},
+        "leakage_current",
+        also=("current_sensor_offset",),
+    ),
+    "lithium_plating": Recipe(
+        "lithium_plating",
+        lambda m, q: {"rate_m_s": 3e-8 * m},
+        "lithium_plating",
+        most=300.0,
+        duty=fast_charge,
+    ),
+    "current_sensor_gain": Recipe(
+        "current_sensor_gain", lambda m, q: {"gain": 1 + 0.03 * m}, instrument=_gain
+    ),
+    "current_sensor_offset": Recipe(
+        "current_sensor_offset",
+        lambda m, q: {"offset_a": 0.006 * m * q},
+        instrument=_current_offset,
+        also=("leakage_current",),
+    ),
+    "voltage_sensor_offset": Recipe(
+        "voltage_sensor_offset",
+        lambda m, q: {"offset_v": 4e-3 * m},
+        instrument=_voltage_offset,
+        also=("ocp_shape",),
+    ),
+    "voltage_lag": Recipe("clock_skew", lambda m, q: {"lag_s": 0.3 * m}, instrument=_lag, most=10.0),
+    "clock_rate": Recipe("clock_skew", lambda m, q: {"skew": 0.02 * m}, instrument=_rate),
+}

@@ -1,0 +1,101 @@
+"""Effects that are in no catalogue: what a finder must call unknown.
+
+Each changes the noise-free voltage by a real, structured amount that no physics of the catalogue has: at magnitude
+m, in millivolts, roughly m times the stated size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.data.laboratory.simulator import Trace
+from aesi.numerics.typing import Array
+
+SECONDS_PER_HOUR = 3600.0
+
+
+@dataclass(frozen=True)
+class Stranger:
+    """shift : trace, capacity in Ah, random generator -> (n,) V added to the voltage at magnitude 1."""
+
+    shift: Callable[[Trace, float, np.random.Generator], Array]
+    also: tuple[str, ...] = ()
+
+
+def _throughput(trace: Trace) -> Array:
+    """(n,) Ah through the cell, either way."""
+    step = 0.5 * (np.abs(trace.current_a[1:]) + np.abs(trace.current_a[:-1])) * np.diff(trace.time_s)
+    return np.concatenate([[0.0], np.cumsum(step)]) / SECONDS_PER_HOUR
+
+
+def _lagged(values: Array, time_s: Array, constant_s: float) -> Array:
+    """First-order lag of (n,) values, straight between rows."""
+    decay = np.exp(-np.diff(time_s) / constant_s)
+    out = np.empty_like(values)
+    out[0] = 0.0
+    for k, factor in enumerate(decay):
+        out[k + 1] = factor * out[k] + (1 - factor) * 0.5 * (values[k] + values[k + 1])
+    return out
+
+
+def _breathing(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+    """Waves of the open-circuit voltage along the charge that went through, whichever way it went."""
+    wave = rng.uniform(0.06, 0.12) * capacity_ah
+    shift: Array = 6e-3 * np.sin(2 * np.pi * _throughput(trace) / wave)
+    return shift
+
+
+def _memory(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+    """Two lags of the current against each other: a first answer that is taken back some minutes later."""
+    rate = trace.current_a / capacity_ah
+    fast = _lagged(rate, trace.time_s, rng.uniform(40, 80))
+    slow = _lagged(rate, trace.time_s, rng.uniform(400, 800))
+    return 0.03 * (slow - fast) * np.sign(slow)
+
+
+def _loose_contact(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+    """A contact that opens a little at random for tens of seconds."""
+    n = len(trace.time_s)
+    bad = np.zeros(n)
+    start = 0
+    while start < n:
+        start += int(rng.exponential(250)) + 1
+        stop = start + int(rng.exponential(60)) + 5
+        bad[start:stop] = rng.uniform(0.5, 1.5)
+        start = stop
+    return -0.03 * bad * trace.current_a / capacity_ah
+
+
+def _wandering(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+    """A reference that wanders with the air of the room, whatever the cell does."""
+    period = rng.uniform(900, 2000)
+    phase = rng.uniform(0, 2 * np.pi)
+    shift: Array = 6e-3 * (np.sin(2 * np.pi * trace.time_s / period + phase) - np.sin(phase))
+    return shift
+
+
+def _uneven_converter(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+    """A converter whose steps are not equal: an error that repeats every tens of millivolts."""
+    pitch = rng.uniform(0.03, 0.05)
+    shift: Array = 6e-3 * np.sin(2 * np.pi * trace.voltage_v / pitch)
+    return shift
+
+
+def _fatigue(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+    """A resistance that grows in the first seconds of every load and forgets at rest, on discharge only."""
+    effort = _lagged(np.maximum(trace.current_a, 0.0) / capacity_ah, trace.time_s, rng.uniform(60, 120))
+    shift: Array = -0.05 * effort * np.maximum(trace.current_a, 0.0) / capacity_ah
+    return shift
+
+
+STRANGERS: dict[str, Stranger] = {
+    "breathing": Stranger(_breathing),
+    "memory": Stranger(_memory),
+    "loose_contact": Stranger(_loose_contact),
+    "wandering": Stranger(_wandering),
+    "uneven_converter": Stranger(_uneven_converter),
+    "fatigue": Stranger(_fatigue),
+}
