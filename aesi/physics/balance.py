@@ -18,6 +18,7 @@ from aesi.errors import SimulationError
 from aesi.physics.cell import Cell
 
 EDGE = 1e-6
+SOC_BEYOND = 0.05
 
 
 def without_lithium(cell: Cell, fraction: float) -> Cell:
@@ -44,6 +45,42 @@ def with_active_material(cell: Cell, negative: float, positive: float) -> Cell:
     q_n, q_p = aged.electrode_capacity_ah(aged.negative), aged.electrode_capacity_ah(aged.positive)
     lithium = q_n * n.theta_max + q_p * p.theta_min
     return _with_windows(aged, (n.theta_max, p.theta_min), _at(aged, lithium, empty))
+
+
+def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
+    """State of charge in the windows of `aged` at which it rests where `declared` rests at `soc`.
+
+    The same number where the windows are the same: an open-circuit potential that is off does not move a state of
+    charge that is known. Beyond both ends of the new windows the nearer end.
+    """
+    if _windows(declared) == _windows(aged):
+        return soc
+    voltage = float(declared.rest_voltage_v(soc)[0])
+
+    def excess(z: float) -> float:
+        return float(aged.rest_voltage_v(z)[0]) - voltage
+
+    low, high = aged_range(aged)
+    if excess(low) >= 0.0:
+        return low
+    if excess(high) <= 0.0:
+        return high
+    return float(brentq(excess, low, high, xtol=1e-13))
+
+
+def aged_range(cell: Cell) -> tuple[float, float]:
+    """States of charge at which both electrodes are within (0, 1), at most 5 % beyond the windows."""
+    low, high = -SOC_BEYOND, 1.0 + SOC_BEYOND
+    n, p = cell.negative, cell.positive
+    span_n, span_p = n.theta_max - n.theta_min, p.theta_max - p.theta_min
+    low = max(low, (EDGE - n.theta_min) / span_n, (p.theta_max - 1.0 + EDGE) / span_p)
+    high = min(high, (1.0 - EDGE - n.theta_min) / span_n, (p.theta_max - EDGE) / span_p)
+    return low, high
+
+
+def _windows(cell: Cell) -> tuple[float, ...]:
+    n, p = cell.negative, cell.positive
+    return n.theta_min, n.theta_max, p.theta_min, p.theta_max
 
 
 def _at(cell: Cell, lithium_ah: float, voltage_v: float) -> tuple[float, float]:

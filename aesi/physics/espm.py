@@ -17,6 +17,7 @@ import numpy as np
 
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
+from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.constants import ZERO_CELSIUS_K
 from aesi.physics.effect import ActiveEffect, Record, Trace
@@ -43,7 +44,8 @@ def simulate(
     """Terminal voltage and states of `cell` under a current.
 
     time_s : (n,) s, strictly increasing, any sampling.  current_a : (n,) A, positive on discharge.
-    soc0 : state of charge at rest before the first sample; None takes it from `rest_voltage_v`.
+    soc0 : state of charge at rest before the first sample, by the declared windows; where an effect moved these,
+    the cell starts from the same rest voltage in the new ones. None takes it from `rest_voltage_v`.
     effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
     temperature_degc : (n,) or one value: the cell's measured temperature; None leaves it to the cell file's
     initial temperature, or to the heat balance where an effect brings one.
@@ -66,6 +68,8 @@ def simulate(
             record = effect.effect.on_record(record, **effect.parameters)
     if soc0 is None:
         soc0 = _soc_from_rest(model, active, rest_voltage_v)
+    else:
+        soc0 = same_rest(cell, model.cell, soc0)
     rows, extra, fault_at, fault = _core(model, record, soc0, hold)
     series = _series(model.cell, rows, time) | extra
     if fault_at >= 0:

@@ -74,12 +74,20 @@ def overpotential(y, exchange, occupancy, g1, g2, g3, log_salt, alpha, thermal):
     return eta, 1.0 / gradient
 
 
+@njit(inline="always", fastmath=FASTMATH)
+def end_weight(z):  # type: ignore[no-untyped-def]
+    """Weight of the end of a step of z time constants, exact for a relaxing exponential: 1/2 at 0, 1 at infinity."""
+    if z < 1e-3:
+        return 0.5 + z / 12.0
+    return 1.0 / (1.0 - math.exp(-min(z, LARGEST_EXPONENT))) - 1.0 / z
+
+
 @njit(cache=True, fastmath=FASTMATH)
 def solve_electrode(  # type: ignore[no-untyped-def]
     lo, hi, regions, side, total, dt, thermal, temperature_rise, kappa, chi,
     region_of, share, exchange, exchange_factor, alpha, capacity, plating, plated,
     theta_pred, give, ocp, entropic, ohm_solid, ohm_salt, salt, log_salt, region_salt,
-    y, theta, delta, region_total, plating_current, work,
+    y, theta, delta, dl_current, region_total, plating_current, work,
 ):  # fmt: skip
     """Currents y[lo:hi] of the units of one electrode; returns Phi.
 
@@ -90,7 +98,8 @@ def solve_electrode(  # type: ignore[no-untyped-def]
     first = side * regions
     potential, slope = work[0], work[1]
     matrix = work[2 : 3 + n, : n + 2]
-    new_delta, gain = work[3 + n], work[4 + n]
+    new_delta, gain, fitted, new_current = work[3 + n], work[4 + n], work[5 + n], work[6 + n]
+    new_current[:] = 0.0
     phi = 0.0
     for step in range(NEWTON_STEPS):
         for r in range(regions):
@@ -120,8 +129,13 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                 new_delta[r] = potential[i]
                 extra, d_extra = 0.0, 0.0
                 if capacity > 0.0 and dt > 0.0:
-                    extra += capacity * (potential[i] - delta[first + r]) / dt
-                    d_extra += capacity / dt
+                    if step == 0:
+                        fitted[r] = end_weight(dt / (capacity * slope[i]))
+                    charging = capacity * (potential[i] - delta[first + r]) / dt
+                    charging = (charging - (1.0 - fitted[r]) * dl_current[first + r]) / fitted[r]
+                    new_current[r] = charging
+                    extra += charging
+                    d_extra += capacity / (dt * fitted[r])
                 if plating[0] > 0.0 and side == 0:
                     up = plating[0] * plated[r] * bounded_exp((1.0 - plating[1]) * potential[i] / thermal)
                     down = (
@@ -167,6 +181,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
         phi += matrix[n, n + 1]
     for r in range(regions):
         delta[first + r] = new_delta[r]
+        dl_current[first + r] = new_current[r]
     return phi
 
 
@@ -225,8 +240,9 @@ def run_general(  # type: ignore[no-untyped-def]
     q, c, forcing, rest = np.zeros(n_e), np.full(m_e, c0), np.zeros(n_e), np.zeros(m_e)
     salt, log_salt, region_salt = np.ones(6 * regions), np.zeros(2 * regions), np.ones(2 * regions)
     deviation, region_total = np.zeros(2 * regions), np.zeros(2 * regions)
-    delta, plated, plating_current = np.zeros(2 * regions), np.zeros(regions), np.zeros(regions)
-    work = np.zeros((n_units + 6, n_units + 3))
+    delta, dl_current = np.zeros(2 * regions), np.zeros(2 * regions)
+    plated, plating_current = np.zeros(regions), np.zeros(regions)
+    work = np.zeros((n_units + 8, n_units + 3))
     keys = np.full(CACHE_SLOTS, -1, dtype=np.int64)
     w = np.zeros((CACHE_SLOTS, n_units, 3, n_modes))
     w_e = np.zeros((CACHE_SLOTS, 3, n_e))
@@ -368,7 +384,7 @@ def run_general(  # type: ignore[no-untyped-def]
                     units[:, 1], share, exchange, math.exp(energies[2 + side] * inverse),
                     alpha[side], capacity[side], plating, plated,
                     pred, give, ocp[side], entropic[side], ohm_solid[side], ohm_salt[side],
-                    salt, log_salt, region_salt, y, theta, delta, region_total, plating_current, work,
+                    salt, log_salt, region_salt, y, theta, delta, dl_current, region_total, plating_current, work,
                 )  # fmt: skip
                 if side == 0:
                     phi_n = phi

@@ -3,7 +3,8 @@
     a = (1 - loss) a_declared        a reactive area per volume, at the declared particle radius
 
 The full cell keeps its stoichiometries (the material goes with the lithium it holds then); empty follows
-from the declared rest voltage and the lithium left; soc0 counts in the new window.
+from the declared rest voltage and the lithium left; a simulation starts from the
+rest voltage that soc0 declares.
 
 Leaves out the change of porosity and conductivity. Holds for isolated or cracked-off particles.
 

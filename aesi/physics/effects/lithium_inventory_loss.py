@@ -3,7 +3,8 @@
     q_n x_n + q_p x_p = Q_Li - loss Q,   U_p(x_p) - U_n(x_n) = V_full, V_empty       q electrode capacities,
     Ah
 
-Stoichiometry windows follow from the declared rest voltages of full and empty; soc0 counts in the new window.
+Stoichiometry windows follow from the declared rest voltages of full and empty; a simulation starts from the
+rest voltage that soc0 declares.
 
 Leaves out the film that consumed the lithium (film_growth). Holds for a cell that still reaches both
 voltages.
