@@ -55,10 +55,10 @@ def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None) -
                 signature=signature,
                 input_example=example,
             )
+        if registered_as:  # resolves the model through the global address, so before that is put back
+            _register(mlflow.MlflowClient(uri, uri), registered_as, run_id, logged)
     finally:
         mlflow.set_tracking_uri(before)
-    if registered_as:
-        _register(mlflow.MlflowClient(uri, uri), registered_as, run_id, logged)
 
 
 def _register(client: MlflowClient, name: str, run_id: str, logged: ModelInfo) -> None:

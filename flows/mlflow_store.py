@@ -6,6 +6,7 @@ passes, and sends an item twice without doubling it.
 
 from __future__ import annotations
 
+import errno
 import os
 import time
 import urllib.error
@@ -23,6 +24,7 @@ PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
 KIND = "aesi.kind"
 REACH_S = 5.0
+PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
 PAGE = 1000
 
 
@@ -97,8 +99,15 @@ class Store:
         }
 
     def away(self, error: Exception) -> bool:
-        """True for a failure that passes: no connection, a server error, a locked database, a full disk."""
-        return _passes(error)
+        """True for a failure that passes: no connection, a locked database, a full disk, a server in trouble."""
+        return _passes(error) or not self._answers()
+
+    def _answers(self) -> bool:
+        try:
+            self.client.search_experiments(max_results=1)
+        except Exception:
+            return False
+        return True
 
     def deliver(self, item: Item, again: bool) -> None:
         """Send an item; `again` says that it may have been sent before."""
@@ -241,17 +250,18 @@ def _without_password(uri: str) -> str:
     return uri.replace(f":{parts.password}@", ":***@") if parts.password else uri
 
 
-def _passes(error: Exception) -> bool:
+def _passes(error: BaseException | None) -> bool:
+    """Whether an error or one of its causes speaks of a connection, a lock or a full disk."""
     import requests
-    from mlflow.exceptions import MlflowException
 
     seen: set[int] = set()
-    cause: BaseException | None = error
-    while cause is not None and id(cause) not in seen:
-        seen.add(id(cause))
-        if isinstance(cause, (OSError, requests.exceptions.RequestException)):
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        if isinstance(error, ConnectionError | TimeoutError | requests.exceptions.RequestException):
             return True
-        cause = cause.__cause__ or cause.__context__
-    if isinstance(error, MlflowException):
-        return error.error_code in ("INTERNAL_ERROR", "TEMPORARILY_UNAVAILABLE", "REQUEST_LIMIT_EXCEEDED")
+        if isinstance(error, OSError) and error.errno in PASSING:
+            return True
+        if "database is locked" in str(error):
+            return True
+        error = error.__cause__ or error.__context__
     return False

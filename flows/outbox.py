@@ -22,6 +22,8 @@ Deliver = Callable[[Item, bool], None]
 
 RETRY_S = (1.0, 2.0, 5.0, 10.0, 20.0)
 REFUSED = "refused"
+TRIES = 3
+"""Failures of one item before a store that answers is taken to refuse it."""
 
 
 class Outbox:
@@ -44,6 +46,7 @@ class Outbox:
         self._wake = threading.Condition()
         self._closing = False
         self._failing_since: float | None = None
+        self._tries = 0
         folder.mkdir(parents=True, exist_ok=True)
         self._old = {path.name for path in self._waiting()}
         self._next = 1 + max((int(path.stem) for path in self._waiting()), default=0)
@@ -114,11 +117,16 @@ class Outbox:
             if self._away(error):
                 self._complain(error)
                 return False
+            self._tries += 1
+            if self._tries < TRIES:
+                return False
+            self._tries = 0
             aside = self._folder / REFUSED / path.name
             aside.parent.mkdir(exist_ok=True)
             path.replace(aside)
             self._say(f"tracking: the store refused an item ({_line(error)}); it is kept in {aside}.")
             return True
+        self._tries = 0
         path.unlink(missing_ok=True)
         if self._failing_since is not None:
             self._failing_since = None
