@@ -1,0 +1,156 @@
+"""Pages made at build time: catalogue of effects, benchmarks, command line, and files of the repository."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[2]
+KINDS = {
+    "physics": "Physics the model lacks",
+    "parameter": "Parameters that may be declared wrongly",
+    "instrument": "Instrument faults that imitate physics",
+}
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Replace `<!-- generated: name -->` by what the generator of that name writes."""
+    for name, write in GENERATORS.items():
+        marker = f"<!-- generated: {name} -->"
+        if marker in markdown:
+            markdown = markdown.replace(marker, write())
+    return markdown
+
+
+def catalogue() -> str:
+    """Every effect of the catalogue, by kind."""
+    from aesi.physics.effects import CATALOGUE
+
+    parts = []
+    for kind, title in KINDS.items():
+        effects = [effect for effect in CATALOGUE.values() if effect.kind == kind]
+        if effects:
+            parts.append(f"## {title}\n")
+            parts += [_effect(effect) for effect in effects]
+    return "\n".join(parts)
+
+
+def _effect(effect: Any) -> str:
+    lines = [f"### {effect.id}\n", f"{effect.summary}.\n", "```text", effect.equation, "```\n"]
+    if effect.validity:
+        lines.append(f"{effect.validity}\n")
+    if effect.source:
+        lines.append(f"Source: {effect.source}\n")
+    if effect.parameters:
+        lines += [
+            "| parameter | unit | typical | range | vanishes at | meaning | range from |",
+            "|---|---|---:|---:|---:|---|---|",
+            *(_parameter(name, parameter) for name, parameter in effect.parameters.items()),
+            "",
+        ]
+    return "\n".join(lines)
+
+
+def _parameter(name: str, parameter: Any) -> str:
+    low, high = parameter.bounds
+    scale = " (log)" if parameter.log else ""
+    neutral = "–" if parameter.neutral is None else f"{parameter.neutral:g}"
+    cells = (
+        f"`{name}`",
+        parameter.unit,
+        f"{parameter.default:g}",
+        f"{low:g} to {high:g}{scale}",
+        neutral,
+        parameter.description,
+        parameter.source,
+    )
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def benchmarks() -> str:
+    """docs/benchmarks.json as tables: the lines that `aesi bench --json` printed, and the machine."""
+    path = ROOT / "docs" / "benchmarks.json"
+    if not path.exists():
+        return "No benchmark has been recorded in this checkout; `aesi bench` runs them."
+    record = json.loads(path.read_text(encoding="utf-8"))
+    lines = [f"Measured on {record['machine']}, {record['date']}, with `{record['command']}`.\n"]
+    by_name: dict[str, list[dict[str, Any]]] = {}
+    for line in record["lines"]:
+        by_name.setdefault(line["bench"], []).append(line)
+    for name, rows in by_name.items():
+        lines += [f"## {name}\n", _table(rows)]
+    return "\n".join(lines)
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    """Few values stand below each other; several lines of one benchmark become rows."""
+    keys = list(dict.fromkeys(key for row in rows for key in row if key != "bench"))
+    if len(rows) == 1:
+        body = [f"| {key} | {_cell(rows[0][key])} |" for key in keys]
+        return "\n".join(["| figure | value |", "|---|---:|", *body, ""])
+    body = ["| " + " | ".join(_cell(row.get(key)) for key in keys) + " |" for row in rows]
+    return "\n".join(["| " + " | ".join(keys) + " |", "|" + "---|" * len(keys), *body, ""])
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, dict | list):
+        return f"`{json.dumps(value)}`"
+    return str(value).replace("|", "\\|")
+
+
+def command_line() -> str:
+    """`--help` of every command."""
+    from typer.main import get_command
+
+    from flows.cli import app
+
+    root: Any = get_command(app)
+    parts = []
+    for name, command in _commands(root, "aesi"):
+        context = command.make_context(name, [], resilient_parsing=True)
+        parts += [f"## {name}\n", "```text", command.get_help(context), "```\n"]
+    return "\n".join(parts)
+
+
+def _commands(group: Any, prefix: str) -> list[tuple[str, Any]]:
+    found = []
+    for name, command in group.commands.items():
+        if hasattr(command, "commands"):
+            found += _commands(command, f"{prefix} {name}")
+        else:
+            found.append((f"{prefix} {name}", command))
+    return found
+
+
+def contributing() -> str:
+    """CONTRIBUTING.md of the repository, with its links as the site has them."""
+    return _from_root("CONTRIBUTING.md")
+
+
+def changelog() -> str:
+    """CHANGELOG.md of the repository."""
+    return _from_root("CHANGELOG.md")
+
+
+def _from_root(name: str) -> str:
+    text = (ROOT / name).read_text(encoding="utf-8")
+    return text.replace("](docs/", "](").replace("](CHANGELOG.md)", "](changelog.md)")
+
+
+GENERATORS: dict[str, Callable[[], str]] = {
+    "catalogue": catalogue,
+    "benchmarks": benchmarks,
+    "command line": command_line,
+    "contributing": contributing,
+    "changelog": changelog,
+}
+
+if str(ROOT) not in sys.path:  # mkdocs imports a hook by its path
+    sys.path.insert(0, str(ROOT))

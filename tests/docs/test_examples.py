@@ -1,0 +1,133 @@
+"""Every Python and console block of the README and the documentation, run in the order of its page.
+
+A page runs in one working folder and one namespace. Jobs that take minutes run as smaller ones of the same
+kind; nothing else about the text is changed.
+"""
+
+import contextlib
+import doctest
+import io
+import os
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+STAND_INS = {
+    "aesi run experiments/virtual_30ah.yaml": "aesi run experiments/smoke.yaml --set name=virtual_30ah",
+    "aesi run experiments/measured_nmc_drive.yaml": "aesi run experiments/measured_nmc_drive.yaml "
+    "--set search.candidates=4 --set search.resamples=10 --set library.d=[1,2]",
+}
+"""A job of minutes -> one of the same kind that takes seconds."""
+
+SECONDS = 600
+
+
+def _load_blocks():
+    spec = spec_from_file_location("blocks", Path(__file__).with_name("blocks.py"))
+    module = module_from_spec(spec)
+    sys.modules["blocks"] = module
+    spec.loader.exec_module(module)
+    return module.blocks
+
+
+blocks = _load_blocks()
+
+
+@pytest.fixture
+def workspace(tmp_path, monkeypatch):
+    """A folder that looks like a checkout to relative paths, with its own tracking store."""
+    for name in ("experiments", "docs"):
+        (tmp_path / name).symlink_to(ROOT / name)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("AESI_HOME", str(tmp_path))
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    return tmp_path
+
+
+def _tested(page, slow):
+    found = [block for block in blocks(page) if block.is_tested]
+    return any("slow" in block.directives for block in found) if slow else bool(found)
+
+
+def _name(page):
+    return str(page.relative_to(ROOT))
+
+
+@pytest.mark.parametrize("page", [p for p in PAGES if p.exists() and _tested(p, False)], ids=_name)
+def test_the_quick_examples_of_a_page_run(page, workspace, request):
+    _run_page(page, request, slow=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in PAGES if p.exists() and _tested(p, True)], ids=_name)
+def test_all_examples_of_a_page_run(page, workspace, request):
+    _run_page(page, request, slow=True)
+
+
+def _run_page(page, request, slow):
+    namespace = {"__name__": "__main__"}
+    for block in blocks(page):
+        if not block.is_tested or "skip" in block.directives or ("slow" in block.directives and not slow):
+            continue
+        if "needs" in block.directives:
+            _require(request, block.directives["needs"])
+        where = f"{_name(page)}, line {block.line}"
+        if "file" in block.directives:
+            target = Path(block.directives["file"])
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(block.body, encoding="utf-8")
+        elif block.language == "python":
+            _run_python(block.body, where, namespace)
+        else:
+            _run_console(block.body, where)
+
+
+def _require(request, data_set):
+    folder = request.getfixturevalue("shared_data")
+    if not (folder / "measured" / data_set).is_dir():
+        pytest.skip(f"{data_set} is not on this machine")
+    request.getfixturevalue("monkeypatch").setenv("AESI_DATA", str(folder))
+
+
+def _run_python(body, where, namespace):
+    """Plain code is executed; a session with prompts is compared with what it shows."""
+    if not body.startswith(">>> "):
+        with contextlib.redirect_stdout(io.StringIO()):
+            exec(compile(body, where, "exec"), namespace)
+        return
+    test = doctest.DocTestParser().get_doctest(body, namespace, where, where, 0)
+    said = io.StringIO()
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert runner.run(test, out=said.write, clear_globs=False).failed == 0, said.getvalue()
+    namespace.update(test.globs)
+
+
+def _run_console(body, where):
+    for command, shown in _session(body):
+        for long, short in STAND_INS.items():
+            command = command.replace(long, short)
+        done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=SECONDS)
+        assert done.returncode == 0, f"{where}: {command}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
+        if shown:
+            matches = doctest.OutputChecker().check_output(
+                shown, done.stdout, doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+            )
+            assert matches, f"{where}: {command}\nsays\n{done.stdout}\nnot\n{shown}"
+
+
+def _session(body):
+    """Commands (after `$ `, continued by a backslash) with the output shown below each."""
+    pairs = []
+    lines = iter(body.replace("\\\n", "").splitlines())
+    for line in lines:
+        if line.startswith("$ "):
+            pairs.append([line[2:], ""])
+        else:
+            pairs[-1][1] += line + "\n"
+    return [(command, shown) for command, shown in pairs]

@@ -1,0 +1,89 @@
+"""The documentation as a site: it builds without a warning, and its generated parts follow the code."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def hook(name):
+    spec = spec_from_file_location(f"docs_{name}", ROOT / "docs" / "hooks" / f"{name}.py")
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_effect_is_in_the_catalogue_page_with_its_parameters():
+    from aesi.physics.effects import CATALOGUE
+
+    page = hook("generate").catalogue()
+    for effect in CATALOGUE.values():
+        assert f"### {effect.id}\n" in page
+        for name in effect.parameters:
+            assert f"| `{name}` |" in page
+
+
+def test_every_command_is_on_the_command_line_page():
+    page = hook("generate").command_line()
+    commands = (
+        "run",
+        "discover",
+        "calibrate",
+        "simulate",
+        "predict",
+        "tables",
+        "effects",
+        "data list",
+        "data get",
+    )
+    for command in (*commands, "worker", "ui", "bench"):
+        assert f"## aesi {command}\n" in page
+
+
+def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
+    generate = hook("generate")
+    (tmp_path / "docs").mkdir()
+    monkeypatch.setattr(generate, "ROOT", tmp_path)
+    assert "No benchmark has been recorded" in generate.benchmarks()
+    record = {
+        "machine": "a machine",
+        "date": "2026-01-01",
+        "command": "aesi bench x --json",
+        "lines": [{"bench": "x", "ours_s": 0.123456, "peer": "p", "peer_s": None}],
+    }
+    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps(record))
+    page = generate.benchmarks()
+    assert "a machine" in page
+    assert "| ours_s | 0.1235 |" in page
+    assert "| peer_s | – |" in page
+
+
+def test_formulas_become_mathml_and_code_is_left_alone():
+    change = hook("formulas").on_page_markdown
+    assert "<math" in change("an $x_1$ here")
+    assert change("`$x$` and\n```\n$ aesi run $HOME\n```\n") == "`$x$` and\n```\n$ aesi run $HOME\n```\n"
+    assert change("costs 5$ or 6$") == "costs 5$ or 6$"
+
+
+def test_pages_refer_to_files_that_exist():
+    for page in [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]:
+        for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", page.read_text(encoding="utf-8")):
+            assert (ROOT / target).exists(), f"{page.name} refers to {target}"
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning(tmp_path):
+    if shutil.which("mkdocs", path=str(Path(sys.executable).parent)) is None:
+        pytest.skip("the documentation's own packages are not installed")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr[-4000:]
+    html = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
+    assert "fonts.googleapis" not in html
