@@ -24,20 +24,27 @@ class RawBand:
 class Band(ABC):
     """A fitted rule from the past to a raw band.
 
-    `batch` and `row` must agree: row k of `batch(residuals)` is `row(residuals[:k])`, as far back as the
-    last missing residual and as the window reaches.
+    `batch` and `row` must agree: row k of `batch(residuals, current)` is
+    `row(residuals[:k], current[k - 3 : k + 1])`, the residuals as far back as the last missing one and as the
+    window reaches.
     """
 
     kind: ClassVar[str]
 
-    @abstractmethod
-    def batch(self, residuals: Array) -> RawBand:
-        """The band of every sample of a record, (n,) V, from the samples before it; NaN is missing."""
+    @property
+    def needs_current(self) -> bool:
+        """Whether the current is one of its inputs."""
+        return False
 
     @abstractmethod
-    def row(self, past: Array) -> tuple[float, float] | None:
+    def batch(self, residuals: Array, current_a: Array | None) -> RawBand:
+        """The band of every sample of a record, (n,) V, from the residuals before it (NaN is missing) and the
+        current (n,) A up to and at it; None where the band does not need it."""
+
+    @abstractmethod
+    def row(self, past: Array, recent_current: Array) -> tuple[float, float] | None:
         """The band after `past`: the finite residuals since the last missing one, at most the window,
-        most recent last. None where there are too few."""
+        most recent last. recent_current : A, the coming sample's at the end. None where `past` is too short."""
 
     @abstractmethod
     def to_state(self) -> State:

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from aesi.conformal.band import State
-from aesi.conformal.regression import QuantileModel
+from aesi.conformal.regression import FitTask, QuantileModel
 from aesi.numerics.trees import Splits, flatten, forest_quantiles
 from aesi.numerics.typing import Array
 
@@ -55,17 +55,17 @@ class ForestQuantiles(QuantileModel):
     kind: ClassVar[str] = "forest"
 
     @classmethod
-    def fit(cls, rows: Array, targets: Array, levels: Array, rng: np.random.Generator, **forest: Any) -> Self:
-        """rows (n, p), targets (n,) V; `forest` goes to RandomForestQuantileRegressor."""
+    def fit(cls, task: FitTask, **forest: Any) -> Self:
+        """`forest` goes to RandomForestQuantileRegressor."""
         from quantile_forest import RandomForestQuantileRegressor
 
         regressor = RandomForestQuantileRegressor(
-            max_samples_leaf=None, random_state=int(rng.integers(2**31)), **forest
+            max_samples_leaf=None, random_state=int(task.rng.integers(2**31)), **forest
         )
-        regressor.fit(rows, targets)
+        regressor.fit(task.rows, task.targets)
         splits = flatten(regressor.estimators_)
-        grid = _grid(targets)
-        return cls(levels, grid, _leaf_distributions(regressor, splits, targets, grid), splits)
+        grid = _grid(task.targets)
+        return cls(task.levels, grid, _leaf_distributions(regressor, splits, task.targets, grid), splits)
 
     def quantiles(self, rows: Array) -> Array:
         out = np.empty((len(rows), self.levels.size))

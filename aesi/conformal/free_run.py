@@ -102,7 +102,9 @@ class FreeRunBands:
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time."""
-        return _symmetric(self._half_widths(np.full(n, float(horizon_s)), _columns(current_a, soc, dt_s)))
+        return _symmetric(
+            self._half_widths(np.full(n, horizon_s, dtype=np.float64), _columns(current_a, soc, dt_s))
+        )
 
     def along(
         self, n: int, dt_s: float, current_a: Array | None = None, soc: Array | None = None

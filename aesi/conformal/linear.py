@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from aesi.conformal.band import State
-from aesi.conformal.regression import QuantileModel
+from aesi.conformal.regression import FitTask, QuantileModel
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array
 
@@ -40,10 +40,11 @@ class LinearQuantiles(QuantileModel):
     kind: ClassVar[str] = "linear"
 
     @classmethod
-    def fit(cls, rows: Array, targets: Array, weights: Array, levels: Array) -> Self:
-        """rows (n, p), targets (n,) V, weights (n,) > 0 (one over the local scale), levels (2 B,)."""
-        design = np.column_stack([np.ones(len(rows)), rows]) * weights[:, None]
-        coefficients = fit_quantiles(design, targets * weights, levels)
+    def fit(cls, task: FitTask) -> Self:
+        """Rows weigh by one over their local scale, so that one smoothing width suits quiet and busy times."""
+        weights = 1 / (local_scale(task) + task.floor_v)
+        design = np.column_stack([np.ones(len(task.rows)), task.rows]) * weights[:, None]
+        coefficients = fit_quantiles(design, task.targets * weights, task.levels)
         return cls(coefficients[0].copy(), np.ascontiguousarray(coefficients[1:]))
 
     def quantiles(self, rows: Array) -> Array:
@@ -57,3 +58,8 @@ class LinearQuantiles(QuantileModel):
     @classmethod
     def from_state(cls, state: State) -> Self:
         return cls(np.asarray(state["intercept"], dtype=float), np.asarray(state["slope"], dtype=float))
+
+
+def local_scale(task: FitTask) -> Array:
+    """(n,) V: mean absolute value of the history's features, a causal scale that makes rows comparable."""
+    return np.asarray(np.mean(np.abs(task.rows[:, : task.n_history]), axis=1))

@@ -21,11 +21,11 @@ class FixedBand(Band):
     high: float
     kind: ClassVar[str] = "fixed"
 
-    def batch(self, residuals: Array) -> RawBand:
+    def batch(self, residuals: Array, current_a: Array | None) -> RawBand:
         n = len(residuals)
         return RawBand(np.full(n, self.low), np.full(n, self.high), np.ones(n, dtype=bool))
 
-    def row(self, past: Array) -> tuple[float, float] | None:
+    def row(self, past: Array, recent_current: Array) -> tuple[float, float] | None:
         return self.low, self.high
 
     def to_state(self) -> State:
@@ -70,7 +70,7 @@ class RollingBand(Band):
     levels: Array
     kind: ClassVar[str] = "rolling"
 
-    def batch(self, residuals: Array) -> RawBand:
+    def batch(self, residuals: Array, current_a: Array | None) -> RawBand:
         quantiles = np.zeros((len(residuals), len(self.levels)))
         ready = np.zeros(len(residuals), dtype=bool)
         _rolling(residuals, self.window, self.needed, self.levels, quantiles, ready)
@@ -78,7 +78,7 @@ class RollingBand(Band):
         narrowest(quantiles, low, high)
         return RawBand(low, high, ready)
 
-    def row(self, past: Array) -> tuple[float, float] | None:
+    def row(self, past: Array, recent_current: Array) -> tuple[float, float] | None:
         if len(past) < self.needed:
             return None
         quantiles = np.empty((1, len(self.levels)))

@@ -1,11 +1,12 @@
 """The adaptive step: widen after a miss, narrow after a hit.
 
-    r[k+1] = r[k] exp(rate (1[e[k] outside the band] - alpha))                                     (1)
+    r_g <- r_g exp((rate [g is the sample's group] + shared rate) (1[e outside the band] - alpha))       (1)
 
-r multiplies the half-width of the raw band about its middle. Whatever the residuals do, the share of misses
-over n steps is within |log r[n] - log r[0]| / (rate n) of alpha: a long-run guarantee without assumptions.
-The rate trades speed against jitter: after a sudden rise of the error by a factor f the band has caught up
-after about log(f) / (rate (1 - alpha)) misses. rate = 0 leaves the calibrated band as it is.
+r_g multiplies the half-width of the raw band about its middle; a group is a range of the current, so that
+coverage is held within each, not just on average. Whatever the residuals do, the share of misses over n steps
+is within |log r[n] - log r[0]| / (rate n) of alpha (for one group): a long-run guarantee without assumptions.
+The rate trades speed against jitter: after a rise of the error by a factor f the band has caught up after
+about log(f) / rate misses. rate = 0 leaves the calibrated band as it is.
 
 This is quantile tracking on the logarithm of the score |e - middle| / half-width, which keeps every width
 positive. Gibbs & Candes, NeurIPS 2021 (adaptive conformal inference); Angelopoulos, Candes & Tibshirani,
@@ -17,18 +18,22 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 
+SHARED = 0.4
+"""Part of the rate with which a miss in one group moves all: a cell that drifts does so at every current."""
 LOG_RATIO_LIMIT = 7.0
 """|log r| is held below this (a factor of 1,100): a sensor that is stuck for hours must not drive r to zero
 or infinity, from where it would take as long to come back."""
 
 
 @njit(cache=True)
-def next_log_ratio(log_ratio: float, missed: bool, rate: float, alpha: float) -> float:
-    """Equation (1), one step."""
-    moved = log_ratio + rate * ((1.0 if missed else 0.0) - alpha)
-    return min(max(moved, -LOG_RATIO_LIMIT), LOG_RATIO_LIMIT)
+def move(log_ratio: Array, group: int, missed: bool, rate: float, alpha: float) -> None:
+    """Equation (1), one step, in place; log_ratio : (n_groups,)."""
+    step = rate * ((1.0 if missed else 0.0) - alpha)
+    for g in range(log_ratio.size):
+        moved = log_ratio[g] + SHARED * step + (step if g == group else 0.0)
+        log_ratio[g] = min(max(moved, -LOG_RATIO_LIMIT), LOG_RATIO_LIMIT)
 
 
 @njit(cache=True)
@@ -46,17 +51,21 @@ def replay(
     high: Array,
     ready: BoolArray,
     residuals: Array,
-    start: float,
+    groups: IntArray,
+    start: Array,
     rate: float,
     alpha: float,
     floor: float,
 ) -> None:
-    """Scale the raw bands in place along a record; a row that is not ready keeps its band."""
-    log_ratio = start
+    """Scale the raw bands in place along a record; a row that is not ready keeps its band.
+
+    low, high, residuals : (n,) V.  groups : (n,).  start : (n_groups,) log r at the first sample.
+    """
+    log_ratio = start.copy()
     for k in range(low.size):
         if not ready[k]:
             continue
-        low[k], high[k] = scaled(low[k], high[k], log_ratio, floor)
+        low[k], high[k] = scaled(low[k], high[k], log_ratio[groups[k]], floor)
         if rate > 0 and np.isfinite(residuals[k]):
             missed = residuals[k] < low[k] or residuals[k] > high[k]
-            log_ratio = next_log_ratio(log_ratio, missed, rate, alpha)
+            move(log_ratio, groups[k], missed, rate, alpha)

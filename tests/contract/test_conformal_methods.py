@@ -58,6 +58,66 @@ def test_the_stream_gives_the_intervals_of_the_replay(calibrated: Calibrated) ->
     np.testing.assert_array_equal(high, replay.upper_v)
 
 
+@pytest.fixture(scope="module", params=sorted(METHODS))
+def driven(request: pytest.FixtureRequest) -> Calibrated:
+    pairs = [driven_series(3000, seed) for seed in (1, 2)]
+    errors, currents = zip(*pairs, strict=True)
+    return METHODS[request.param].fit(errors, window=WINDOW, current_a=currents)
+
+
+def driven_series(n: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """(residual, current): noise that is ten times larger just after the current has jumped."""
+    rng = np.random.default_rng(seed)
+    current = np.repeat(rng.choice([0.0, 2.0, 5.0], n // 5), 5)
+    jump = np.abs(np.diff(current, prepend=current[0])) > 0
+    return 1e-4 * np.where(jump, 10.0, 1.0) * rng.standard_normal(n), current
+
+
+def test_the_stream_gives_the_intervals_of_the_replay_with_current(driven: Calibrated) -> None:
+    record, current = driven_series(500, 5)
+    record[[0, 100, 300, 301]] = np.nan
+    replay = driven.intervals(record, current)
+    stream = driven.stream()
+    bounds = []
+    for error, now in zip(record, current, strict=True):
+        bounds.append(stream.interval(float(now)))
+        stream.update(float(error))
+    low, high = np.array(bounds).T
+    np.testing.assert_array_equal(low, replay.lower_v)
+    np.testing.assert_array_equal(high, replay.upper_v)
+
+
+def test_a_current_that_was_calibrated_with_is_asked_for(driven: Calibrated) -> None:
+    record, current = driven_series(50, 6)
+    if not driven.needs_current:
+        np.testing.assert_array_equal(
+            driven.intervals(record, current).lower_v, driven.intervals(record).lower_v
+        )
+        return
+    with pytest.raises(InputError, match="give current_a"):
+        driven.intervals(record)
+    with pytest.raises(InputError, match="interval\\(current_a\\)"):
+        driven.stream().interval()
+    with pytest.raises(InputError, match="interval\\(current_a\\)"):
+        driven.stream().update(1e-4)
+    current[7] = np.nan
+    with pytest.raises(InputError, match="sample 7"):
+        driven.intervals(record, current)
+    with pytest.raises(InputError, match="shape"):
+        driven.intervals(record, current[:5])
+
+
+def test_a_known_current_widens_the_band_where_it_jumps(driven: Calibrated) -> None:
+    record, current = driven_series(2000, 7)
+    replay = driven.intervals(record, current)
+    jump = np.abs(np.diff(current, prepend=current[0])) > 0
+    ratio = replay.width_v[jump].mean() / replay.width_v[~jump].mean()
+    if driven.needs_current:
+        assert ratio > 4
+    else:
+        assert ratio < 2  # it cannot know
+
+
 def test_survives_a_file_without_pickle(calibrated: Calibrated) -> None:
     state = calibrated.to_dict()
     arrays: dict[str, np.ndarray] = {}
@@ -110,7 +170,7 @@ def test_a_missing_residual_brings_back_the_marginal_interval(calibrated: Calibr
     replay = calibrated.intervals(record)
     assert np.all(np.isfinite(replay.width_v))
     assert not replay.covers(record)[200]
-    if calibrated.method != "split":
+    if calibrated.method not in ("split", "aci"):
         assert not replay.warm[201]
         assert (replay.lower_v[201], replay.upper_v[201]) == calibrated.marginal_v
         assert replay.warm[201 + WINDOW :].all()
