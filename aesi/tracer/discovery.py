@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,14 +13,14 @@ from aesi.errors import DataError
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
-from aesi.records import Measurement, Run
+from aesi.records import Hold, Measurement, Run
 from aesi.tracer.candidates import Candidate, ranking
 from aesi.tracer.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.explain import Explained, explain
 from aesi.tracer.fit import Fit, fit_hypothesis
 from aesi.tracer.knobs import SOC0
 from aesi.tracer.outcome import FileOutcome, States, outcomes, polarisation_v, simulated, test_rmse_v
-from aesi.tracer.problem import Problem
+from aesi.tracer.problem import TOLERANCES, Problem
 from aesi.tracer.records import Record, noise_floor_v, prepare, prepare_all
 from aesi.tracer.search import Admission, Archive, Scored, Search, context_of, select
 from aesi.tracer.tell_apart import experiment
@@ -41,7 +41,8 @@ class Discovery:
 
     model_effects : what `after` simulates with: the effects found, and the tolerated parameters where they
     settled.
-    soc0 : of the first record, fitted.  files : errors by file and part.  explained_before/after : what the
+    soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
+    part.  explained_before/after : what the
     residual
     depends on.  experiments : group of look-alikes -> what would tell them apart.
     """
@@ -55,11 +56,12 @@ class Discovery:
     explained_after: Explained
     model_effects: tuple[ActiveEffect, ...]
     soc0: float
+    hold: Hold
+    effects: Mapping[str, Effect]
     experiments: tuple[tuple[tuple[str, ...], str], ...]
     notes: tuple[str, ...] = ()
     seconds: float = 0.0
     simulations: int = 0
-    settings: Mapping[str, object] = field(default_factory=dict)
 
 
 def discover(
@@ -72,6 +74,7 @@ def discover(
     max_effects: int = 3,
     seed: int = 0,
     effects: Mapping[str, Effect] = CATALOGUE,
+    given: Sequence[ActiveEffect] = (),
     archive: Path | None = None,
     progress: Progress | None = None,
 ) -> Discovery:
@@ -80,7 +83,8 @@ def discover(
     measurements : what may be looked at, less the last `holdout` share of each where no `tests` are given.
     tests : files that choose nothing.  soc0 : state of charge at the first sample; None takes it from the
     rest voltage.
-    effects : what may be tried.  archive : a file that keeps fits, so that an interrupted search resumes.
+    effects : what may be tried.  given : effects that the declared model has already.  archive : a file that
+    keeps fits, so that an interrupted search resumes.
 
     Raises DataError where the data cannot decide anything or do not belong to the cell.
     """
@@ -93,8 +97,9 @@ def discover(
     for record in records:
         check_record(cell, record)
     tested = tuple(prepare(cell, data, soc0, 0.0) for data in tests)
-    tried = {name: effect for name, effect in effects.items() if name != NUMERICS}
-    problem = _refined(Problem(cell, records, tried), effects.get(NUMERICS))
+    there = {active.id for active in given} - set(TOLERANCES)
+    tried = {name: effect for name, effect in effects.items() if name != NUMERICS and name not in there}
+    problem = _refined(Problem(cell, records, tried, fixed=tuple(given)), effects.get(NUMERICS))
     _check_cells(problem, tested)
     problem = _with_noise_of_residual(problem)
     search = Search(problem, np.random.default_rng(seed), Archive(archive, context_of(problem)))
@@ -114,11 +119,11 @@ def _refined(problem: Problem, numerics: Effect | None) -> Problem:
     all."""
     if numerics is None:
         return problem
-    finer = (numerics.activate(),)
+    finer = (*problem.fixed, numerics.activate())
     moved, noise = [], _noise_v(problem)
     for record in problem.records:
         seen = record.thin.take(slice(0, record.n_fit))
-        coarse = problem.voltage(seen, record.soc0, (), record.hold)
+        coarse = problem.voltage(seen, record.soc0, problem.fixed, record.hold)
         moved.append(problem.voltage(seen, record.soc0, finer, record.hold) - coarse)
     shift = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
     return replace(problem, fixed=finer) if shift > NUMERICS_SHARE * noise else problem
@@ -172,6 +177,8 @@ def _told(
         explained_after=_explained(problem, chosen.fit),
         model_effects=problem.active(values),
         soc0=values[SOC0]["0"],
+        hold=problem.records[0].hold,
+        effects=problem.effects,
         experiments=tuple((g, experiment(g, kinds)) for g in verdict.groups),
         notes=tuple(n for r in (*problem.records, *tested) for n in r.notes) + tuple(search.notes),
         seconds=seconds,
