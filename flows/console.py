@@ -37,6 +37,20 @@ class Console:
             self._close()
         sys.stderr.flush()
 
+    def count(self, what: str, done: int, started_s: float, note: str = "") -> None:
+        """Progress of work whose end is not known beforehand."""
+        now = time.monotonic()
+        if not self._moving and now - self._last_s < self._every_s:
+            return
+        self._last_s = now
+        line = f"  {what}: {done} in {duration(now - started_s)}{f', {note}' if note else ''}"
+        if self._moving:
+            sys.stderr.write(f"\r\x1b[2K{line[:110]}")
+            self._open_line = True
+            sys.stderr.flush()
+        else:
+            print(line, file=sys.stderr, flush=True)
+
     def _close(self) -> None:
         if self._open_line:
             sys.stderr.write("\n")

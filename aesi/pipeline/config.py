@@ -103,7 +103,8 @@ class DataConfig(Section):
 
 
 class CellConfig(Section):
-    """The cell: a BPX file, or `catalogue` for the one that belongs to the data set.
+    """The cell: a BPX file, a folder of a saved model (its cell and effects), or `catalogue` for the one that
+    belongs to the data set.
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
     effects : id -> parameters, effects added to the declared cell.
@@ -196,12 +197,15 @@ class RunnerConfig(Section):
 
 
 class DiscoverConfig(Section):
-    """What `aesi discover` needs beyond cell and data: files by role, or one record and a holdout share."""
+    """What `aesi discover` needs beyond cell and data.
+
+    fit, test : names of records (kind: virtual has them by role).  until_s : what comes later is left out.
+    holdout : the last share of each record, kept back where there are no test records.
+    """
 
     fit: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
-    fit_until_s: Positive | None = None
-    test_until_s: Positive | None = None
+    until_s: Positive | None = None
     holdout: Share = 0.3
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
 

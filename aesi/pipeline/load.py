@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from aesi.errors import ConfigError, DataError
 from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
 from aesi.pipeline.config import DataConfig, ExperimentConfig, RepeatsConfig
 from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run, Split
+
+if TYPE_CHECKING:
+    from aesi.data.virtual import Experiment
 
 REST_C_RATE = 0.02
 """A first current below this C-rate counts as rest, and the first voltage as a rest voltage."""
@@ -117,10 +120,10 @@ def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
 
 
 def _load(config: ExperimentConfig) -> Loaded:
-    cell_path = _cell_path(config)
-    cell = Cell.from_bpx(cell_path)
-    effects = _effects(config)
-    sources = _virtual(config, cell_path) if config.data.kind == "virtual" else _sources(config)
+    path = cell_path(config)
+    cell, given = declared(path)
+    effects = (*given, *_effects(config))
+    sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
     series: dict[str, ErrorSeries] = {}
     soc0: dict[str, float] = {}
     notes: list[str] = []
@@ -135,7 +138,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         series[name] = error_series(even, run, config.data.dt_s)
     return Loaded(
         cell=cell,
-        cell_name=cell_path.stem,
+        cell_name=path.stem,
         effects=effects,
         split=_split(config.data, series, sources.roles),
         soc0=soc0,
@@ -154,7 +157,7 @@ class _Sources:
 
 def _sources(config: ExperimentConfig) -> _Sources:
     data = config.data
-    where = _locator(config)
+    where = locator(config)
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
@@ -164,13 +167,18 @@ def _sources(config: ExperimentConfig) -> _Sources:
     return _Sources(records, roles)
 
 
-def _virtual(config: ExperimentConfig, cell_path: Path) -> _Sources:
+def virtual_experiment(config: ExperimentConfig, cell: Path) -> Experiment:
+    """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
     from aesi.data.virtual import DEFAULT_MIX, Laboratory, paper_experiment
 
     wanted = config.data.virtual
     effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
-    laboratory = Laboratory(cell_path, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
-    experiment = paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c)
+    laboratory = Laboratory(cell, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
+    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c)
+
+
+def _virtual(config: ExperimentConfig, cell: Path) -> _Sources:
+    experiment = virtual_experiment(config, cell)
     measurements: dict[Role, tuple[Measurement, ...]] = {role: getattr(experiment, role) for role in ROLES}
     return _Sources(
         records={m.name: (m, experiment.soc0[m.name]) for role in ROLES for m in measurements[role]},
@@ -194,7 +202,18 @@ def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
     return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
 
 
-def _cell_path(config: ExperimentConfig) -> Path:
+def declared(path: Path) -> tuple[Cell, tuple[ActiveEffect, ...]]:
+    """The cell of a BPX file, or cell and effects of a saved model's folder."""
+    if not path.is_dir():
+        return Cell.from_bpx(path), ()
+    from aesi.pipeline.hybrid import HybridModel
+
+    model = HybridModel.load(path)
+    return model.cell, model.effects
+
+
+def cell_path(config: ExperimentConfig) -> Path:
+    """The BPX file of the experiment's cell. Raises ConfigError or DataError where there is none."""
     if config.cell.bpx != "catalogue":
         return config.path(config.cell.bpx)
     from aesi.data.catalogue import locate
@@ -204,7 +223,8 @@ def _cell_path(config: ExperimentConfig) -> Path:
     return locate(config.data.set, "cell.bpx.json")
 
 
-def _locator(config: ExperimentConfig) -> Callable[[str], Path]:
+def locator(config: ExperimentConfig) -> Callable[[str], Path]:
+    """Finds the file of a record by its name in the experiment."""
     if config.data.kind == "files":
         return config.path
     from aesi.data.catalogue import locate

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from aesi.errors import InputError
 from flows.commands import options
 
 
@@ -82,9 +83,18 @@ def calibrate(
 
 
 def discover(
-    cell: options.Cell,
-    data: Annotated[list[Path], typer.Option("--data", help="Measurement; may be given again.")],
-    out: Annotated[Path, typer.Option(help="Folder for discovery.json, report.html and model/.")],
+    experiment: Annotated[
+        Path | None, typer.Argument(help="An experiment file instead of --cell and --data.")
+    ] = None,
+    cell: Annotated[
+        Path | None, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
+    ] = None,
+    data: Annotated[
+        list[Path] | None, typer.Option("--data", help="Measurement; may be given again.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for discovery.json, report.html and model/.")
+    ] = None,
     test: Annotated[
         list[Path] | None, typer.Option("--test", help="Measurement that chooses nothing; may be repeated.")
     ] = None,
@@ -97,18 +107,34 @@ def discover(
     effect_file: options.EffectFiles = None,
     column: options.Columns = None,
     sign: options.Sign = "discharge-positive",
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", help="key=value laid over the experiment file.")
+    ] = None,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
     from flows.discover import discover as flow
+    from flows.discover import discover_experiment
 
-    flow(
+    if experiment is not None:
+        discover_experiment(str(experiment), list(overrides or []), out)
+        return
+    if cell is None or not data or out is None:
+        raise InputError("give --cell, --data and --out, or an experiment file.")
+    from aesi.pipeline.cases import case_of_files
+
+    case = case_of_files(
         cell,
-        options.measurements(data, column, sign),
-        options.measurements(test or [], column, sign),
-        out,
-        soc0=soc0,
-        holdout=holdout,
-        max_effects=max_effects,
-        seed=seed,
-        effect_files=tuple(effect_file or ()),
+        data,
+        test or [],
+        options.columns(column),
+        sign,
+        soc0,
+        holdout,
+        max_effects,
+        seed,
+        effect_file or [],
     )
+    for measurement in (*case.measurements, *case.tests):
+        for note in measurement.notes:
+            typer.echo(f"{measurement.name}: {note}", err=True)
+    flow(case, out)
