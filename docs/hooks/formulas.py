@@ -24,7 +24,8 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 def _formulas(text: str) -> str:
     text = BLOCK.sub(lambda m: f'\n<div class="formula">{_mathml(m[1], "block")}</div>\n', text)
-    return INLINE.sub(lambda m: _mathml(m[1], "inline"), text)
+    # The span keeps Markdown from taking a formula at the start of a line for a block.
+    return INLINE.sub(lambda m: f"<span>{_mathml(m[1], 'inline')}</span>", text)
 
 
 def _mathml(latex: str, display: str) -> str:

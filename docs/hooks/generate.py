@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+import textwrap
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -39,15 +40,21 @@ def catalogue() -> str:
 
 
 def _effect(effect: Any) -> str:
-    lines = [f"### {effect.id}\n", f"{effect.summary}.\n", "```text", effect.equation, "```\n"]
+    lines = [
+        f"### {effect.id}\n",
+        f"{effect.summary}.\n",
+        "```text",
+        textwrap.dedent(effect.equation),
+        "```\n",
+    ]
     if effect.validity:
         lines.append(f"{effect.validity}\n")
     if effect.source:
         lines.append(f"Source: {effect.source}\n")
     if effect.parameters:
         lines += [
-            "| parameter | unit | typical | range | vanishes at | meaning | range from |",
-            "|---|---|---:|---:|---:|---|---|",
+            "| parameter | unit | typical | range | meaning |",
+            "|---|---|---:|---:|---|",
             *(_parameter(name, parameter) for name, parameter in effect.parameters.items()),
             "",
         ]
@@ -57,16 +64,12 @@ def _effect(effect: Any) -> str:
 def _parameter(name: str, parameter: Any) -> str:
     low, high = parameter.bounds
     scale = " (log)" if parameter.log else ""
-    neutral = "–" if parameter.neutral is None else f"{parameter.neutral:g}"
-    cells = (
-        f"`{name}`",
-        parameter.unit,
-        f"{parameter.default:g}",
-        f"{low:g} to {high:g}{scale}",
-        neutral,
-        parameter.description,
-        parameter.source,
-    )
+    about = [parameter.description] if parameter.description else []
+    if parameter.neutral is not None:
+        about.append(f"without effect at {parameter.neutral:g}")
+    about.append(f"range: {parameter.source}")
+    limits = f"{low:g} to {high:g}{scale}"
+    cells = (f"`{name}`", parameter.unit, f"{parameter.default:g}", limits, "; ".join(about))
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 
-LEAST_SAMPLES = 5
+LEAST_SAMPLES = 3
 """Bins with fewer samples stay blank: their mean says more about the record than about the model."""
 
 
