@@ -98,10 +98,10 @@ def run_linear(  # type: ignore[no-untyped-def]
     q, c, forcing, rest = np.zeros(n_e), np.full(m_e, c0), np.zeros(n_e), np.zeros(m_e)
     keys = np.full(CACHE_SLOTS, -1, dtype=np.int64)
     w_n, w_p = np.zeros((CACHE_SLOTS, 3, n_modes)), np.zeros((CACHE_SLOTS, 3, n_modes))
-    w_e, parts = np.zeros((CACHE_SLOTS, 3, n_e)), np.ones(CACHE_SLOTS, dtype=np.int64)
+    w_e, parts = np.zeros((CACHE_SLOTS, 4, n_e)), np.ones(CACHE_SLOTS, dtype=np.int64)
     mean_n, mean_p = theta0[0], theta0[1]
     fault_at, fault = -1, 0
-    last = c.shape[0] - 1
+    last, width, g = m_e - 1, (m_e - 1) // 3 + 1, np.zeros(6)
     for k in range(n_samples):
         i1 = current[k]
         if k > 0:
@@ -113,20 +113,26 @@ def run_linear(  # type: ignore[no-untyped-def]
                 keys[slot] = key
                 parts[slot] = max(1, math.ceil(dt / substep)) if nonlinear else 1
                 for j in range(n_modes):
-                    w_n[slot, 0, j], w_n[slot, 1, j], w_n[slot, 2, j] = step_weights(rates[0, j], dt)
-                    w_p[slot, 0, j], w_p[slot, 1, j], w_p[slot, 2, j] = step_weights(rates[1, j], dt)
-                for j in range(n_e):
-                    w_e[slot, 0, j], w_e[slot, 1, j], w_e[slot, 2, j] = step_weights(
-                        e_rates[j], dt / parts[slot]
+                    decay, start, end = step_weights(rates[0, j], dt)
+                    w_n[slot, 0, j], w_n[slot, 1, j], w_n[slot, 2, j] = (
+                        decay,
+                        start * gains[0, j],
+                        end * gains[0, j],
                     )
+                    decay, start, end = step_weights(rates[1, j], dt)
+                    w_p[slot, 0, j], w_p[slot, 1, j], w_p[slot, 2, j] = (
+                        decay,
+                        start * gains[1, j],
+                        end * gains[1, j],
+                    )
+                for j in range(n_e):
+                    decay, start, end = step_weights(e_rates[j], dt / parts[slot])
+                    w_e[slot, 0, j], w_e[slot, 3, j] = decay, (start + end) * e_rates[j] * psi_scale
+                    w_e[slot, 1, j], w_e[slot, 2, j] = start * e_gains[j], end * e_gains[j]
             for j in range(n_modes):
-                z_n[j] = w_n[slot, 0, j] * z_n[j] - gains[0, j] * (
-                    w_n[slot, 1, j] * i0 + w_n[slot, 2, j] * i1
-                )
+                z_n[j] = w_n[slot, 0, j] * z_n[j] - w_n[slot, 1, j] * i0 - w_n[slot, 2, j] * i1
             for j in range(n_modes):
-                z_p[j] = w_p[slot, 0, j] * z_p[j] + gains[1, j] * (
-                    w_p[slot, 1, j] * i0 + w_p[slot, 2, j] * i1
-                )
+                z_p[j] = w_p[slot, 0, j] * z_p[j] + w_p[slot, 1, j] * i0 + w_p[slot, 2, j] * i1
             charge = 0.5 * (i0 + i1) * dt
             mean_n -= lump[0] * charge
             mean_p += lump[1] * charge
@@ -141,11 +147,11 @@ def run_linear(  # type: ignore[no-untyped-def]
                         for j in range(n_e):
                             forcing[j] += project[i, j] * rest[i]
                 for j in range(n_e):
-                    source = -psi_scale * e_rates[j] * forcing[j]
                     q[j] = (
                         w_e[slot, 0, j] * q[j]
-                        + w_e[slot, 1, j] * (e_gains[j] * u0 + source)
-                        + w_e[slot, 2, j] * (e_gains[j] * u1 + source)
+                        + w_e[slot, 1, j] * u0
+                        + w_e[slot, 2, j] * u1
+                        - w_e[slot, 3, j] * forcing[j]
                     )
                 c[:] = c0
                 for j in range(n_e):
@@ -159,11 +165,12 @@ def run_linear(  # type: ignore[no-untyped-def]
         for j in range(m_e):
             c_mean += mean[j] * c[j]
             c_low = min(c_low, c[j])
-        g = np.zeros(6)
         for i in range(6):
-            for j in range(m_e):
-                g[i] += gauss[i, j] * c[j]
-            g[i] = max(g[i] / c0, SMALLEST_SALT)
+            first = 0 if i < 3 else m_e - width
+            value = 0.0
+            for j in range(width):
+                value += gauss[i, first + j] * c[first + j]
+            g[i] = max(value / c0, SMALLEST_SALT)
 
         density = i1 / area
         s_n = kinetic_ratio(density / a_l_n, exchange_n, theta_n)

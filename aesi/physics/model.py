@@ -11,8 +11,8 @@ from typing import Any
 from aesi.physics.cell import Cell
 from aesi.physics.relations import Constant
 
-DEFAULT_SOLID_ORDER = 10
-DEFAULT_ELECTROLYTE_ORDER = 4
+DEFAULT_SOLID_ORDER = 12
+DEFAULT_ELECTROLYTE_ORDER = 3
 DEFAULT_SUBSTEP_S = 2.0
 
 

@@ -1,0 +1,159 @@
+"""Cells from BPX files: both versions, round trip, and one clear sentence for what cannot be used."""
+
+import copy
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.errors import CellError, SimulationError
+from aesi.physics import Cell, initial_soc
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+
+
+@pytest.fixture
+def content() -> dict:
+    return json.loads((CELLS / "lg_m50_chen2020.bpx.json").read_text())
+
+
+def as_version_0(content: dict) -> dict:
+    """The same cell as files of version 0.x put it."""
+    old = copy.deepcopy(content)
+    old["Header"]["BPX"] = 0.4
+    initial = old.pop("State")["Initial conditions"]
+    parts = old["Parameterisation"]
+    parts["Electrolyte"]["Initial concentration [mol.m-3]"] = initial[
+        "Initial electrolyte concentration [mol.m-3]"
+    ]
+    parts["Cell"] |= {"Initial temperature [K]": 298.15, "Ambient temperature [K]": 298.15}
+    parts["Cell"]["Thermal conductivity [W.m-1.K-1]"] = 1.0
+    return old
+
+
+@pytest.mark.parametrize("name", ["lg_m50_chen2020", "nmc_30ah"])
+def test_a_cell_survives_the_way_to_a_file_and_back(name):
+    cell = Cell.from_bpx(CELLS / f"{name}.bpx.json")
+    assert Cell.from_bpx(json.loads(json.dumps(cell.to_bpx()))) == cell
+
+
+def test_the_schema_accepts_what_is_written(nmc):
+    import bpx
+
+    bpx.parse_bpx_obj(nmc.to_bpx())
+
+
+def test_both_versions_give_the_same_cell(content):
+    assert Cell.from_bpx(as_version_0(content)) == Cell.from_bpx(content)
+
+
+def test_reading_leaves_the_callers_dict_alone(content):
+    before = copy.deepcopy(content)
+    Cell.from_bpx(content)
+    assert content == before
+
+
+def test_the_30_ah_cell_is_the_published_one_with_more_electrode_pairs(nmc):
+    assert nmc.electrode_pairs == 82
+    assert nmc.nominal_capacity_ah == 30.0
+    assert "34" in nmc.description
+
+
+def test_the_lg_m50_has_the_capacity_of_its_windows_and_rests_at_its_cut_offs(lg_m50):
+    p = lg_m50.positive
+    window = (p.theta_max - p.theta_min) * lg_m50.electrode_capacity_ah(p)
+    assert lg_m50.capacity_ah == pytest.approx(window, rel=1e-5)  # limits are written with six digits
+    assert lg_m50.rest_voltage_v(np.array([0.0, 1.0])) == pytest.approx([2.5, 4.2], abs=1e-4)
+
+
+def test_contact_resistance_travels_in_the_user_section(content):
+    content["Parameterisation"]["User-defined"] = {"Contact resistance [Ohm]": 0.002}
+    cell = Cell.from_bpx(content)
+    assert cell.contact_resistance_ohm == 0.002
+    assert Cell.from_bpx(cell.to_bpx()) == cell
+
+
+def test_tables_are_accepted_for_every_function(content):
+    parts = content["Parameterisation"]
+    parts["Negative electrode"]["OCP [V]"] = {"x": [0.0, 0.5, 1.0], "y": [1.0, 0.2, 0.05]}
+    parts["Negative electrode"]["Diffusivity [m2.s-1]"] = {"x": [0.0, 1.0], "y": [1e-14, 3e-14]}
+    parts["Electrolyte"]["Conductivity [S.m-1]"] = {"x": [0.0, 4000.0], "y": [0.1, 1.5]}
+    cell = Cell.from_bpx(content)
+    assert float(cell.negative.ocp(np.array([0.25]))[0]) == pytest.approx(0.6)
+
+
+def fault(content: dict) -> str:
+    with pytest.raises(CellError) as caught:
+        Cell.from_bpx(content)
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def test_a_missing_field_is_named(content):
+    del content["Parameterisation"]["Positive electrode"]["Thickness [m]"]
+    assert "Thickness [m]" in fault(content)
+
+
+def test_a_missing_concentration_is_named(content):
+    del content["State"]["Initial conditions"]["Initial electrolyte concentration [mol.m-3]"]
+    assert "Initial electrolyte concentration" in fault(content)
+
+
+def test_a_single_particle_file_is_refused(content):
+    content["Header"]["Model"] = "SPM"
+    del content["Parameterisation"]["Electrolyte"]
+    assert "Electrolyte" in fault(content)
+
+
+def test_a_blend_is_refused(content):
+    content["Parameterisation"]["Negative electrode"]["Particle"] = {"Primary": {}}
+    assert "blend" in fault(content)
+
+
+def test_stoichiometry_limits_in_the_wrong_order_are_refused(content):
+    content["Parameterisation"]["Negative electrode"]["Minimum stoichiometry"] = 0.99
+    assert "stoichiometry limits" in fault(content)
+
+
+def test_a_negative_thickness_is_refused(content):
+    content["Parameterisation"]["Separator"]["Thickness [m]"] = -1e-5
+    assert "separator_thickness_m" in fault(content)
+
+
+def test_text_instead_of_a_number_is_refused(content):
+    content["Parameterisation"]["Cell"]["Nominal cell capacity [A.h]"] = "five"
+    assert "Nominal cell capacity" in fault(content)
+
+
+def test_no_version_is_refused(content):
+    del content["Header"]["BPX"]
+    assert "version" in fault(content)
+
+
+def test_code_in_an_open_circuit_potential_is_refused_and_not_run(content, tmp_path):
+    mark = tmp_path / "ran"
+    content["Parameterisation"]["Negative electrode"]["OCP [V]"] = f"open('{mark}', 'w')"
+    assert "OCP" in fault(content)
+    assert not mark.exists()
+
+
+def test_files_that_are_not_there_or_not_json_are_named(tmp_path):
+    with pytest.raises(CellError, match=r"nowhere\.json"):
+        Cell.from_bpx(tmp_path / "nowhere.json")
+    broken = tmp_path / "broken.json"
+    broken.write_text("{")
+    with pytest.raises(CellError, match=r"broken\.json is not JSON"):
+        Cell.from_bpx(broken)
+
+
+@pytest.mark.parametrize("soc", [0.02, 0.4, 0.97])
+def test_the_rest_voltage_leads_back_to_the_state_of_charge(lg_m50, soc):
+    voltage = float(lg_m50.rest_voltage_v(soc)[0])
+    assert initial_soc(lg_m50, voltage) == pytest.approx(soc, abs=2e-4)  # table of 4,001 points
+
+
+def test_a_rest_voltage_out_of_range_says_which_range(lg_m50):
+    with pytest.raises(SimulationError, match=r"5\.0000 V lies outside"):
+        initial_soc(lg_m50, 5.0)

@@ -1,0 +1,60 @@
+"""Constitutive relations: values, scaling, and the way into a file."""
+
+import numpy as np
+import pytest
+
+from aesi.errors import CellError
+from aesi.physics.relations import (
+    Constant,
+    Expression,
+    PowerSeries,
+    Product,
+    Scaled,
+    Sum,
+    Table,
+    relation,
+    scaled,
+    tabulated,
+    to_bpx,
+)
+
+X = np.linspace(0.0, 1.0, 7)
+TABLE = Table((0.0, 0.5, 1.0), (1.0, 3.0, 2.0))
+
+
+def test_a_table_is_straight_between_its_points_and_constant_beyond():
+    assert TABLE(np.array([-1.0, 0.25, 0.75, 2.0])) == pytest.approx([1.0, 2.0, 2.5, 2.0])
+
+
+def test_sums_products_and_factors():
+    mix = Sum(Scaled(TABLE, 2.0), Product(Constant(3.0), PowerSeries((1.0, 0.0, 2.0))))
+    assert mix(X) == pytest.approx(2.0 * TABLE(X) + 3.0 * (1.0 + 2.0 * X**2))
+    assert tabulated(mix, 0.0, 1.0, 7) == pytest.approx(mix(X))
+
+
+def test_a_factor_of_one_changes_nothing_and_factors_join():
+    assert scaled(TABLE, 1.0) is TABLE
+    assert scaled(Constant(2.0), 3.0) == Constant(6.0)
+    assert scaled(scaled(TABLE, 2.0), 3.0) == Scaled(TABLE, 6.0)
+
+
+@pytest.mark.parametrize(
+    "item",
+    [
+        Constant(2.0),
+        Expression("exp(x) - 2"),
+        TABLE,
+        Scaled(Expression("x ** 2"), 0.3),
+        Sum(Expression("x"), PowerSeries((0.1, -0.2))),
+        Product(Expression("x"), TABLE),
+    ],
+)
+def test_what_a_file_holds_reads_back_as_the_same_function(item):
+    back = relation(to_bpx(item), "test")
+    assert back(X) == pytest.approx(item(X), abs=1e-6)  # mixtures with tables become tables of 1,025 points
+
+
+@pytest.mark.parametrize("bad", [None, True, [1, 2], {"x": [0, 1]}, {"x": [1, 0], "y": [0, 1]}, "x +"])
+def test_what_is_no_relation_is_named(bad):
+    with pytest.raises(CellError, match="Diffusivity"):
+        relation(bad, "Diffusivity")

@@ -1,0 +1,157 @@
+"""`simulate`: conservation, sampling, ways of holding the current, errors that name time and electrode."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aesi.errors import DataError, SimulationError
+from aesi.physics import Cell, simulate
+from aesi.physics.constants import SECONDS_PER_HOUR
+from aesi.physics.effects import CATALOGUE
+
+LG_M50 = Cell.from_bpx(
+    Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
+)
+
+
+def lithium_in_negative_ah(cell, run):
+    """Mean stoichiometry of the negative electrode times its capacity."""
+    n = cell.negative
+    theta = n.theta_min + run.series["soc"] * (n.theta_max - n.theta_min)
+    return theta * cell.electrode_capacity_ah(n)
+
+
+@pytest.mark.parametrize("hold", ["linear", "backward"])
+def test_lithium_leaves_as_charge_to_nine_digits(nmc, load, hold):
+    time, current = load
+    run = simulate(nmc, time, current, soc0=0.9, hold=hold)
+    steps = np.diff(time) * (current[1:] if hold == "backward" else 0.5 * (current[1:] + current[:-1]))
+    charge = np.concatenate([[0.0], np.cumsum(steps)]) / SECONDS_PER_HOUR
+    lithium = lithium_in_negative_ah(nmc, run)
+    assert lithium[0] - lithium == pytest.approx(charge, abs=1e-9 * lithium[0])
+
+
+def test_lithium_is_kept_with_every_effect_that_shares_currents(nmc, load):
+    names = ("particle_size_distribution", "reaction_nonuniformity", "concentration_dependent_diffusivity")
+    time, current = load
+    effects = [CATALOGUE[name].activate() for name in names]
+    run = simulate(nmc, time, current, soc0=0.9, effects=effects)
+    plain = simulate(nmc, time, current, soc0=0.9)
+    assert run.series["soc"] == pytest.approx(plain.series["soc"], abs=1e-9)
+
+
+def test_a_cell_at_rest_stays_at_its_rest_voltage(nmc):
+    run = simulate(nmc, np.arange(50.0), np.zeros(50), soc0=0.6)
+    assert run.voltage_v == pytest.approx(nmc.rest_voltage_v(0.6)[0], abs=1e-6)  # table against expression
+    assert run.series["c_e0"] == pytest.approx(1000.0)
+
+
+def test_discharge_lowers_the_voltage_and_moves_the_states_the_right_way(nmc):
+    time = np.arange(100.0)
+    rest, run = (simulate(nmc, time, np.full(100, i), soc0=0.6) for i in (0.0, 30.0))
+    assert (run.voltage_v < rest.voltage_v).all()
+    assert run.series["c_sn"][-1] < rest.series["c_sn"][-1]
+    assert run.series["c_sp"][-1] > rest.series["c_sp"][-1]
+    assert run.series["c_e0"][-1] > 1000.0 > run.series["c_eL"][-1]
+    assert set(run.states.columns) >= {"c_sp", "c_sn", "c_e0", "c_eL", "soc", "temperature_k"}
+
+
+def test_straight_lines_between_samples_are_the_same_however_they_are_sampled(nmc, load):
+    time, current = load
+    fine = np.unique(np.concatenate([time, np.linspace(0.0, time[-1], 1777)]))
+    coarse = simulate(nmc, time, current, soc0=0.9)
+    dense = simulate(nmc, fine, np.interp(fine, time, current), soc0=0.9)
+    at = np.searchsorted(fine, time)
+    # The electrolyte's concentration-dependent part is held over a step of 1 s; the rest is exact.
+    assert dense.voltage_v[at] == pytest.approx(coarse.voltage_v, abs=2e-4)
+    assert dense.series["c_sn"][at] == pytest.approx(coarse.series["c_sn"], rel=1e-10)
+
+
+def test_a_held_row_is_a_step_at_the_row_before(nmc):
+    held = simulate(nmc, np.array([0.0, 60.0, 120.0]), np.array([0.0, 30.0, 0.0]), soc0=0.8, hold="backward")
+    time = np.array([0.0, 1e-6, 60.0, 60.0 + 1e-6, 120.0])
+    steps = simulate(nmc, time, np.array([0.0, 30.0, 30.0, 0.0, 0.0]), soc0=0.8)
+    assert held.series["c_sn"] == pytest.approx(steps.series["c_sn"][[0, 2, 4]], rel=1e-7)
+
+
+def test_the_general_path_agrees_with_the_plain_one(nmc, load):
+    time, current = load
+    plain = simulate(nmc, time, current, soc0=0.9)
+    drifting = np.full(len(time), 25.0) + 1e-9 * np.arange(len(time))  # not constant, so not the plain path
+    general = simulate(nmc, time, current, soc0=0.9, temperature_degc=drifting)
+    assert general.voltage_v == pytest.approx(plain.voltage_v, abs=1e-8)
+
+
+def test_a_measured_temperature_is_used_as_given(nmc, load):
+    time, current = load
+    cold = simulate(nmc, time, current, soc0=0.9, temperature_degc=0.0)
+    shifted = simulate(
+        nmc, time, current, soc0=0.9, effects=[CATALOGUE["ambient_temperature"].activate(shift_k=-25)]
+    )
+    assert cold.voltage_v == pytest.approx(shifted.voltage_v, abs=1e-12)
+    ramp = np.linspace(0.0, 40.0, len(time))
+    assert simulate(nmc, time, current, soc0=0.9, temperature_degc=ramp).series[
+        "temperature_k"
+    ] == pytest.approx(ramp + 273.15)
+
+
+def test_an_empty_cell_names_time_and_electrode(lg_m50):
+    time = np.arange(0.0, 4000.0, 10.0)
+    with pytest.raises(SimulationError, match=r"(negative|positive) electrode .* at \d+ s"):
+        simulate(lg_m50, time, np.full(len(time), 10.0), soc0=0.9)
+
+
+def test_a_search_gets_finite_values_and_a_flag(lg_m50):
+    time = np.arange(0.0, 4000.0, 10.0)
+    run = simulate(lg_m50, time, np.full(len(time), 10.0), soc0=0.9, on_depletion="clip")
+    assert np.isfinite(run.voltage_v).all()
+    flag = run.series["depleted"]
+    assert flag[0] == 0.0
+    assert flag[-1] == 1.0
+    assert (np.diff(flag) >= 0).all()
+    longer = run.voltage_v[flag == 1.0]
+    assert longer[-1] < longer[0]  # the further out, the worse: a slope that a search can follow
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.floats(-300.0, 300.0), min_size=2, max_size=40), st.floats(0.0, 1.0))
+def test_no_current_makes_a_search_see_a_value_that_is_not_finite(currents, soc0):
+    time = np.arange(len(currents)) * 30.0
+    run = simulate(LG_M50, time, np.array(currents), soc0=soc0, on_depletion="clip")
+    assert np.isfinite(run.voltage_v).all()
+
+
+def test_the_state_of_charge_comes_from_the_rest_voltage(lg_m50):
+    voltage = float(lg_m50.rest_voltage_v(0.73)[0])
+    run = simulate(lg_m50, np.arange(3.0), np.zeros(3), rest_voltage_v=voltage)
+    assert run.series["soc"][0] == pytest.approx(0.73, abs=2e-4)
+
+
+def test_a_voltmeters_offset_is_taken_off_the_rest_voltage(lg_m50):
+    voltage = float(lg_m50.rest_voltage_v(0.73)[0]) + 0.01
+    offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=0.01)
+    run = simulate(lg_m50, np.arange(3.0), np.zeros(3), rest_voltage_v=voltage, effects=[offset])
+    assert run.series["soc"][0] == pytest.approx(0.73, abs=2e-4)
+    assert run.voltage_v == pytest.approx(voltage, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("time", "current", "words"),
+    [
+        ([0, 1, 1], [0, 0, 0], "row 2"),
+        ([0, 1], [0, 0, 0], "shapes"),
+        ([0, 1], [0, np.nan], "not finite"),
+        ([], [], "shapes"),
+    ],
+)
+def test_arrays_that_cannot_be_simulated_are_refused(nmc, time, current, words):
+    with pytest.raises(DataError, match=words):
+        simulate(nmc, np.array(time, dtype=float), np.array(current, dtype=float), soc0=0.5)
+
+
+def test_neither_state_of_charge_nor_rest_voltage_is_refused(nmc):
+    with pytest.raises(DataError, match="rest_voltage_v"):
+        simulate(nmc, np.arange(3.0), np.zeros(3))
