@@ -1,155 +1,203 @@
-"""`aesi discover`: close the loop on measured data, every hypothesis a tracked run.
+"""`aesi discover` as a flow: trace the residual, track every hypothesis, write the finding.
 
-    read -> trace -> write
-
-Fits are kept in the output folder as they are made, so the same command goes on where it was interrupted.
+cell and data -> hypotheses -> verdict -> discovery.json, report, model
 """
 
 from __future__ import annotations
 
+import os
 import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.config import DataConfig, ExperimentConfig, TrackingConfig
+from aesi.pipeline.config import TrackingConfig
+from aesi.pipeline.discover import ARCHIVE, MV, Case, catalogue, declared, run_case, write_discovery
+from aesi.records import digest
+from flows import environment
 from flows.console import Console, duration
 
 if TYPE_CHECKING:
-    from aesi.pipeline.discover import Case
-    from flows.stages import Run
+    from aesi.tracer import Discovery
+    from aesi.tracer.search import Admission, Scored
+    from flows.tracking import Tracker
 
 EXPERIMENT = "discover"
 
 
-def discover(case: Case, out: Path, name: str = EXPERIMENT, uri: str | None = None) -> dict[str, Any]:
-    """Trace one case and write its results to `out`; the content of discovery.json."""
+@dataclass(frozen=True)
+class Tracked:
+    """What the tracker needs to know of a case: one experiment for all discoveries, a run for each."""
+
+    name: str
+    seed: int
+    digest: str
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+
+
+def discover(
+    case: Case, out: Path, use_prefect: bool | None = None, experiment: str = EXPERIMENT
+) -> dict[str, Any]:
+    """Trace one case and write the finding to `out`; returns the content of discovery.json.
+
+    use_prefect : run the stages as a Prefect flow; None does so where a server is configured (PREFECT_API_URL),
+    because a temporary one takes longer to start than most cases take to trace.
+    Raises AesiError, one sentence, for what cannot be used; nothing is started then.
+    """
+    environment.prepare()
+    declared(case.cell)
+    catalogue(case.effect_files)
+    if use_prefect or (use_prefect is None and os.environ.get("PREFECT_API_URL")):
+        return _as_flow(case, out, experiment)
     from flows.stages import plainly
 
     console = Console()
-    return _discover(case, out, name, uri, plainly(console.say), console)
+    return trace(case, out, plainly(console.say), console, experiment)
 
 
-def discover_experiment(path: str, overrides: list[str], out: Path | None) -> dict[str, Any]:
-    """Trace the case that an experiment file describes."""
+def discover_experiment(path: str, overrides: Sequence[str] = (), out: Path | None = None) -> dict[str, Any]:
+    """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
     from aesi.pipeline.cases import case_of_experiment
     from aesi.pipeline.config import read_experiment
-    from flows import environment
 
     config = read_experiment(path, overrides)
     folder = out or environment.workspace() / "runs" / config.name / "discovery"
-    return discover(case_of_experiment(config), folder, config.name, config.tracking.uri)
+    return discover(case_of_experiment(config), folder, experiment=config.name)
 
 
-def _discover(
-    case: Case, out: Path, name: str, uri: str | None, run: Run, console: Console
-) -> dict[str, Any]:
-    from aesi.pipeline.discover import run_case, write_discovery
-    from flows.mlflow_store import Store
-    from flows.tracking import Tracker, deliver_leftovers
+def _as_flow(case: Case, out: Path, experiment: str) -> dict[str, Any]:
+    from prefect import flow
 
+    from flows.stages import as_tasks
+
+    console = Console()
+
+    @flow(name="discover", flow_run_name=out.name, validate_parameters=False, persist_result=False)
+    def discovery() -> dict[str, Any]:
+        """Trace a residual to the physics that the declared model lacks."""
+        return trace(case, out, as_tasks(console.say), console, experiment)
+
+    return discovery()
+
+
+def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) -> dict[str, Any]:
+    """The flow itself; `run` runs a stage."""
     started = time.monotonic()
-    store = Store(uri)
-    deliver_leftovers(store, console.say)
-    tracker = Tracker(store, _as_experiment(case, name, uri), console.say)
-    _track_case(tracker, case)
-    follow = _Follow(console)
+    if (out / ARCHIVE).exists():
+        console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
+    tracker = _tracker(case, experiment, console)
+    follow = Follow(tracker, console, len(catalogue(case.effect_files)))
     try:
-        found = run("trace", lambda: run_case(case, out, follow))
-        content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, tracker.run_id))
-        _track_found(tracker, content, out)
-    except KeyboardInterrupt:
-        tracker.end("KILLED", wait_s=5)
-        console.say(f"Stopped. The fits so far are kept in {out}; the same command goes on from there.")
+        found = run("hypotheses", lambda: run_case(case, out, follow))
+        content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
+    except BaseException as error:
+        if tracker is not None:
+            tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise
-    except BaseException:
-        tracker.end("FAILED", wait_s=10)
-        raise
-    tracker.end("FINISHED")
-    effects = ", ".join(content["effects"]) or "no effect"
-    console.say(f"Verdict: {content['verdict']} ({effects}) in {duration(time.monotonic() - started)}.")
-    console.say(f"Report: {out / 'report.html'}")
+    _track_result(tracker, case, found, content, out)
+    _say(console, content, out, started)
     return content
 
 
-class _Follow:
-    """Says which hypothesis was fitted, at most every few seconds where lines cannot be overwritten."""
+class Follow:
+    """Shows and tracks each hypothesis as it is judged."""
 
-    def __init__(self, console: Console) -> None:
-        self._console = console
-        self._count = 0
-        self._started = time.monotonic()
+    def __init__(self, tracker: Tracker | None, console: Console, total: int) -> None:
+        self._tracker, self._console, self._total = tracker, console, total
+        self._started, self._done = time.monotonic(), 0
 
-    def __call__(self, hypothesis: str, scored: Any, admission: Any) -> None:
-        self._count += 1
-        rmse = 1e3 * scored.held_out_rmse_v
-        self._console.count(
-            "hypotheses", self._count, self._started, f"{hypothesis or 'as declared'} {rmse:.2f} mV"
+    def __call__(self, name: str, scored: Scored, admission: Admission | None) -> None:
+        """One hypothesis: its evidence, its error and its parameters."""
+        self._done += 1
+        total = max(self._total, self._done + 1)
+        self._console.progress("hypotheses", self._done, total, self._started, name)
+        if self._tracker is None:
+            return
+        values = scored.fit.values
+        parameters = {f"{owner}.{key}": v for owner, given in values.items() for key, v in given.items()}
+        metrics = {
+            "evidence_nats": scored.evidence,
+            "fit/rmse_mv": MV * scored.fit.rmse_v,
+            "held_out/rmse_mv": MV * scored.held_out_rmse_v,
+            "structured_mv": MV * scored.structured_v,
+            "simulations": float(scored.fit.simulations),
+        }
+        if admission is not None:
+            metrics |= {
+                "added/evidence_nats": admission.evidence_nats,
+                "added/gain_mv": MV * admission.gain_v,
+                "added/placebo_mv": MV * admission.placebo_v,
+            }
+        remark = admission.reason if admission is not None else ""
+        self._tracker.nested(
+            f"{name}#{self._done}",
+            name or "nothing",
+            "hypothesis",
+            {"hypothesis": name, "remark": remark, **parameters},
+            metrics,
         )
 
 
-def _track_case(tracker: Any, case: Case) -> None:
-    from flows.tracking import versions
+def _tracker(case: Case, experiment: str, console: Console) -> Tracker | None:
+    from flows.mlflow_store import Store, StoreAway
+    from flows.tracking import Tracker
 
+    key = digest(*(m.time_s for m in case.measurements), *(m.voltage_v for m in case.measurements))
+    try:
+        return Tracker(Store(), Tracked(experiment, case.seed, key), console.say)  # type: ignore[arg-type]
+    except StoreAway as error:
+        console.say(f"not tracked: {error}")
+        return None
+
+
+def _run_id(tracker: Tracker | None) -> str:
+    return tracker.run_id if tracker is not None else ""
+
+
+def _track_result(
+    tracker: Tracker | None, case: Case, found: Discovery, content: dict[str, Any], out: Path
+) -> None:
+    if tracker is None:
+        return
     tracker.parameters(
         {
-            "cell": case.cell.name,
+            "cell": found.cell.name,
+            "data": ", ".join(m.name for m in case.measurements),
+            "data_digest": ", ".join(m.digest for m in case.measurements),
+            "test": ", ".join(m.name for m in case.tests),
             "soc0": case.soc0,
             "holdout": case.holdout,
             "max_effects": case.max_effects,
             "seed": case.seed,
-            "versions": versions(),
-        }
+        },
+        {"verdict": content["verdict"], "effects": ", ".join(content["effects"])},
     )
-    tracker.datasets(
-        [
-            {
-                "name": measurement.name,
-                "digest": measurement.digest,
-                "source": measurement.source,
-                "role": role,
-                "profile": f'{{"rows": {len(measurement)}}}',
-            }
-            for role, group in (("fit", case.measurements), ("test", case.tests))
-            for measurement in group
-        ]
-    )
+    states = ("before", "recalibrated", "after")
+    errors = {
+        f"{state}/{part}_rmse_mv": content[state][part]["rmse_mv"]
+        for state in states
+        for part in ("fit", "test")
+        if content[state].get(part)
+    }
+    figures = {k: content[k] for k in ("confidence", "noise_floor_mv", "explainable_mv", "structured_mv")}
+    tracker.metrics(errors | figures | {"seconds": content["seconds"]})
+    for name in ("discovery.json", "report.html"):
+        tracker.files(out / name)
+    tracker.end("FINISHED")
 
 
-def _track_found(tracker: Any, content: dict[str, Any], out: Path) -> None:
-    """A nested run a hypothesis; verdict, errors and report with the parent."""
-    for candidate in content["candidates"]:
-        values = {f"parameter/{k}": p["value"] for k, p in candidate["parameters"].items()}
-        tracker.nested(
-            label=f"hypothesis:{candidate['effect']}",
-            name=candidate["effect"],
-            kind="hypothesis",
-            params={"effect": candidate["effect"], "kind": candidate["kind"]},
-            metrics={"score": candidate["score"], "test_rmse_mv": candidate["test_rmse_mv"], **values},
-            files={"hypothesis.json": candidate},
-        )
-    tracker.parameters({"verdict": content["verdict"], "effects": content["effects"]})
-    tracker.metrics(
-        {
-            f"{state}/{part}_{figure}": value
-            for state in ("before", "recalibrated", "after")
-            for part, figures in content[state].items()
-            for figure, value in figures.items()
-        }
-        | {key: content[key] for key in ("confidence", "noise_floor_mv", "explainable_mv")}
-    )
-    for file in ("discovery.json", "report.html"):
-        tracker.files(out / file)
-    tracker.files(out / "model", "model_folder")
-
-
-def _as_experiment(case: Case, name: str, uri: str | None) -> ExperimentConfig:
-    """The name, seed and data under which a case is tracked."""
-    names = tuple(m.source or m.name for m in case.measurements)
-    return ExperimentConfig(
-        name=name,
-        seed=case.seed,
-        data=DataConfig(
-            kind="files", train=names, test=tuple(m.source or m.name for m in case.tests) or names
-        ),
-        tracking=TrackingConfig(uri=uri, register_model=False),
-    )
+def _say(console: Console, content: dict[str, Any], out: Path, started: float) -> None:
+    effects = ", ".join(content["effects"]) or "no effect"
+    console.say(f"{content['verdict']}: {effects} ({100 * content['confidence']:.0f} % confidence)")
+    for group in content["indistinguishable"]:
+        console.say(f"  these data cannot tell apart: {', '.join(group)}")
+    rmse: Callable[[str, str], float] = lambda state, part: content[state][part]["rmse_mv"]  # noqa: E731
+    for part in ("fit", "test"):
+        if content["after"].get(part):
+            values = [rmse(state, part) for state in ("before", "recalibrated", "after")]
+            before, own, after = values
+            console.say(
+                f"  {part}: {before:.2f} mV as declared, {own:.2f} mV recalibrated, {after:.2f} mV after"
+            )
+    console.say(f"Finished in {duration(time.monotonic() - started)}. Report: {out / 'report.html'}")

@@ -24,7 +24,8 @@ QUIET = {
     "PREFECT_CLI_PROMPT": "false",
     # The temporary server takes up to 24 s to start on a slow disk; Prefect gives up after 20 s by default.
     "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
-    "PREFECT_LOGGING_LEVEL": "WARNING",
+    # Errors are told once, in one sentence, by the command line; Prefect's own log keeps them in full.
+    "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",
     "PREFECT_SERVER_LOGGING_LEVEL": "ERROR",
     "PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW": "ignore",
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2",

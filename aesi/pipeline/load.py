@@ -121,7 +121,7 @@ def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
 
 def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
-    cell, given = declared(path)
+    cell, given = declared_cell(path)
     effects = (*given, *_effects(config))
     sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
     series: dict[str, ErrorSeries] = {}
@@ -202,7 +202,7 @@ def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
     return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
 
 
-def declared(path: Path) -> tuple[Cell, tuple[ActiveEffect, ...]]:
+def declared_cell(path: Path) -> tuple[Cell, tuple[ActiveEffect, ...]]:
     """The cell of a BPX file, or cell and effects of a saved model's folder."""
     if not path.is_dir():
         return Cell.from_bpx(path), ()
