@@ -1,0 +1,235 @@
+"""The same checks over every effect of the catalogue, and over one from a user's own file."""
+
+import itertools
+import json
+import pickle
+import re
+from pathlib import Path
+
+import numpy as np
+import pint
+import pytest
+
+from aesi.errors import CellError, InputError, ParameterError
+from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics.effects import CATALOGUE, describe, find_effect, load_effect
+
+CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
+CELL = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
+TIME = np.arange(0.0, 240.0, 2.0)
+CURRENT = 30.0 * (0.3 + np.sin(TIME / 9.0) + 0.7 * np.sign(np.sin(TIME / 37.0)))
+NEUTRAL_V = 1e-9
+CONTRACTED = {
+    "self_heating", "ambient_temperature", "series_resistance", "film_growth", "ocv_hysteresis", "ocp_shape",
+    "double_layer", "concentration_dependent_diffusivity", "solid_diffusivity", "particle_size_distribution",
+    "electrolyte_transport", "charge_transfer_kinetics", "asymmetric_kinetics", "reaction_nonuniformity",
+    "lithium_inventory_loss", "active_material_loss_negative", "active_material_loss_positive", "leakage_current",
+    "lithium_plating", "current_sensor_gain", "current_sensor_offset", "voltage_sensor_offset", "clock_skew",
+    "numerical_error",
+}  # fmt: skip
+SUFFIXES = {
+    "_ohm": "ohm", "_v": "V", "_a": "A", "_s": "s", "_k": "K", "_w_k": "W/K", "_m_s": "m/s", "_f_m2": "F/m**2",
+    "_throughput_ohm_ah": "ohm/(A*hour)", "_per_root_time_ohm": "ohm/hour**0.5",
+}  # fmt: skip
+"""Unit by the ending of a parameter's name; the longest that fits counts, none means dimensionless."""
+
+each = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=CATALOGUE)
+
+
+def run(*effects, **options):
+    return simulate(CELL, TIME, CURRENT, soc0=0.8, effects=effects, on_depletion="clip", **options)
+
+
+BASE = run()
+
+
+def test_the_catalogue_holds_what_was_promised():
+    assert set(CATALOGUE) >= CONTRACTED
+    assert all(name == effect.id for name, effect in CATALOGUE.items())
+
+
+@each
+def test_it_says_what_it_is(effect):
+    assert effect.kind in ("physics", "parameter", "instrument")
+    assert effect.summary
+    assert effect.equation.strip()
+    assert "Holds" in effect.validity
+    assert "Leaves out" in effect.validity
+    assert len(effect.source) > 10
+    page = describe(effect.id)
+    assert effect.equation in page
+    assert all(name in page for name in effect.parameters)
+
+
+@each
+def test_it_keeps_the_shape_and_is_finite(effect):
+    result = run(effect.activate())
+    assert result.voltage_v.shape == TIME.shape
+    assert np.isfinite(result.voltage_v).all()
+    for name, values in result.series.items():
+        assert values.shape == TIME.shape, name
+        assert np.isfinite(values).all(), name
+    assert (result.time_s == TIME).all()
+    assert (result.current_a == CURRENT).all()  # what was recorded, whatever the cell saw
+
+
+@each
+def test_it_acts(effect):
+    moved = np.abs(run(effect.activate()).voltage_v - BASE.voltage_v).max()
+    assert moved > (0.0 if effect.id == "numerical_error" else 1e-5)
+
+
+@each
+def test_it_is_pure(effect):
+    time, current = TIME.copy(), CURRENT.copy()
+    active = effect.activate()
+    first = simulate(CELL, time, current, soc0=0.8, effects=[active], on_depletion="clip")
+    second = simulate(CELL, time, current, soc0=0.8, effects=[active], on_depletion="clip")
+    assert (first.voltage_v == second.voltage_v).all()
+    assert (time == TIME).all()
+    assert (current == CURRENT).all()
+    assert (run().voltage_v == BASE.voltage_v).all()
+
+
+@each
+def test_it_vanishes_at_its_neutral_values(effect):
+    neutral = {name: p.neutral for name, p in effect.parameters.items() if p.neutral is not None}
+    if not neutral:
+        pytest.skip("has no point at which it vanishes")
+    assert np.abs(run(effect.activate(**neutral)).voltage_v - BASE.voltage_v).max() < NEUTRAL_V
+
+
+@each
+def test_it_travels_between_processes_and_files(effect):
+    active = effect.activate()
+    assert pickle.loads(pickle.dumps(active)) == active
+    assert ActiveEffect.from_dict(json.loads(json.dumps(active.to_dict()))) == active
+
+
+@each
+def test_bounds_hold_defaults_and_neutral_values_and_are_enforced(effect):
+    for name, p in effect.parameters.items():
+        low, high = p.bounds
+        assert low <= p.default <= high
+        assert p.neutral is None or low <= p.neutral <= high
+        assert p.source
+        assert p.description
+        with pytest.raises(ParameterError, match=name):
+            effect.activate(**{name: high + abs(high)})
+        with pytest.raises(ParameterError, match=name):
+            effect.activate(**{name: float("nan")})
+    with pytest.raises(ParameterError, match="unknown parameter"):
+        effect.activate(no_such_parameter=1.0)
+
+
+@each
+def test_both_ends_of_every_range_can_be_simulated(effect):
+    for name, p in effect.parameters.items():
+        for value in p.bounds:
+            assert np.isfinite(run(effect.activate(**{name: value})).voltage_v).all(), (name, value)
+
+
+@each
+def test_units_are_units_and_agree_with_the_names(effect):
+    registry = pint.UnitRegistry()
+    for name, p in effect.parameters.items():
+        endings = [s for s in SUFFIXES if name.endswith(s) or name == s[1:]]
+        wanted = SUFFIXES[max(endings, key=len)] if endings else "dimensionless"
+        assert registry.parse_units(p.unit) == registry.parse_units(wanted), name
+
+
+def test_the_units_of_voltage_laws_add_up():
+    registry = pint.UnitRegistry()
+    ampere, hour, volt = registry.ampere, registry.hour, registry.volt
+    film = CATALOGUE["film_growth"].parameters
+    throughput = registry.parse_units(film["per_throughput_ohm_ah"].unit) * ampere * hour
+    root = registry.parse_units(film["per_root_time_ohm"].unit) * hour**0.5
+    resistance = registry.parse_units(CATALOGUE["series_resistance"].parameters["resistance_ohm"].unit)
+    for unit in (throughput, root, resistance):
+        assert (1.0 * unit * ampere).check(volt.dimensionality)
+    heat = registry.parse_units(CATALOGUE["self_heating"].parameters["heat_transfer_w_k"].unit)
+    assert (1.0 * heat * registry.kelvin).check(registry.watt.dimensionality)
+
+
+@pytest.mark.parametrize("pair", list(itertools.combinations(CATALOGUE, 2)), ids="+".join)
+def test_any_two_work_together(pair):
+    first, second = (CATALOGUE[name].activate() for name in pair)
+    voltage = run(first, second).voltage_v
+    assert np.isfinite(voltage).all()
+    assert np.abs(voltage - BASE.voltage_v).max() < 2.0
+
+
+def test_all_together_give_a_voltage():
+    assert np.isfinite(run(*(effect.activate() for effect in CATALOGUE.values())).voltage_v).all()
+
+
+def test_an_unknown_name_gets_the_nearest_one():
+    with pytest.raises(InputError, match="self_heating"):
+        find_effect("selfheating")
+
+
+@pytest.mark.parametrize("name", ["self_heating", "ambient_temperature"])
+def test_a_cell_without_the_field_an_effect_needs_says_so(name):
+    content = json.loads((CELLS / "lg_m50_chen2020.bpx.json").read_text())
+    parts = content["Parameterisation"]
+    del parts["Cell"]["Density [kg.m-3]"]
+    for side in ("Negative electrode", "Positive electrode"):
+        parts[side] = {k: v for k, v in parts[side].items() if "activation" not in k}
+    cell = Cell.from_bpx(content)
+    with pytest.raises(CellError, match=re.escape(cell.name)):
+        simulate(cell, TIME, 0.1 * CURRENT, soc0=0.8, effects=[CATALOGUE[name].activate()])
+
+
+OWN = '''"""A lead with an inductance.
+
+    V = V_cell - L dI/dt
+
+Leaves out its resistance. Holds at sampling above L/R.
+
+Source: Faraday's law.
+"""
+
+import numpy as np
+
+from aesi.parameters import Parameter
+from aesi.physics import Contribution, Effect, Trace
+
+PARAMETERS = {"inductance_h": Parameter(1e-3, "H", (0.0, 1.0), "a coil", neutral=0.0, description="L")}
+
+
+def drop(trace: Trace, *, inductance_h: float) -> Contribution:
+    return Contribution(-inductance_h * np.gradient(trace.current_a, trace.time_s))
+
+
+EFFECT = Effect("lead_inductance", "physics", __doc__, PARAMETERS, on_voltage=drop)
+'''
+
+
+def test_a_users_own_effect_works_like_the_others(tmp_path):
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    effect = load_effect(path)
+    active = effect.activate(inductance_h=0.01)
+    shift = run(active).voltage_v - BASE.voltage_v
+    assert shift == pytest.approx(-0.01 * np.gradient(CURRENT, TIME))
+    assert effect.equation.strip() == "V = V_cell - L dI/dt"
+    assert pickle.loads(pickle.dumps(active)) == active
+    assert ActiveEffect.from_dict(json.loads(json.dumps(active.to_dict()))) == active
+    assert np.isfinite(run(active, CATALOGUE["self_heating"].activate()).voltage_v).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("EFFECT = 3", "defines no EFFECT"),
+        ("1 / 0", "ZeroDivisionError"),
+        (OWN.replace('"lead_inductance"', '"self_heating"'), "taken"),
+    ],
+)
+def test_a_file_that_is_no_effect_says_why(tmp_path, text, words):
+    path = tmp_path / "bad.py"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        load_effect(path)
+    with pytest.raises(InputError, match="no effect file"):
+        load_effect(tmp_path / "nowhere.py")
