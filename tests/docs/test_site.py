@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
@@ -70,6 +71,25 @@ def test_formulas_become_mathml_and_code_is_left_alone():
     assert "<math" in change("an $x_1$ here")
     assert change("`$x$` and\n```\n$ aesi run $HOME\n```\n") == "`$x$` and\n```\n$ aesi run $HOME\n```\n"
     assert change("costs 5$ or 6$") == "costs 5$ or 6$"
+
+
+def test_every_formula_of_the_documentation_is_understood():
+    change = hook("formulas").on_page_markdown
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        html = re.sub(r'aria-label="[^"]*"', "", change(page.read_text(encoding="utf-8")))
+        for math in re.findall(r"<math.*?</math>", html, re.DOTALL):
+            assert "\\" not in math, f"{page.name}: {math}"
+
+
+def test_the_layers_of_the_architecture_page_are_those_that_are_checked():
+    layers = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    checked = layers["tool"]["importlinter"]["contracts"][0]["layers"]
+    picture = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[1]
+    positions = [
+        picture.index(part.strip().replace("aesi.", "aesi/").replace("flows", "flows/"))
+        for part in (layer.split("|")[0] for layer in checked)
+    ]
+    assert positions == sorted(positions)
 
 
 def test_pages_refer_to_files_that_exist():

@@ -62,24 +62,39 @@ def interval_finding(model: Row) -> str:
 
 
 def discovery_finding(view: DiscoveryView) -> str:
-    """The verdict as one sentence."""
-    verdict = view.discovery["verdict"]
-    effects = [_title(view.titles, e) for e in view.discovery["effects"]]
-    confidence = view.discovery["confidence"]
-    sure = f" ({100 * confidence:.0f} % confidence)"
-    if verdict == "found":
-        return f"The declared model of {view.cell} lacks {listed(effects)}{sure}."
+    """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such."""
+    verdict, effects = view.discovery["verdict"], view.discovery["effects"]
+    sure = f" ({100 * view.discovery['confidence']:.0f} % confidence)"
     if verdict == "none":
         return f"Nothing is missing from the declared model of {view.cell} that these data could show{sure}."
-    if effects:
-        return (
-            f"The declared model of {view.cell} lacks {listed(effects)}, and something more that no effect "
-            f"of the catalogue explains{sure}."
-        )
-    return (
-        f"The declared model of {view.cell} lacks something real that no effect of the catalogue "
-        f"explains{sure}."
-    )
+    if verdict == "unknown":
+        rest = "that no effect of the catalogue explains"
+        if not effects:
+            return f"The declared model of {view.cell} misses something real {rest}{sure}."
+        return f"{_named(view, effects)}; and something real is left {rest}{sure}."
+    return f"{_named(view, effects)}{sure}."
+
+
+def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
+    """What was found, each kind in its own words."""
+    kinds = {row["effect"]: row["kind"] for row in view.discovery["candidates"]}
+    groups: dict[str, list[str]] = {}
+    for effect in effects:
+        groups.setdefault(kinds.get(effect, "physics"), []).append(_title(view.titles, effect))
+    parts = []
+    if "physics" in groups:
+        parts.append(f"the declared model of {view.cell} lacks {listed(groups['physics'])}")
+    if "parameter" in groups:
+        names = listed(groups["parameter"])
+        parts.append(f"{names} of {view.cell} {_verb(groups['parameter'])} not as declared")
+    if "instrument" in groups:
+        parts.append(f"the data, not the cell, show {listed(groups['instrument'])}")
+    text = "; ".join(parts)
+    return text[:1].upper() + text[1:]
+
+
+def _verb(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"
 
 
 def discovery_consequence(view: DiscoveryView) -> str:

@@ -56,12 +56,26 @@ def test_each_verdict_has_its_sentence(views, verdict, phrase):
     assert "97 % confidence" in text
 
 
+@pytest.mark.parametrize(
+    ("effect", "kind", "phrase"),
+    [
+        ("ambient_temperature", "parameter", "Ambient temperature of synthetic 5 Ah cell is not as declared"),
+        ("clock_skew", "instrument", "The data, not the cell, show clock skew"),
+    ],
+)
+def test_a_wrong_parameter_and_a_fault_are_not_called_missing_physics(views, effect, kind, phrase):
+    view = views.discovery_view(200)
+    rows = [{"effect": effect, "kind": kind, "score": 1.0}]
+    found = replace(view, discovery={**view.discovery, "effects": [effect], "candidates": rows})
+    assert words.discovery_finding(found).startswith(phrase)
+
+
 def test_a_partial_find_says_that_something_is_left(views):
     view = views.discovery_view(200, verdict="unknown")
     partial = replace(view, discovery={**view.discovery, "effects": ["self_heating"]})
     text = words.discovery_finding(partial)
     assert "self-heating" in text
-    assert "something more" in text
+    assert "something real is left" in text
 
 
 def test_the_refit_stands_apart_from_the_finding(views):
