@@ -8,10 +8,12 @@ checksum is computed again, and a warning says so.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import tempfile
 import warnings
+import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -76,10 +78,10 @@ def _load(path: Path) -> dict[str, Array] | None:
     if not path.exists():
         return None
     try:
-        with np.load(path, allow_pickle=False) as entry:
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as entry:
             arrays = {name: entry[name] for name in entry.files if name != CHECKSUM}
             intact = str(entry[CHECKSUM]) == _digest(arrays)
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):
         intact = False
     if intact:
         return arrays

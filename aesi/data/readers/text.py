@@ -36,6 +36,7 @@ BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
+WITH_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
 
 
@@ -92,26 +93,27 @@ class TextTable:
         layout = self._layout
         names = [str(position) for position in range(len(layout.header))]
         wanted = [names[position] for position in positions]
-        reader = pacsv.open_csv(
-            pa.PythonFile(self._utf8(), mode="r"),
-            pacsv.ReadOptions(
-                use_threads=False,
-                block_size=BLOCK_BYTES,
-                column_names=names,
-                skip_rows=layout.lines_before_data,
-            ),
-            pacsv.ParseOptions(delimiter=layout.separator),
-            pacsv.ConvertOptions(
-                column_types=dict.fromkeys(wanted, pa.float64()),
-                include_columns=wanted,
-                null_values=list(MISSING),
-                decimal_point=layout.decimal,
-            ),
-        )
-        pieces: list[list[Array]] = [[] for _ in wanted]
-        for batch in reader:
-            for column, piece in zip(batch.columns, pieces, strict=True):
-                piece.append(column.to_numpy(zero_copy_only=False).astype(float, copy=False))
+        with self._utf8() as stream:
+            reader = pacsv.open_csv(
+                pa.PythonFile(stream, mode="r"),
+                pacsv.ReadOptions(
+                    use_threads=False,
+                    block_size=BLOCK_BYTES,
+                    column_names=names,
+                    skip_rows=layout.lines_before_data,
+                ),
+                pacsv.ParseOptions(delimiter=layout.separator),
+                pacsv.ConvertOptions(
+                    column_types=dict.fromkeys(wanted, pa.float64()),
+                    include_columns=wanted,
+                    null_values=list(MISSING),
+                    decimal_point=layout.decimal,
+                ),
+            )
+            pieces: list[list[Array]] = [[] for _ in wanted]
+            for batch in reader:
+                for column, piece in zip(batch.columns, pieces, strict=True):
+                    piece.append(column.to_numpy(zero_copy_only=False).astype(float, copy=False))
         return [np.concatenate(piece) if piece else np.empty(0) for piece in pieces]
 
     def _bytes(self) -> BinaryIO:
@@ -235,9 +237,13 @@ def _layout(text: str, encoding: str, *, whole: bool, name: str) -> Layout:
 
 
 def _decimal(lines: list[str], separator: str) -> str:
-    """A comma, where cells are separated otherwise and commas but no points are in the first rows."""
-    body = "".join(lines)
-    return "," if separator != "," and "," in body and "." not in body else "."
+    """A comma, where cells are separated otherwise and more of the first ones have a comma than a point."""
+    if separator == ",":
+        return "."
+    cells = [cell.strip() for line in lines for cell in line.split(separator)]
+    commas = sum(bool(WITH_COMMA.fullmatch(cell)) for cell in cells)
+    points = sum("." in cell and bool(NUMBER.fullmatch(cell)) for cell in cells)
+    return "," if commas > points else "."
 
 
 def _advice(cell: str) -> str:

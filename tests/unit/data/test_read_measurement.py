@@ -1,0 +1,244 @@
+"""Reading: what is accepted, what is refused, and with which words."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.data import read_measurement
+from aesi.errors import DataError
+
+N = 200
+TIME = np.arange(N) * 1.0
+CURRENT = np.where((TIME // 10) % 2 == 0, 5.0, -2.0)
+VOLTAGE = 3.7 - 0.01 * CURRENT - 1e-4 * TIME
+HEADER = "time_s,current_a,voltage_v"
+
+
+def text(time=TIME, current=CURRENT, voltage=VOLTAGE, header=HEADER, separator=",", end="\n"):
+    rows = (separator.join(map(repr, map(float, row))) for row in zip(time, current, voltage, strict=True))
+    return header + end + end.join(rows) + end
+
+
+def with_line(number: int, line: str) -> str:
+    """The good file, one of its lines (1 is the header) replaced."""
+    lines = text().split("\n")
+    lines[number - 1] = line
+    return "\n".join(lines)
+
+
+def written(folder: Path, content: str | bytes, name: str = "drive.csv") -> Path:
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def refusal(folder: Path, content: str | bytes, **options) -> str:
+    with pytest.raises(DataError) as caught:
+        read_measurement(written(folder, content), **options)
+    assert caught.value.exit_code == 2
+    message = str(caught.value)
+    assert "\n" not in message
+    return message
+
+
+def assert_same(measurement):
+    np.testing.assert_allclose(measurement.time_s, TIME)
+    np.testing.assert_allclose(measurement.current_a, CURRENT)
+    np.testing.assert_allclose(measurement.voltage_v, VOLTAGE)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        pytest.param(text().encode(), id="plain"),
+        pytest.param(text(end="\r\n").encode(), id="windows lines"),
+        pytest.param(b"\xef\xbb\xbf" + text().encode(), id="byte order mark"),
+        pytest.param(text().encode("utf-16"), id="utf-16"),
+        pytest.param(text(separator=";", header="time_s;current_a;voltage_v").encode(), id="semicolons"),
+        pytest.param(
+            text(separator=";", header="time_s;current_a;voltage_v").replace(".", ",").encode(),
+            id="decimal commas",
+        ),
+        pytest.param(text(separator="\t", header='"time_s"\t"current_a"\t"voltage_v"').encode(), id="tabs"),
+        pytest.param(b"# made by hand\n\n" + text().encode(), id="comment above"),
+        pytest.param(text(header=" Time_s , CURRENT_A,voltage_v").encode(), id="other case"),
+        pytest.param(gzip.compress(text().encode()), id="gzip"),
+    ],
+)
+def test_every_way_of_writing_gives_the_same_numbers(tmp_path, content):
+    assert_same(read_measurement(written(tmp_path, content)))
+
+
+def test_parquet_is_read_like_csv(tmp_path):
+    import pandas as pd
+
+    frame = pd.DataFrame({"time_s": TIME, "current_a": CURRENT, "voltage_v": VOLTAGE})
+    frame.to_parquet(tmp_path / "drive.parquet")
+    assert_same(read_measurement(tmp_path / "drive.parquet"))
+
+
+def test_bdf_is_turned_to_discharge_positive(tmp_path):
+    header = "Test Time / s,Current / A,Voltage / V"
+    measurement = read_measurement(written(tmp_path, text(current=-CURRENT, header=header), "cell.bdf.csv"))
+    assert_same(measurement)
+    assert measurement.name == "cell"
+    assert any("positive on charge" in note for note in measurement.notes)
+
+
+def test_bdf_machine_names_are_known_too(tmp_path):
+    header = "test_time_second,current_ampere,voltage_volt"
+    assert_same(read_measurement(written(tmp_path, text(current=-CURRENT, header=header))))
+
+
+def test_other_headers_are_mapped_with_their_sign(tmp_path):
+    path = written(tmp_path, text(current=-CURRENT, header="Time [s],I[A],U[V]"))
+    columns = {"time_s": "Time [s]", "current_a": "I[A]", "voltage_v": "U[V]"}
+    assert_same(read_measurement(path, columns, "charge-positive"))
+
+
+def test_a_missing_column_names_the_nearest_and_the_option(tmp_path):
+    message = refusal(tmp_path, text(header="time_s,I[A],voltage_v"))
+    assert "drive.csv" in message
+    assert "current_a" in message
+    assert '--column current_a="I[A]"' in message
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        pytest.param("4.0,abc,3.7", ["current_a", "row 5", "line 6", "'abc'"], id="no number"),
+        pytest.param("4.0,1_000,3.7", ["current_a", "row 5", "not a number"], id="underscore"),
+        pytest.param("4.0,,3.7", ["current_a", "row 5", "line 6", "NaN"], id="empty"),
+        pytest.param("4.0,nan,3.7", ["current_a", "row 5", "NaN"], id="nan"),
+        pytest.param("4.0,1.0,inf", ["voltage_v", "row 5", "infinite"], id="infinite"),
+        pytest.param("4.0,1.0", ["row 5", "line 6", "2 cells"], id="short row"),
+        pytest.param("2.5,5.0,3.7", ["time_s", "row 5", "runs back"], id="time back"),
+        pytest.param("3.0,5.0,3.7", ["time_s", "row 5", "twice"], id="duplicate"),
+        pytest.param("4.0,5.0,0.0", ["voltage_v", "row 5", "0 V"], id="dropout"),
+    ],
+)
+def test_one_bad_row_is_named(tmp_path, line, words):
+    message = refusal(tmp_path, with_line(6, line))
+    assert "drive.csv" in message
+    for word in words:
+        assert word in message
+
+
+def test_the_first_bad_row_is_named_below_blank_lines(tmp_path):
+    message = refusal(tmp_path, text().replace("\n", "\n\n") + "x,1,2\n")
+    assert "row 201 (line 403)" in message
+
+
+def test_duplicates_can_be_dropped_and_that_is_said(tmp_path):
+    path = written(tmp_path, with_line(6, "3.0,5.0,3.7"))
+    measurement = read_measurement(path, duplicates="last")
+    assert len(measurement) == N - 1
+    assert any("1 rows" in note for note in measurement.notes)
+
+
+def test_a_gap_is_refused_with_both_ways_out(tmp_path):
+    lines = text().split("\n")
+    content = "\n".join(lines[:60] + lines[150:])
+    message = refusal(tmp_path, content)
+    assert "gap of 91 s after 58 s" in message
+    assert len(read_measurement(written(tmp_path, content), stop_s=58)) == 59
+    assert len(read_measurement(written(tmp_path, content), start_s=149)) == N - 149
+
+
+def test_a_sparsely_logged_rest_is_no_gap_but_a_note(tmp_path):
+    time = np.concatenate([np.arange(50.0), [500.0], 500 + np.arange(1.0, 50)])
+    current = np.concatenate([np.tile([5.0, -5.0], 20), np.zeros(20), np.tile([5.0, -5.0], 20)])
+    voltage = 3.7 - 0.01 * current
+    measurement = read_measurement(written(tmp_path, text(time, current, voltage)))
+    assert len(measurement) == len(time)
+    assert any("rested" in note for note in measurement.notes)
+
+
+def test_a_lone_row_long_after_the_test_is_dropped_and_that_is_said(tmp_path):
+    content = text() + "50000.0,0.0,3.9\n"
+    measurement = read_measurement(written(tmp_path, content))
+    assert_same(measurement)
+    assert any("dropped" in note for note in measurement.notes)
+
+
+@pytest.mark.parametrize(
+    ("columns", "words"),
+    [
+        ({"current": -CURRENT}, ["sign", "--sign charge-positive"]),
+        ({"current": 1000 * CURRENT}, ["current_a", "mA"]),
+        ({"voltage": 1000 * VOLTAGE}, ["voltage_v", "mV"]),
+        ({"voltage": np.full(N, 3.7)}, ["voltage_v", "all 200 rows"]),
+    ],
+)
+def test_values_that_contradict_themselves_are_refused(tmp_path, columns, words):
+    message = refusal(tmp_path, text(**columns))
+    for word in words:
+        assert word in message
+
+
+def test_the_sign_of_a_plain_discharge_is_checked_along_the_test(tmp_path):
+    discharge = np.full(N, 3.0)
+    falling = np.linspace(4.1, 3.2, N)
+    read_measurement(written(tmp_path, text(current=discharge, voltage=falling)))
+    assert "along the test" in refusal(tmp_path, text(current=-discharge, voltage=falling))
+
+
+def test_a_unit_in_the_name_is_believed(tmp_path):
+    message = refusal(tmp_path, text(header="time_s,I[mA],voltage_v"), columns={"current_a": "I[mA]"})
+    assert "ma by its name" in message
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        (b"", "empty"),
+        (HEADER.encode(), "0 rows"),
+        (text().split("\n", 1)[1].encode(), "header"),
+        (bytes(range(256)) * 10, "binary"),
+        (gzip.compress(text().encode())[:300], "truncated"),
+        (b"PAR1" + b"x" * 20, "damaged"),
+        (b"PK\x03\x04" + b"x" * 20, "spreadsheet"),
+        (text(separator=" ", header="time_s current_a voltage_v").encode(), "no comma"),
+        (text(header="time_s,voltage_v,voltage_v").encode(), "2 columns named"),
+        (text().encode() + b"200.0,5.0", "2 cells"),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path, content, word):
+    assert word in refusal(tmp_path, content)
+
+
+def test_no_file_and_a_folder(tmp_path):
+    with pytest.raises(DataError, match="no file"):
+        read_measurement(tmp_path / "nowhere.csv")
+    with pytest.raises(DataError, match="folder"):
+        read_measurement(tmp_path)
+
+
+def test_a_last_line_without_end_is_said(tmp_path):
+    measurement = read_measurement(written(tmp_path, text()[:-1]))
+    assert any("last line" in note for note in measurement.notes)
+
+
+def test_temperature_can_be_left_out(tmp_path):
+    lines = [f"{line},300.0" for line in text().strip().split("\n")]
+    lines[0] = HEADER + ",temperature_degc"
+    path = written(tmp_path, "\n".join(lines) + "\n")
+    with pytest.raises(DataError, match="kelvin"):
+        read_measurement(path)
+    assert read_measurement(path, {"temperature_degc": None}).temperature_degc is None
+
+
+def test_decimation_keeps_the_charge_and_is_said(tmp_path):
+    measurement = read_measurement(written(tmp_path, text()), max_rows=50)
+    assert len(measurement) <= 50
+    charge = np.sum(measurement.current_a[1:] * np.diff(measurement.time_s))
+    last = np.searchsorted(TIME, measurement.time_s[-1])
+    assert charge == pytest.approx(np.sum(CURRENT[1 : last + 1]))
+    assert any("Decimated from 200" in note for note in measurement.notes)
+
+
+@pytest.mark.parametrize("options", [{"sign": "positive"}, {"duplicates": "all"}, {"columns": {"x": "y"}}])
+def test_unknown_options_are_refused(tmp_path, options):
+    refusal(tmp_path, text(), **options)

@@ -1,0 +1,76 @@
+"""Fewer or even rows: charge kept, averages where there is something to average."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aesi.data.resample import Intervals, decimate, to_even
+from aesi.errors import DataError
+from aesi.records import Measurement
+
+
+def measurement(time, current, voltage=None):
+    voltage = 3.7 - 0.01 * np.asarray(current) if voltage is None else voltage
+    return Measurement(np.asarray(time, float), np.asarray(current, float), np.asarray(voltage, float))
+
+
+def held_charge(m):
+    return np.sum(m.current_a[1:] * np.diff(m.time_s))
+
+
+def test_hand_worked_averages():
+    # Rows at 0, 1, 3 s hold 0, 2, 5 A over the time before them: 2 C to 1 s, 10 C more to 3 s.
+    intervals = Intervals(np.array([0.0, 1.0, 3.0]), np.array([0.0, 1.5, 3.0]))
+    np.testing.assert_allclose(intervals.held(np.array([0.0, 2.0, 5.0])), [0.0, 4.5 / 1.5, 7.5 / 1.5])
+    # Straight lines 0 -> 2 -> 5 have areas 1 + 0.5 (2 + 2.75) / 2 = 2.1875 and 5.8125.
+    np.testing.assert_allclose(intervals.linear(np.array([0.0, 2.0, 5.0])), [0.0, 2.1875 / 1.5, 5.8125 / 1.5])
+
+
+@given(
+    steps=st.lists(st.floats(0.01, 100.0), min_size=2, max_size=60),
+    share=st.floats(0.01, 1.0),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_the_charge_up_to_the_last_stamp_is_kept(steps, share, seed):
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    current = np.random.default_rng(seed).uniform(-10, 10, len(time))
+    even = to_even(measurement(time, current), share * time[-1])
+    charge = np.interp(even.time_s[-1], time, np.concatenate([[0], np.cumsum(current[1:] * np.diff(time))]))
+    assert held_charge(even) == pytest.approx(charge, rel=1e-9, abs=1e-9 * time[-1])
+
+
+def test_rows_that_are_even_stay_as_they_are():
+    record = measurement(np.arange(10.0), np.ones(10))
+    assert to_even(record, 1.0) is record
+
+
+def test_a_straight_voltage_between_sparse_rows_stays_straight():
+    record = measurement([0.0, 60.0, 120.0], [1.0, 1.0, 1.0], [4.0, 3.9, 3.8])
+    even = to_even(record, 1.0)
+    np.testing.assert_allclose(even.voltage_v, 4.0 - 0.1 * even.time_s / 60)
+    assert any("Resampled" in note for note in even.notes)
+
+
+def test_temperature_goes_along():
+    record = Measurement(np.arange(0, 10, 0.1), np.ones(100), np.full(100, 3.7), np.full(100, 25.0))
+    np.testing.assert_allclose(to_even(record, 1.0).temperature_degc, 25.0)
+
+
+@pytest.mark.parametrize("step", [0.0, -1.0, 100.0, np.nan, 1e-9])
+def test_impossible_steps_are_refused(step):
+    with pytest.raises(DataError):
+        to_even(measurement(np.arange(10.0), np.ones(10)), step)
+
+
+@given(n=st.integers(3, 400), most=st.integers(2, 50))
+def test_decimation_is_never_longer_than_asked(n, most):
+    record = measurement(np.arange(float(n)), np.sin(np.arange(n)))
+    few = decimate(record, most)
+    assert len(few) <= max(most, 2)
+    assert few is record or any("Decimated" in note for note in few.notes)
+
+
+def test_decimation_to_one_row_is_refused():
+    with pytest.raises(DataError):
+        decimate(measurement(np.arange(10.0), np.ones(10)), 1)
