@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -85,14 +84,16 @@ class SearchResult:
     """All finished trials of a study, and what to choose from them."""
 
     study: Study
+    trials: tuple[Trial, ...]
     library_size: int
     weights: FitnessWeights
 
-    @cached_property
-    def trials(self) -> tuple[Trial, ...]:
-        """In order of their number."""
-        stored = self.study.get_trials(deepcopy=False, states=_FINISHED)
-        return tuple(sorted((_read(trial) for trial in stored), key=lambda trial: trial.number))
+    @classmethod
+    def of(cls, study: Study, library_size: int, weights: FitnessWeights) -> SearchResult:
+        """What the study holds now, in the order of the index."""
+        stored = study.get_trials(deepcopy=False, states=_FINISHED)
+        trials = sorted((_read(trial) for trial in stored), key=lambda trial: trial.number)
+        return cls(study, tuple(trials), library_size, weights)
 
     @property
     def feasible(self) -> tuple[Trial, ...]:
@@ -154,9 +155,10 @@ def search(
     on_candidate : called with index, genome and outcome as each is evaluated.
     evaluate_one : what evaluates a candidate; evaluate_many, if given, evaluates a generation instead.
     population : candidates in a generation.  warm_start : genomes to begin with.
-    shared : other processes work on the study now; else trials that a killed process left are taken up again.
+    shared : other processes work on the study now; then indices under evaluation are marked in the storage
+    (a candidate that two take in the same instant is evaluated twice).
     The same seed gives the same candidates, interrupted or not, as long as one process searches.
-    Exceptions of the evaluation are bugs: the trial is marked as failed and they propagate.
+    Exceptions of the evaluation are bugs: what the generation has finished is stored, and they propagate.
     """
     space = space or GenomeSpace.of(problem.library)
     if space.size != len(problem.library):
@@ -164,9 +166,6 @@ def search(
     constraints = constraints or Constraints()
     sampler = TermSampler(space, seed, population, warm_start)
     study = _open(storage, name, sampler)
-    if not shared:
-        for left in study.get_trials(deepcopy=False, states=[TrialState.RUNNING]):
-            study.tell(left.number, state=TrialState.FAIL)
 
     def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:
         return ((k, evaluate_one(problem, genome)) for k, genome in enumerate(genomes))
@@ -179,8 +178,9 @@ def search(
             evaluate_many or one_by_one,
             constraints,
             on_candidate,
+            shared,
         )
-    return SearchResult(study, space.size, weights or FitnessWeights())
+    return SearchResult.of(study, space.size, weights or FitnessWeights())
 
 
 def _generation(
@@ -190,41 +190,65 @@ def _generation(
     evaluate_many: EvaluateMany,
     constraints: Constraints,
     on_candidate: OnCandidate | None,
+    shared: bool,
 ) -> None:
-    indices = _next_indices(study, sampler.size, most)
-    asked = [sampler.ask(study, index) for index in indices]
+    asked: list[tuple[int, Genome]] = []
+    claims: dict[int, int] = {}
+    for index in _next_indices(study, sampler.size, most):
+        genome = sampler.propose(study, index)
+        asked.append((index, genome))
+        if shared:
+            claims[index] = _claim(study, sampler, genome, index)
     outcomes: dict[int, Outcome] = {}
     try:
         for position, outcome in evaluate_many([genome for _, genome in asked]):
             outcomes[position] = outcome
             if on_candidate is not None:
-                on_candidate(indices[position], asked[position][1], outcome)
+                on_candidate(*asked[position], outcome)
     finally:
         # What is known is told even if the rest was interrupted, so that a resumed search keeps it.
-        for position, (trial, _) in enumerate(asked):
+        for position, (index, genome) in enumerate(asked):
             if position in outcomes:
-                _tell(study, trial, outcomes[position], constraints)
-            else:
-                study.tell(trial, state=TrialState.FAIL)
+                study.add_trial(_finished(sampler, genome, index, outcomes[position], constraints))
+        for number in claims.values():
+            study.tell(number, state=TrialState.FAIL)
+
+
+def _claim(study: Study, sampler: TermSampler, genome: Genome, index: int) -> int:
+    """Number of a running trial that tells other workers which index is taken; it fails when that is over."""
+    study.add_trial(sampler.write(genome, index, TrialState.RUNNING))
+    mine = [
+        t
+        for t in study.get_trials(deepcopy=False, states=[TrialState.RUNNING])
+        if t.user_attrs[INDEX] == index
+    ]
+    return mine[-1].number
 
 
 def _next_indices(study: Study, population: int, most: int) -> list[int]:
     """The lowest free indices, within one generation so that the next one has all of its parents."""
     trials = study.get_trials(deepcopy=False, states=(*_FINISHED, TrialState.RUNNING))
-    taken = {trial.user_attrs.get(INDEX) for trial in trials}
+    taken = {trial.user_attrs[INDEX] for trial in trials}
     free = [index for index in range(len(trials) + most) if index not in taken][:most]
     return [index for index in free if index // population == free[0] // population]
 
 
-def _tell(study: Study, trial: optuna.Trial, outcome: Outcome, constraints: Constraints) -> None:
+def _finished(
+    sampler: TermSampler, genome: Genome, index: int, outcome: Outcome, constraints: Constraints
+) -> FrozenTrial:
     if isinstance(outcome, Failed):
-        trial.set_user_attr("reason", outcome.reason)
-        study.tell(trial, state=TrialState.PRUNED)
-        return
-    trial.set_user_attr(_RECORD, {key: float(getattr(outcome, key)) for key in _RECORDED})
-    trial.set_constraint("pearson_train", constraints.pearson_train - outcome.pearson_train)
-    trial.set_constraint("pearson_valid", constraints.pearson_valid - outcome.pearson_valid)
-    study.tell(trial, outcome.losses)
+        return sampler.write(genome, index, TrialState.PRUNED, user_attrs={"reason": outcome.reason})
+    return sampler.write(
+        genome,
+        index,
+        TrialState.COMPLETE,
+        values=list(outcome.losses),
+        user_attrs={_RECORD: {key: float(getattr(outcome, key)) for key in _RECORDED}},
+        constraints={
+            "pearson_train": constraints.pearson_train - outcome.pearson_train,
+            "pearson_valid": constraints.pearson_valid - outcome.pearson_valid,
+        },
+    )
 
 
 def _open(storage: str | Path | BaseStorage | None, name: str, sampler: TermSampler) -> Study:

@@ -4,7 +4,8 @@ One Optuna parameter a term costs 40 ms a trial in memory and 2.2 s on SQLite at
 and mutating whole words of bits loses the single term. Here Optuna keeps six parameters (lambda1, lambda2,
 tau, p_c, d, feedback), visible to its dashboard, and the mask travels as one user attribute of the trial,
 packed in hexadecimal. Optuna does what it is good at (ranking under constraints, crowding, generations,
-storage); crossover and mutation of the mask are ten lines of numpy. `overhead` in tests/flows measures it.
+storage); crossover and mutation of the mask are ten lines of numpy. A trial is written once, when it is
+finished, instead of attribute by attribute. tests/flows/test_search.py measures what this costs.
 
 Every candidate has an index in the search, stored with its trial. Random numbers come from (seed, index): a
 search is the same whether it was interrupted or not, and workers that share a study draw different points.
@@ -21,7 +22,7 @@ import numpy as np
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
 from optuna.samplers import NSGAIISampler
 from optuna.study import Study
-from optuna.trial import FrozenTrial, Trial
+from optuna.trial import FrozenTrial, TrialState, create_trial
 
 from aesi.sparse.genome import Genome
 from aesi.sparse.genome_space import GenomeSpace
@@ -46,7 +47,7 @@ def distributions(space: GenomeSpace) -> dict[str, BaseDistribution]:
 
 
 class TermSampler(NSGAIISampler):
-    """NSGA-II that knows how to cross masks. `warm_start` genomes are the first trials."""
+    """NSGA-II that knows how to cross masks. `warm_start` genomes are the first candidates."""
 
     def __init__(
         self, space: GenomeSpace, seed: int, population_size: int = 20, warm_start: Sequence[Genome] = ()
@@ -56,38 +57,57 @@ class TermSampler(NSGAIISampler):
         self._space = space
         self._seed = seed
         self._warm_start = tuple(warm_start)
-        self._index = 0
-        self._terms = ""
 
-    def ask(self, study: Study, index: int) -> tuple[Trial, Genome]:
-        """The trial of the candidate with this index, and its genome."""
-        self._index = index
-        trial = study.ask(distributions(self._space))
-        trial.set_user_attr(TERMS, self._terms)
-        trial.set_user_attr(INDEX, index)
-        return trial, Genome(terms=self._terms, **trial.params)
+    def propose(self, study: Study, index: int) -> Genome:
+        """The genome of the candidate with this index, given the generations before its own."""
+        if index < len(self._warm_start):
+            return self._warm_start[index]
+        rng = np.random.default_rng([self._seed, index])
+        parents = self.get_parent_population(study, index // self.size)
+        if not parents:
+            return self._space.random(rng)
+        parents = _by_index(parents)
+        return self._space.child(_tournament(parents, rng), _tournament(parents, rng), rng)
 
-    def infer_relative_search_space(self, study: Study, trial: FrozenTrial) -> dict[str, BaseDistribution]:
-        return distributions(self._space)
+    def get_population(self, study: Study, generation: int) -> list[FrozenTrial]:
+        """The evaluated trials of a generation, read afresh: Optuna's own cache is only emptied by `ask`."""
+        evaluated = study.get_trials(deepcopy=False, states=[TrialState.COMPLETE])
+        return [trial for trial in evaluated if trial.user_attrs[INDEX] // self.size == generation]
 
-    def get_trial_generation(self, study: Study, trial: FrozenTrial) -> int:
-        generation = self._index // self.size
-        study._storage.set_trial_system_attr(trial._trial_id, self._get_generation_key(), generation)
-        return generation
+    def select_parent(self, study: Study, generation: int) -> list[FrozenTrial]:
+        """The elite of a generation and its parents, which breaks ties by the order in which it meets them."""
+        earlier = self.get_population(study, generation - 1)
+        return self._elite_population_selection_strategy(
+            study, _by_index([*earlier, *self.get_parent_population(study, generation - 1)])
+        )
 
-    def sample_relative(
-        self, study: Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
-    ) -> dict[str, Any]:
-        rng = np.random.default_rng([self._seed, self._index])
-        parents = self.get_parent_population(study, self.get_trial_generation(study, trial))
-        if self._index < len(self._warm_start):
-            genome = self._warm_start[self._index]
-        elif parents:
-            genome = self._space.child(_tournament(parents, rng), _tournament(parents, rng), rng)
-        else:
-            genome = self._space.random(rng)
-        self._terms = genome.terms
-        return {name: getattr(genome, name) for name in search_space}
+    def write(self, genome: Genome, index: int, state: TrialState, **contents: Any) -> FrozenTrial:
+        """A trial that carries the genome, for `Study.add_trial`: a single write to the storage."""
+        chosen = distributions(self._space)
+        noted = contents.pop("user_attrs", {})
+        return create_trial(
+            state=state,
+            params={name: getattr(genome, name) for name in chosen},
+            distributions=_widened(chosen, genome),
+            user_attrs={TERMS: genome.terms, INDEX: index, **noted},
+            system_attrs={self._get_generation_key(): index // self.size},
+            **contents,
+        )
+
+
+def _widened(chosen: dict[str, BaseDistribution], genome: Genome) -> dict[str, BaseDistribution]:
+    """Ranges that hold a warm start from outside of the space as well; Optuna refuses it otherwise."""
+    for name, distribution in chosen.items():
+        value = getattr(genome, name)
+        if isinstance(distribution, FloatDistribution | IntDistribution):
+            distribution.low = min(distribution.low, value)
+            distribution.high = max(distribution.high, value)
+    return chosen
+
+
+def _by_index(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:
+    """One order for all: Optuna hands parents out ranked the first time, and as stored from then on."""
+    return sorted(trials, key=lambda trial: trial.user_attrs[INDEX])
 
 
 def genome_of(trial: FrozenTrial) -> Genome:

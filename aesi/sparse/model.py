@@ -89,7 +89,7 @@ class SparseModel:
         if self.has_feedback:
             scaled, diverged = free_run.run(drive, self._functions, scaled0, self._clip, free_run.LIMIT)
         else:
-            scaled, diverged = free_run.remember(drive[0], self.memory, scaled0), -1
+            scaled, diverged = free_run.held(free_run.remember(drive[0], self.memory, scaled0))
         error_v = np.append(start, self.scaling.error_to_volts(scaled))
         variables[:, 0] = error_v
         return FreeRun(error_v, None if diverged < 0 else diverged + 1, self.scaling.is_outside(variables))

@@ -1,0 +1,206 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sparse_records import make_record
+
+from aesi.errors import DataError
+from aesi.numerics.metrics import mser
+from aesi.records import Failed, Split
+from aesi.sparse import Candidate, FitnessWeights, Genome, Options, Problem, evaluate, fitness
+from aesi.sparse.ranking import svd_scores
+
+
+def whole(problem, lambda1=1e-3, lambda2=1e-3, **others):
+    return Genome.whole(problem.library, lambda1, lambda2, **{"tau": 0.5, "p_c": 2, "d": 2, **others})
+
+
+def test_a_known_error_is_recovered(problem, split):
+    candidate = evaluate(problem, whole(problem, 1e-2, 2e-2, feedback=False))
+    assert isinstance(candidate, Candidate)
+    for model in (candidate.bagging, candidate.stability):
+        assert {"T1(I)", "T1(I)*T1(soc)"} <= set(model.terms)
+        # Noise of 0.5 mV on an error of 5.5 mV RMS leaves 0.8 %; outside its range the model is clipped.
+        run = model.free_run(split.test[0])
+        assert mser(split.test[0].error_v[~run.outside], run.error_v[~run.outside]) > 98.5
+    assert candidate.loss_oob < 0.02
+    assert candidate.loss_sparse == len(candidate.bagging.terms)
+    assert candidate.pearson_train > 0.98
+
+
+def test_evaluation_is_pure(problem):
+    one, other = (evaluate(problem, whole(problem)) for _ in range(2))
+    assert one.losses == other.losses
+    np.testing.assert_array_equal(one.bagging.coefficients, other.bagging.coefficients)
+
+
+def test_feedback_is_recovered_and_its_gain_known(feedback_problem):
+    candidate = evaluate(feedback_problem, whole(feedback_problem, 1e-3, 5e-3))
+    series = make_record(seed=9, feedback=0.8)
+    assert mser(series.error_v, candidate.bagging.free_run(series).error_v) > 95
+    assert candidate.bagging.has_feedback
+    assert np.median(candidate.bagging.gain(series)) == pytest.approx(0.8, abs=0.1)
+
+
+def test_a_model_without_feedback_learns_a_memory(feedback_problem):
+    candidate = evaluate(feedback_problem, whole(feedback_problem, feedback=False))
+    assert not candidate.bagging.has_feedback
+    assert 0.5 < candidate.bagging.memory < 1
+
+
+def test_free_runs_of_the_search_equal_those_of_the_model(feedback_problem):
+    # The fold's fit, run by the vectorised loop over a piece, against the model's own loop.
+    from aesi.sparse.evaluate import sparse_model
+    from aesi.sparse.judge import fold_runs
+
+    problem = feedback_problem
+    genome = whole(problem, 1e-3, 1e-3)
+    candidate = evaluate(problem, genome)
+    active = np.flatnonzero(genome.active(problem.library))
+    names = [problem.library.names[j] for j in active]
+    table = candidate.bagging.coefficient_table()
+    coefficients = np.array([table.get(name, 0.0) for name in names])
+    fits = np.tile(coefficients, (len(problem.folds), 1))
+    runs, _ = fold_runs(problem, active, fits, fits, coefficients)
+    first = problem.split.train[0].take(slice(0, problem.folds[0][1] + 1))
+    model = replace(candidate.bagging, memory=0.0)
+    expected = problem.scaling.error_to_scaled(model.free_run(first).error_v[1:])
+    np.testing.assert_allclose(runs.free_run[: len(expected), 2], expected, atol=1e-10)
+    assert callable(sparse_model)
+
+
+def test_residuals_are_honest_and_complete(problem, split):
+    candidate = evaluate(problem, whole(problem, 1e-2, 1e-2, feedback=False))
+    assert [honest.record for honest in candidate.residuals] == ["record", "second"]
+    for honest, record in zip(candidate.residuals, split.train, strict=True):
+        assert len(honest.one_step_v) == len(honest.free_run_v) == len(record) - 1
+        assert honest.starts[0] == 0
+        # What is left is the noise of 0.5 mV.
+        assert np.std(honest.one_step_v) == pytest.approx(5e-4, rel=0.2)
+
+
+def test_validation_records_replace_the_folds(split):
+    both = Split(split.train, (make_record(300, seed=8, name="valid"),), ())
+    problem = Problem.build(both, Options(p_c=1, d=2, mixed=False, resamples=10, block=60))
+    candidate = evaluate(problem, whole(problem, feedback=False, p_c=1))
+    truth = both.valid[0].error_v
+    assert candidate.free_run_valid_mser_pct == pytest.approx(
+        mser(truth[1:], candidate.bagging.free_run(both.valid[0]).error_v[1:])
+    )
+
+
+def test_test_records_choose_nothing(split):
+    options = Options(p_c=1, d=2, mixed=False, resamples=5, block=60)
+    other = Split(split.train, split.valid, (make_record(seed=77),))
+    one, two = (Problem.build(s, options) for s in (split, other))
+    assert evaluate(one, whole(one, p_c=1)).losses == evaluate(two, whole(two, p_c=1)).losses
+
+
+def test_fitness_weighs_the_three_losses():
+    assert fitness((0.2, 0.4, 10), 100, FitnessWeights(0.5, 0.25, 1.0)) == pytest.approx(1 - 0.1 - 0.1 - 0.1)
+
+
+@pytest.mark.parametrize(
+    ("genome", "reason"),
+    [
+        (lambda p: Genome.of(np.zeros(len(p.library), dtype=bool), 1e-3, 1e-2, 0.5, 2, 2), "no term is left"),
+        (lambda p: whole(p, lambda2=1e3), "below lambda2 = 1000 in every resample"),
+        (lambda p: whole(p, lambda2=0.05, tau=1.0), "no term reaches an inclusion probability"),
+    ],
+)
+def test_expected_failures_are_values_with_reasons(problem, genome, reason):
+    outcome = evaluate(problem, genome(problem))
+    assert isinstance(outcome, Failed)
+    assert reason in outcome.reason
+
+
+def test_every_resample_diverging_is_a_reason():
+    # The error doubles every step within the trained range; extrapolated, every free run explodes.
+    n = 400
+    rng = np.random.default_rng(0)
+    base = make_record(n)
+    error = np.zeros(n)
+    for k in range(n - 1):
+        error[k + 1] = 1.9 * error[k] + 1e-3 * rng.normal() if abs(error[k]) < 1.0 else 1e-3 * rng.normal()
+    record = replace(base, error_v=error)
+    problem = Problem.build(
+        Split((record,), (), ()),
+        Options(p_c=1, d=1, special=False, resamples=5, block=100, outside="extrapolate"),
+    )
+    only = np.array([name == "T1(e)" for name in problem.library.names])
+    doubling = replace(problem, factors=_doubling(problem, only))
+    outcome = evaluate(doubling, Genome.of(only, 0.0, 1e-3, 0.5, 1, 1))
+    assert outcome == Failed("every resample diverges in free run")
+
+
+def _doubling(problem, only):
+    """Factors of the exact problem e'[k + 1] = 2 e'[k]."""
+    m = len(only)
+    factor = np.eye(m + 1)
+    factor[np.flatnonzero(only)[0], m] = 2.0
+    return np.tile(factor, (len(problem.factors), 1, 1))
+
+
+def with_column(values, position=1):
+    record = make_record(300)
+    inputs = record.inputs.copy()
+    inputs[:, position] = values(record)
+    return Split((replace(record, inputs=inputs),), (), ())
+
+
+SMALL = Options(p_c=1, d=2, mixed=False, resamples=5, block=50)
+
+
+def test_a_constant_input_is_left_out_with_a_note():
+    problem = Problem.build(with_column(lambda record: np.full(len(record), 0.5)), SMALL)
+    assert problem.library.variables == ("e", "I", "c_e0")
+    assert problem.notes == ("soc is constant over the training records; its terms were left out.",)
+
+
+def test_a_repeated_input_is_left_out_with_a_note():
+    problem = Problem.build(with_column(lambda record: 5 + 3 * record.inputs[:, 0]), SMALL)
+    assert "soc repeats I up to scale" in problem.notes[0]
+    assert isinstance(evaluate(problem, whole(problem, p_c=1)), Candidate)
+
+
+def test_a_constant_error_is_refused():
+    record = replace(make_record(300), error_v=np.full(300, 0.01))
+    with pytest.raises(DataError, match="the voltage error is constant"):
+        Problem.build(Split((record,), (), ()), SMALL)
+
+
+def test_nan_is_refused_with_its_place():
+    def broken(record):
+        column = record.inputs[:, 1].copy()
+        column[17] = np.nan
+        return column
+
+    with pytest.raises(DataError, match="soc is not a number at sample 17"):
+        Problem.build(with_column(broken), SMALL)
+
+
+def test_a_library_larger_than_the_data_is_refused():
+    with pytest.raises(DataError, match="needs more than the 99 training samples"):
+        Problem.build(Split((make_record(100),), (), ()), Options(p_c=5, d=5))
+
+
+def test_no_records_is_refused():
+    with pytest.raises(DataError, match="no training records"):
+        Problem.build(Split((), (), ()))
+
+
+def test_unequal_sampling_is_refused():
+    slower = replace(make_record(200), dt_s=2.0)
+    with pytest.raises(DataError, match="every 2 s, the first record every 1 s"):
+        Problem.build(Split((make_record(200), slower), (), ()), SMALL)
+
+
+def test_a_genome_of_another_library_is_refused(problem):
+    with pytest.raises(ValueError, match="does not fit a library"):
+        evaluate(problem, Genome("ff", 1e-3, 1e-2, 0.5, 1, 1))
+
+
+def test_svd_scores_of_orthogonal_features_are_their_squared_sizes():
+    # Orthogonal columns are their own singular vectors: score = sigma_j**2 / sum(sigma).
+    features = np.asfortranarray(np.array([[3.0, 0.0], [0.0, 1.0], [0.0, 0.0]]))
+    np.testing.assert_allclose(svd_scores(features), [9 / 4, 1 / 4])

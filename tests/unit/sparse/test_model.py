@@ -1,0 +1,121 @@
+import json
+
+import numpy as np
+import pytest
+from sparse_records import make_record
+
+from aesi.errors import DataError
+from aesi.records import ErrorSeries
+from aesi.sparse import Library, SparseModel, with_inputs
+from aesi.sparse.library import Term
+from aesi.sparse.scaling import Scaling
+
+
+def linear(feedback: float, gain: float, memory: float = 0.0, outside: str = "clip") -> SparseModel:
+    """In scaled variables e'[k + 1] = feedback e'[k] + gain I'[k]; scaling is the identity."""
+    terms = (Term(((0, 1),)), Term(((1, 1),))) if feedback else (Term(((1, 1),)),)
+    coefficients = np.array([feedback, gain] if feedback else [gain])
+    scaling = Scaling(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), outside)
+    return SparseModel("test", Library(("e", "I"), terms), coefficients, scaling, 1.0, memory)
+
+
+def record(error, current) -> ErrorSeries:
+    n = len(error)
+    return ErrorSeries(
+        "r", 1.0, np.arange(n, dtype=float), np.array(error, dtype=float),
+        np.array(current, dtype=float)[:, None], np.zeros(n), np.zeros(n), ("I",)
+    )  # fmt: skip
+
+
+def test_hand_worked_recursion():
+    run = linear(0.5, 0.1).free_run(record([0.8, 9, 9, 9], [1, 0, -1, 0]))
+    np.testing.assert_allclose(run.error_v, [0.8, 0.5, 0.25, 0.025])
+    assert run.diverged_at is None
+
+
+def test_one_step_uses_the_measured_error():
+    series = record([0.8, 0.4, -0.2, 0.0], [1, 0, -1, 0])
+    np.testing.assert_allclose(linear(0.5, 0.1).one_step(series), [0.8, 0.5, 0.2, -0.2])
+    np.testing.assert_allclose(linear(0.0, 0.1, 0.5).one_step(series), [0.8, 0.45, 0.15, -0.2])
+
+
+def test_k_steps_lie_between_one_step_and_free_run():
+    series = make_record(80)
+    for model in (linear(0.7, 0.05), linear(0.0, 0.05, 0.9)):
+        np.testing.assert_allclose(model.k_step(series, 1), model.one_step(series), atol=1e-15)
+        np.testing.assert_allclose(model.k_step(series, 200), model.free_run(series).error_v, atol=1e-15)
+        by_hand = model.free_run(series.take(slice(10, 16))).error_v[-1]
+        if model.memory == 0:
+            assert model.k_step(series, 5)[15] == pytest.approx(by_hand, abs=1e-15)
+
+
+def test_divergence_is_found_and_held():
+    run = linear(1.5, 0.0, outside="extrapolate").free_run(record([0.9] + [0] * 20, [0.0] * 21))
+    # 0.9 * 1.5**n exceeds ten at n = 6.
+    assert run.diverged_at == 6
+    assert run.error_v[-1] == pytest.approx(0.9 * 1.5**5)
+    assert run.outside[5]
+
+
+def test_clipping_bounds_an_unstable_map():
+    run = linear(1.5, 0.0).free_run(record([0.9] + [0] * 50, [0.0] * 51))
+    assert run.diverged_at is None
+    assert run.error_v[-1] == pytest.approx(1.5)
+    assert run.outside[-1]
+
+
+def test_inputs_outside_the_trained_range_are_held_and_flagged():
+    run = linear(0.0, 1.0).free_run(record([0, 0, 0, 0], [0.5, 3.0, -7.0, 0.0]))
+    np.testing.assert_allclose(run.error_v, [0.0, 0.5, 1.0, -1.0])
+    assert run.outside.tolist() == [False, True, True, False]
+
+
+def test_tan_past_its_pole_is_a_divergence_not_a_nan():
+    model = SparseModel(
+        "tan",
+        Library(("e", "I"), (Term(((1, 8),)),)),
+        np.array([1.0]),
+        Scaling(np.array([-1.0, -1.0]), np.array([1.0, 1.0]), "extrapolate"),
+        1.0,
+    )
+    run = model.free_run(record([0, 0, 0], [0.0, np.pi / 2, 0.0]))
+    assert np.isfinite(run.error_v).all()
+    assert run.diverged_at == 2
+
+
+def test_gain_is_the_slope_of_the_map():
+    series = make_record(60)
+    term = Library(("e", "I"), (Term(((0, 11), (1, 1))), Term(((0, 1),))))
+    scaling = Scaling(np.array([-0.05, -30.0]), np.array([0.05, 30.0]))
+    model = SparseModel("g", term, np.array([0.4, 0.3]), scaling, 1.0)
+    shift = 1e-7
+    moved = ErrorSeries(**{**series.__dict__, "error_v": series.error_v + shift})
+    central = (model.one_step(moved) - model.one_step(series))[1:] / shift
+    np.testing.assert_allclose(model.gain(series)[:-1], central, atol=1e-6)
+    assert linear(0.0, 0.1, 0.9).gain(series).tolist() == [0.9] * 60
+
+
+def test_json_round_trip():
+    model = linear(0.5, 0.1)
+    again = SparseModel.from_dict(json.loads(json.dumps(model.to_dict())))
+    series = make_record(50)
+    np.testing.assert_array_equal(again.free_run(series).error_v, model.free_run(series).error_v)
+    assert again.terms == ("T1(e)", "T1(I)")
+    with pytest.raises(DataError, match="not a sparse model"):
+        SparseModel.from_dict({"schema": "other"})
+
+
+def test_another_sampling_is_refused():
+    series = make_record(30)
+    with pytest.raises(DataError, match="the model steps 1 s"):
+        linear(0.5, 0.1).free_run(ErrorSeries(**{**series.__dict__, "dt_s": 0.1}))
+
+
+def test_inputs_are_derived_by_name():
+    series = with_inputs(make_record(40), ("I_next", "soc", "I_5s"))
+    current = make_record(40).current_a
+    np.testing.assert_array_equal(series.inputs[:, 0], np.append(current[1:], current[-1]))
+    keep = np.exp(-1 / 5)
+    assert series.inputs[1, 2] == pytest.approx(keep * current[0] + (1 - keep) * current[1])
+    with pytest.raises(DataError, match="no input 'voltage'"):
+        with_inputs(make_record(40), ("voltage",))

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+
+from aesi.errors import ParameterError
+from aesi.sparse import STRidge
+from aesi.sparse.stridge import triangle
+
+
+def test_hand_worked_case():
+    # Orthogonal columns of squared length 2: ridge divides x'y by 2 + lambda1; then 0.05 falls below 0.1.
+    theta = np.array([[1.0, 1.0], [1.0, -1.0]])
+    y = theta @ [3.0, 0.05]
+    np.testing.assert_allclose(STRidge(0.5, 0.1).fit(theta, y), [2 * 3.0 / 2.5, 0.0], rtol=1e-14)
+
+
+def test_weights_are_repeated_rows(rng):
+    theta, y = rng.normal(size=(40, 5)), rng.normal(size=40)
+    times = rng.integers(0, 4, 40)
+    repeated = np.repeat(np.arange(40), times)
+    solver = STRidge(1e-3, 0.05)
+    np.testing.assert_allclose(
+        solver.fit(theta, y, times.astype(float)), solver.fit(theta[repeated], y[repeated]), atol=1e-13
+    )
+
+
+def test_a_triangular_factor_poses_the_same_problem(rng):
+    theta, y = rng.normal(size=(200, 12)), rng.normal(size=200)
+    factor = triangle(np.column_stack([theta, y]))
+    solver = STRidge(1e-2, 0.05)
+    np.testing.assert_allclose(solver.fit_factor(factor), solver.fit(theta, y), atol=1e-14)
+
+
+def test_thresholding_all_leaves_nothing(rng):
+    assert not STRidge(1e-3, 1e6).fit(rng.normal(size=(20, 3)), rng.normal(size=20)).any()
+
+
+def test_duplicated_columns_without_ridge_share_the_coefficient(rng):
+    x = rng.normal(size=50)
+    coefficients = STRidge(0.0, 0.0).fit(np.column_stack([x, x]), 2 * x)
+    np.testing.assert_allclose(coefficients.sum(), 2.0, rtol=1e-9)
+    assert np.abs(coefficients).max() < 10
+
+
+def test_fewer_rows_than_terms_is_solved_by_the_ridge(rng):
+    theta, y = rng.normal(size=(5, 9)), rng.normal(size=5)
+    expected = np.linalg.solve(theta.T @ theta + 0.1 * np.eye(9), theta.T @ y)
+    np.testing.assert_allclose(STRidge(0.1, 0.0).fit(theta, y), expected, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("lambda1", "lambda2", "times"), [(-1, 0, 1), (0, -1, 1), (0, 0, 0), (float("nan"), 0, 1)]
+)
+def test_inadmissible_settings_are_named(lambda1, lambda2, times):
+    with pytest.raises(ParameterError, match="must not be negative"):
+        STRidge(lambda1, lambda2, times)
