@@ -165,10 +165,10 @@ def _out_of_bag(problem: Problem, active: IntArray, fits: Array, unseen: BoolArr
             prediction = free_predictions(problem, drive, functions, rows, problem.restart[rows], state)
         else:
             prediction = one_step_predictions(problem, drive, functions, rows)
-        mask = unseen[:, rows].T
+        weighted = np.where(unseen[:, rows], problem.row_weights[rows], 0.0).T
         target = problem.target[rows, None]
-        squared += np.square(target - prediction).sum(axis=0, where=mask)
-        bare += np.square(target[:, 0] - problem.zero) @ mask
+        squared += np.einsum("kj,kj->j", weighted, np.square(target - prediction))
+        bare += np.square(target[:, 0] - problem.zero) @ weighted
     with np.errstate(invalid="ignore", divide="ignore"):
         ratio = squared / bare
     return np.where(np.isfinite(ratio), ratio, np.inf)

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.numerics.metrics import mse, pearson
+from aesi.numerics.metrics import mse, mser, pearson
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries
 from aesi.sparse import free_run
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem
+from aesi.sparse.problem import Problem, balanced_weights, spans_of
 
 _MOST_MEMORY = 0.9999
 
@@ -66,15 +66,18 @@ class FoldRuns:
 
     def judge(self, problem: Problem, column: int) -> Judged:
         """How one of the three did over all pieces."""
-        bare = float(np.mean((problem.target - problem.zero) ** 2))
+        run = self.free_run if problem.options.regime == "free_run" else self.one_step
+        bare = problem.target - problem.zero
         with np.errstate(invalid="ignore"):
-            loss_step = mse(problem.target, self.one_step[:, column]) / bare
-            loss_free = mse(problem.target, self.free_run[:, column]) / bare
+            left = problem.target - run[:, column]
+            loss = float((problem.row_weights @ left**2) / (problem.row_weights @ bare**2))
+            loss_free = mse(problem.target, self.free_run[:, column]) / float(np.mean(bare**2))
+            loss_step = mse(problem.target, self.one_step[:, column])
         return Judged(
-            loss_free if problem.options.regime == "free_run" else loss_step,
+            loss,
             pearson(problem.target, self.free_run[:, column]),
             100.0 * (1.0 - loss_free),
-            problem.scaling.error_volts_per_unit * float(np.sqrt(loss_step * bare)),
+            problem.scaling.error_volts_per_unit * float(np.sqrt(loss_step)),
         )
 
 
@@ -118,20 +121,28 @@ def memory_of(problem: Problem, given: Sequence[Array]) -> float:
 
 def on_records(model: SparseModel, records: Sequence[ErrorSeries], problem: Problem) -> Judged:
     """How a model does on whole records, each started from its first measured error."""
-    truth = np.concatenate([record.error_v[1:] for record in records])
-    one_step = np.concatenate([model.one_step(record)[1:] for record in records])
+    truth = [record.error_v[1:] for record in records]
+    one_step = [model.one_step(record)[1:] for record in records]
     runs = [model.free_run(record) for record in records]
-    free = np.concatenate([run.error_v[1:] for run in runs])
-    bare = float(np.mean(truth**2))
-    diverged = any(run.diverged_at is not None for run in runs)
-    loss_free = np.inf if diverged else float(np.mean((truth - free) ** 2)) / bare
-    loss_step = float(np.mean((truth - one_step) ** 2)) / bare
+    free = [run.error_v[1:] for run in runs]
+    chosen = free if problem.options.regime == "free_run" else one_step
+    diverged = problem.options.regime == "free_run" and any(run.diverged_at is not None for run in runs)
+    joined, joined_free = np.concatenate(truth), np.concatenate(free)
     return Judged(
-        loss_free if problem.options.regime == "free_run" else loss_step,
-        pearson(truth, free),
-        100.0 * (1.0 - loss_free),
-        float(np.sqrt(loss_step * bare)),
+        np.inf if diverged else _relative_loss(truth, chosen, problem.options.balance),
+        pearson(joined, joined_free),
+        mser(joined, joined_free),
+        float(np.sqrt(mse(joined, np.concatenate(one_step)))),
     )
+
+
+def _relative_loss(truth: Sequence[Array], predictions: Sequence[Array], balance: bool) -> float:
+    """Squared error over that of the bare model; balanced, every record counts alike."""
+    spans = spans_of([len(record) for record in truth])
+    joined = np.concatenate(truth)
+    weights = balanced_weights(spans, joined) if balance else np.ones(len(joined))
+    left = joined - np.concatenate(predictions)
+    return float((weights @ left**2) / (weights @ joined**2))
 
 
 def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[SparseModel]) -> Judged:

@@ -53,6 +53,8 @@ class Options:
     best : share of resamples that enters the ensemble.  horizon : rows of a free run (default: the block).
     fold : rows of a left-out piece (default: an eighth of the rows).
     regime : what the losses measure.  outside : what happens beyond the trained range.
+    balance : let every record count alike, in fits and losses, whatever the size of its error. Otherwise one
+    record near the end of discharge, where the error is largest, decides the model for all others.
     """
 
     inputs: tuple[str, ...] | None = None
@@ -68,6 +70,7 @@ class Options:
     fold: int | None = None
     regime: Regime = "free_run"
     outside: Outside = "clip"
+    balance: bool = True
     seed: int = 0
 
 
@@ -79,8 +82,9 @@ class Problem:
     error_functions : (12, n) the functions of the fed-back error.  error, target : (n,) scaled e[k] and
     e[k + 1].
     counts : (resamples, n) how often each resample holds a row.
+    row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
     factors : (resamples, m + 1, m + 1), fold_factors likewise, and
-    full_factor (m + 1, m + 1): F with F' F = [Theta y]' W [Theta y].
+    full_factor (m + 1, m + 1): F with F' F = [Theta y]' W [Theta y], W the row weights times the counts.
     notes : what was left out of the library, and why, one sentence each.
     """
 
@@ -96,6 +100,7 @@ class Problem:
     error: Array
     target: Array
     counts: CountArray
+    row_weights: Array
     restart: BoolArray
     folds: tuple[Span, ...]
     factors: Array
@@ -126,7 +131,7 @@ class Problem:
                 f"a library of {len(library)} terms needs more than the {n} training samples there are; "
                 "lower p_c and d, leave out mixed terms, or give more data."
             )
-        spans = _spans([len(block) for block in scaled])
+        spans = spans_of([len(block) for block in scaled])
         parts, which = library.input_products
         products = evaluate_terms(parts, rows)
         error_functions = np.stack(
@@ -141,6 +146,9 @@ class Problem:
         augmented[:, -1] = target
         if not np.isfinite(augmented).all():
             raise DataError(_not_finite(library, augmented))
+        zero = float(scaling.error_to_scaled(np.array(0.0)))
+        row_weights = balanced_weights(spans, target - zero) if options.balance else np.ones(n)
+        augmented *= np.sqrt(row_weights)[:, None]
         q_rows, r = orthonormal(augmented)
         every = triangular_factors(weighted_grams(q_rows, np.vstack([weights, leave_out_weights(cut, n)])), r)
         return cls(
@@ -156,6 +164,7 @@ class Problem:
             error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
             target=target,
             counts=weights,
+            row_weights=row_weights,
             restart=starts_mask(pieces(spans, options.horizon or block), n),
             folds=cut,
             factors=every[: len(weights)],
@@ -170,14 +179,28 @@ class Problem:
         return float(self.scaling.error_to_scaled(np.array(0.0)))
 
     def weights(self, resample: int) -> Array:
-        """(n,) how often a resample holds each row."""
-        return self.counts[resample].astype(float)
+        """(n,) what each row counts in a resample."""
+        return self.counts[resample] * self.row_weights
 
     def theta(self, which: IntArray) -> Array:
         """(n_terms, n) the given terms along the training rows."""
         return np.asarray(
             self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
         )
+
+
+LEAST_SHARE = 0.1
+"""A record whose bare error is smaller than this share of the mean counts as if it were this large: a record on
+which the physics is all but exact should not rule the fit."""
+
+
+def balanced_weights(spans: Sequence[Span], bare: Array) -> Array:
+    """(n,) mean 1: a weight a row, by which every record's bare error (n,) adds the same to a sum of squares."""
+    squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans])
+    sizes = np.array([b - a for a, b in spans])
+    each = 1.0 / np.maximum(squares, LEAST_SHARE * squares.mean())
+    weights: Array = np.repeat(each, sizes)
+    return weights / weights.mean()
 
 
 def _prepared(
@@ -243,7 +266,8 @@ def _variables(record: ErrorSeries) -> Array:
     return np.column_stack([record.error_v, record.inputs])
 
 
-def _spans(lengths: Sequence[int]) -> tuple[Span, ...]:
+def spans_of(lengths: Sequence[int]) -> tuple[Span, ...]:
+    """Row ranges of records of these lengths, put one after the other."""
     edges = np.concatenate([[0], np.cumsum(lengths)])
     return tuple((int(a), int(b)) for a, b in pairwise(edges))
 
