@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import textwrap
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -102,4 +103,4 @@ def _tied(text: str) -> str:
     return re.sub(r"(\d) (?=(?:mV|%|s|V|A)(?!\w))", "\\1\u00a0", text)
 
 
-FILTERS = {"fixed": _fixed, "significant": _significant, "tied": _tied}
+FILTERS = {"fixed": _fixed, "significant": _significant, "tied": _tied, "dedented": textwrap.dedent}

@@ -7,6 +7,8 @@ from typing import Any
 
 from aesi.pipeline.report.views import DiscoveryView, Row, RunView
 
+SAME_SHARE = 0.98
+"""An error after that is not below this share of the recalibrated one is no better than a refit."""
 LARGE_SHARE = 0.5
 """An explainable rest above this share of the remaining error is worth a sentence."""
 
@@ -105,18 +107,31 @@ def discovery_consequence(view: DiscoveryView) -> str:
     }
     if any(value is None for value in values.values()):
         return ""
-    return (
+    text = (
         f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
         f"same model with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model "
         f"with the finding added by {values['after']:.1f} mV; the noise floor is "
         f"{view.discovery['noise_floor_mv']:.1f} mV."
     )
+    if view.discovery["effects"] and values["after"] > SAME_SHARE * values["recalibrated"]:
+        text += " A refit of the model's own parameters does as well here: it can stand in for the finding."
+    return text
+
+
+def look_alike_finding(view: DiscoveryView) -> str:
+    """What else fits as well, said next to the verdict."""
+    groups = [
+        [_title(view.titles, e) for e in group] for group in view.discovery.get("indistinguishable", [])
+    ]
+    if not groups:
+        return ""
+    return f"These data cannot tell {'; nor '.join(' from '.join(group) for group in groups)}."
 
 
 def rest_finding(discovery: Mapping[str, Any]) -> str:
     """What a data-driven correction could still explain."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")
-    text = f"A sparse correction learnt on what is left could still explain {rest:.1f} mV"
+    text = f"A flexible correction learnt on what is left could still explain {rest:.1f} mV"
     if after:
         share = "much" if rest > LARGE_SHARE * after else "little"
         text += f" of {after:.1f} mV: {share} structure is left for physics to name"

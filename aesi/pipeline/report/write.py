@@ -56,7 +56,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         discovery=view.discovery,
         states=STATES,
         finding=words.discovery_finding(view),
-        consequence=words.discovery_consequence(view),
+        sentences=[s for s in (words.look_alike_finding(view), words.discovery_consequence(view)) if s],
         rest=words.rest_finding(view.discovery),
         candidates=sorted(view.discovery["candidates"], key=lambda row: -row["score"]),
     )

@@ -85,6 +85,19 @@ def test_the_refit_stands_apart_from_the_finding(views):
     )
 
 
+def test_a_refit_that_does_as_well_is_said_to(views):
+    view = views.discovery_view(200)
+    assert "refit" not in words.discovery_consequence(view).split(";")[1]
+    same = {**view.discovery, "recalibrated": {"test": {"rmse_mv": 1.1}}}
+    assert "can stand in for the finding" in words.discovery_consequence(replace(view, discovery=same))
+
+
+def test_look_alikes_stand_next_to_the_verdict(views):
+    text = words.look_alike_finding(views.discovery_view(200))
+    assert text == "These data cannot tell self-heating from ambient temperature."
+    assert words.look_alike_finding(views.discovery_view(200, verdict="none")) == ""
+
+
 def test_lists_read_as_english():
     assert words.listed(["a"]) == "a"
     assert words.listed(["a", "b"]) == "a and b"

@@ -17,7 +17,9 @@ MOST_HYPOTHESES = 30
 def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen: Sequence[str]) -> Figure:
     """Score of every hypothesis, best on top, coloured and hatched by kind; a star marks those added."""
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES][::-1]
-    caption = "Score of each hypothesis; higher is better. The placebo has parameters but no physics."
+    caption = "Score of each hypothesis, evidence over the empty one in nats; higher is better."
+    if any(row["kind"] == "placebo" for row in rows):
+        caption += " The placebo has parameters but no physics."
     fig = style.figure("Hypotheses by score", caption, max(240, 110 + 20 * len(rows)), barmode="overlay")
     others = sorted({row["kind"] for row in rows} - set(KIND_ORDER))
     for kind in (*KIND_ORDER, *others):
@@ -37,7 +39,7 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
             )
     order = [_label(row, titles, chosen) for row in rows]
     fig.update_yaxes(categoryorder="array", categoryarray=order)
-    fig.update_xaxes(title_text="score, -", zeroline=True)
+    fig.update_xaxes(title_text="score, nats", zeroline=True)
     return fig
 
 
@@ -66,6 +68,7 @@ def dependence_bars(rows: Sequence[Row]) -> Figure:
     fig = style.figure(
         "What the residual depends on", caption, max(220, 110 + 34 * len(rows)), barmode="group"
     )
+    rows = sorted(rows, key=lambda row: -row["before"])
     names = [row["variable"] for row in rows][::-1]
     for state, label in (("after", "after"), ("before", "as declared")):
         fig.add_bar(

@@ -108,7 +108,7 @@ def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
         line(fig, item.x, y, role, colours[trace.role], first=role not in seen)
         seen.add(role)
     _mark_records(fig, placed)
-    fig.update_xaxes(title_text=f"time, records end to end, {unit}")
+    fig.update_xaxes(title_text=_time_title(placed, unit))
     fig.update_yaxes(title_text=label)
     caption = f"Measured {quantity} of the training (I), validation (II) and test (III) records."
     return style.framed(fig, f"{quantity.capitalize()} profile", caption, 320, hovermode="x unified")
@@ -137,7 +137,7 @@ def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure
     _mark_records(fig, placed)
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="error, mV", row=2, zeroline=True)
-    fig.update_xaxes(title_text=f"time, records end to end, {unit}", row=2)
+    fig.update_xaxes(title_text=_time_title(placed, unit), row=2)
     role = traces[0].role
     caption = (
         f"Top: measured voltage, {physics} alone, and {chosen} in free run (no measured voltage after the "
@@ -165,7 +165,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: dict[str, str]) ->
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="current, A", row=2)
     fig.update_yaxes(title_text="residual, mV", zeroline=True, row=3)
-    fig.update_xaxes(title_text=f"time, records end to end, {unit}", row=3)
+    fig.update_xaxes(title_text=_time_title(placed, unit), row=3)
     part = "data that chose nothing" if traces[0].part == "test" else "the data the loop was fitted on"
     caption = f"Residual (measured minus model) over time on {part}; discharge current is positive."
     return style.framed(
@@ -185,7 +185,7 @@ def interval_figure(traces: Sequence[Trace], model: str, zoom_s: float | None = 
     for i, item in enumerate(placed):
         _add_interval(fig, item, model, first=i == 0)
     _mark_records(fig, placed)
-    fig.update_xaxes(title_text=f"time, {unit}", row=2)
+    fig.update_xaxes(title_text=_time_title(placed, unit), row=2)
     fig.update_yaxes(title_text="voltage error, mV", row=1)
     fig.update_yaxes(title_text="minus prediction, mV", zeroline=True, row=2)
     title = f"Prediction intervals of {model}"
@@ -238,6 +238,10 @@ def _mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
                 xshift=3,
                 font={"size": 10, "color": style.GREY},
             )
+
+
+def _time_title(placed: Sequence[Placed], unit: str) -> str:
+    return f"time, records end to end, {unit}" if len(placed) > 1 else f"time, {unit}"
 
 
 def _error(trace: Trace, model_v: Array) -> Array:
