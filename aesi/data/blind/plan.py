@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 
 from aesi.data.blind.case import CaseSpec
@@ -9,11 +11,12 @@ from aesi.data.blind.recipes import RECIPES
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.simulator import Model
 
-NMC = "nmc_12ah5"
+NMC = "nmc"
 M50 = "lg_m50"
+FILES = {NMC: "nmc_30ah.bpx.json", M50: "lg_m50_chen2020.bpx.json"}
 RATES = {NMC: 1.0, M50: 0.7}
 """The LG M50 is an energy cell, with higher resistances; its currents stay lower."""
-SOC0 = {NMC: (0.8, 0.95), M50: (0.8, 0.95)}
+SOC0 = {NMC: (0.8, 0.95), M50: (0.7, 0.85)}
 TARGETS_MV = (2.0, 4.0, 8.0)
 TOLERANCE = 0.05
 SLOW = ("particle_size_distribution",)
@@ -28,6 +31,11 @@ PAIRS = (
     ("slow_negative_kinetics", "positive_ocp"),
     ("film_growth", "negative_diffusivity"),
 )
+
+
+def cells_in(folder: Path) -> dict[str, Path]:
+    """The two cells of the plan, from a folder of cell files such as experiments/cells."""
+    return {name: folder / file for name, file in FILES.items()}
 
 
 def plan(seed: int = 0) -> tuple[CaseSpec, ...]:

@@ -110,12 +110,12 @@ RECIPES: dict[str, Recipe] = {
     ),
     "positive_ocp": Recipe(
         "ocp_shape",
-        lambda m, q: {"positive_v": 8e-3 * m, "positive_centre": 0.58, "width": 0.08},
+        lambda m, q: {"positive_v": 8e-3 * m, "centre_soc": 0.75, "width_soc": 0.12},
         "ocp_shape",
     ),
     "negative_ocp": Recipe(
         "ocp_shape",
-        lambda m, q: {"positive_v": 0.0, "negative_v": 8e-3 * m, "negative_centre": 0.6, "width": 0.1},
+        lambda m, q: {"positive_v": 0.0, "negative_v": 8e-3 * m, "centre_soc": 0.8, "width_soc": 0.15},
         "ocp_shape",
     ),
     "double_layer": Recipe(
@@ -128,14 +128,14 @@ RECIPES: dict[str, Recipe] = {
     ),
     "negative_sloped_diffusivity": Recipe(
         "concentration_dependent_diffusivity",
-        lambda m, q: {"negative_slope": -3.0 * m, "negative_centre": 0.3},
+        lambda m, q: {"negative_slope": -3.0 * m, "centre_soc": 0.5},
         "concentration_dependent_diffusivity",
         also=("solid_diffusivity",),
         most=3.0,
     ),
     "positive_sloped_diffusivity": Recipe(
         "concentration_dependent_diffusivity",
-        lambda m, q: {"positive_slope": 5.0 * m, "positive_centre": 0.8},
+        lambda m, q: {"positive_slope": 5.0 * m, "centre_soc": 0.5},
         "concentration_dependent_diffusivity",
         also=("solid_diffusivity",),
         most=3.0,

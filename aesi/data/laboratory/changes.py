@@ -123,26 +123,25 @@ def _plus(function: Any, shift: float) -> Any:
     return lambda sto: function(sto) + shift
 
 
+def _window(parameters: Any, electrode: str) -> tuple[float, float]:
+    """Stoichiometry of the empty cell and of the full one."""
+    low = float(parameters[f"{electrode} electrode minimum stoichiometry"])
+    high = float(parameters[f"{electrode} electrode maximum stoichiometry"])
+    return (low, high) if electrode == "Negative" else (high, low)
+
+
 def _ocp(parameters: Any, values: Values) -> None:
-    """A Gaussian bump on either electrode's open-circuit potential."""
+    """A Gaussian bump on either electrode's open-circuit potential; its place and width count in charge."""
     import pybamm
 
-    for electrode in ("negative", "positive"):
-        height = values[f"{electrode}_v"]
+    for electrode in ("Negative", "Positive"):
+        height = values[f"{electrode.lower()}_v"]
         if height:
-            name = f"{electrode.capitalize()} electrode OCP [V]"
-            _update(
-                parameters,
-                {
-                    name: _bump(
-                        parameters[name],
-                        height,
-                        values[f"{electrode}_centre"],
-                        values["width"],
-                        pybamm.exp,
-                    )
-                },
-            )
+            name = f"{electrode} electrode OCP [V]"
+            empty, full = _window(parameters, electrode)
+            centre = empty + values["centre_soc"] * (full - empty)
+            width = values["width_soc"] * abs(full - empty)
+            _update(parameters, {name: _bump(parameters[name], height, centre, width, pybamm.exp)})
 
 
 def _bump(function: Any, height: float, centre: float, width: float, exp: Any) -> Any:
@@ -150,14 +149,15 @@ def _bump(function: Any, height: float, centre: float, width: float, exp: Any) -
 
 
 def _sloped_diffusivity(parameters: Any, values: Values) -> None:
-    """D(x) = D exp(slope (x - centre)), per electrode."""
+    """D(x) = D exp(slope (x - centre)), per electrode; the centre is the stoichiometry at a state of charge."""
     import pybamm
 
-    for electrode in ("negative", "positive"):
-        slope = values[f"{electrode}_slope"]
+    for electrode in ("Negative", "Positive"):
+        slope = values[f"{electrode.lower()}_slope"]
         if slope:
-            name = f"{electrode.capitalize()} particle diffusivity [m2.s-1]"
-            centre = values[f"{electrode}_centre"]
+            name = f"{electrode} particle diffusivity [m2.s-1]"
+            empty, full = _window(parameters, electrode)
+            centre = empty + values["centre_soc"] * (full - empty)
             _update(parameters, {name: _tilted(parameters[name], slope, centre, pybamm.exp)})
 
 
@@ -260,23 +260,12 @@ CHANGES: dict[str, Change] = {
         ),
         Change(
             "ocp_shape",
-            {
-                "negative_v": 0.0,
-                "negative_centre": 0.4,
-                "positive_v": 0.01,
-                "positive_centre": 0.65,
-                "width": 0.1,
-            },
+            {"negative_v": 0.0, "positive_v": 0.01, "centre_soc": 0.5, "width_soc": 0.2},
             alter=_ocp,
         ),
         Change(
             "concentration_dependent_diffusivity",
-            {
-                "negative_slope": 0.0,
-                "negative_centre": 0.5,
-                "positive_slope": 0.0,
-                "positive_centre": 0.6,
-            },
+            {"negative_slope": 0.0, "positive_slope": 0.0, "centre_soc": 0.5},
             alter=_sloped_diffusivity,
         ),
         Change("solid_diffusivity", {"negative_factor": 1.0, "positive_factor": 1.0}, alter=_diffusivity),

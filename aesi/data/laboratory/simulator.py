@@ -24,7 +24,7 @@ from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 
 Model = Literal["SPMe", "DFN"]
-VERSION = 1
+VERSION = 2
 """Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
 
 SECONDS_PER_HOUR = 3600.0
@@ -40,6 +40,8 @@ MESH: dict[Model, dict[str, int]] = {
 }
 """10 points across and 20 in radius move a DFN under SC03 and a 5C pulse by 0.35 mV RMS against 20 and 40."""
 TOLERANCE: dict[Model, float] = {"SPMe": 1e-6, "DFN": 1e-5}
+COARSE_TOLERANCE = 1e-5
+"""With radial points of one's own choice, for runs whose differences count."""
 
 
 @dataclass(frozen=True)
@@ -190,7 +192,7 @@ def _solve(setup: Setup, profile: Profile, values: Any, options: dict[str, Any])
     model = getattr(pybamm.lithium_ion, setup.model)(options)
     length = float(profile.time_s[-1])
     row = float(np.median(np.diff(profile.time_s)))
-    tolerance = TOLERANCE[setup.model]
+    tolerance = COARSE_TOLERANCE if setup.radial_points else TOLERANCE[setup.model]
     solver = pybamm.IDAKLUSolver(
         rtol=tolerance,
         atol=1e-2 * tolerance,

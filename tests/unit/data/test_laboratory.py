@@ -1,0 +1,144 @@
+"""The laboratory: the cell does what it was told, and says when it cannot."""
+
+import numpy as np
+import pytest
+
+from aesi.data.laboratory.changes import CHANGES, find_change
+from aesi.data.laboratory.instrument import Instrument
+from aesi.data.laboratory.simulator import Applied, Setup, Trace, edges, run
+from aesi.data.profile import Bench, Profile
+from aesi.errors import DataError, SimulationError
+
+pytestmark = pytest.mark.usefixtures("laboratory_cache")
+
+BENCH = Bench(30.0, 1.0)
+
+
+def short(soc0=0.6) -> Profile:
+    """Rest, a 1C pulse, rest, a 2C charge pulse, rest: 160 s."""
+    pieces = [BENCH.rest(20), BENCH.pulse(1.0, 40), BENCH.rest(30), BENCH.pulse(-2.0, 20), BENCH.rest(50)]
+    return BENCH.profile("short", pieces, soc0)
+
+
+def voltage(nmc, *applied, model="SPMe", soc0=0.6):
+    return run(Setup(nmc, model, applied), short(soc0)).voltage_v
+
+
+def test_the_solver_stops_on_both_sides_of_every_step():
+    stops = edges(short())
+    for time in (0, 19, 20, 59, 60, 89, 90, 109, 110, 159):
+        assert time in stops
+
+
+def test_a_short_pulse_after_a_long_rest_is_not_stepped_over(nmc):
+    # PyBaMM's issue 5145: without break points the solver steps over such a pulse.
+    pieces = [BENCH.rest(3000), BENCH.pulse(2.0, 5), BENCH.rest(1000)]
+    trace = run(Setup(nmc, "SPMe"), BENCH.profile("late", pieces, 0.6))
+    assert trace.voltage_v[2000] - trace.voltage_v[3002] > 0.05
+    assert trace.soc[-1] == pytest.approx(0.6 - 2.0 * 5 / 3600, abs=1e-9)
+
+
+def test_a_contact_resistance_is_a_drop_of_r_times_i(nmc):
+    added = voltage(nmc, Applied("series_resistance", {"resistance_ohm": 1e-3})) - voltage(nmc)
+    # 1e-6 relative tolerance of the solver on 3.7 V.
+    np.testing.assert_allclose(added, -1e-3 * short().current_a, atol=2e-5)
+
+
+def test_a_film_grows_with_throughput(nmc):
+    added = voltage(nmc, Applied("film_growth", {"growth_ohm_ah": 1e-3})) - voltage(nmc)
+    # At the end of the 1C pulse 30 A went through for 39.5 s (the first half second is the ramp): 0.329 Ah.
+    assert added[59] == pytest.approx(-1e-3 * (39.5 * 30 / 3600) * 30, rel=1e-3)
+
+
+def test_full_and_reduced_model_agree_at_a_low_rate(nmc):
+    slow = BENCH.profile("slow", [BENCH.rest(20), BENCH.pulse(0.2, 100)], 0.6)
+    full = run(Setup(nmc, "DFN"), slow).voltage_v
+    reduced = run(Setup(nmc, "SPMe"), slow).voltage_v
+    assert np.sqrt(np.mean((full - reduced) ** 2)) < 0.5e-3
+
+
+@pytest.mark.parametrize(
+    ("change", "values", "least_mv"),
+    [
+        ("self_heating", {"cooling_w_m2_k": 0.1}, 0.05),
+        ("ambient_temperature", {"shift_k": -5.0}, 1.0),
+        ("ocv_hysteresis", {"negative_v": 0.01}, 0.5),
+        ("ocp_shape", {"positive_v": 0.01, "centre_soc": 0.6}, 1.0),
+        ("concentration_dependent_diffusivity", {"negative_slope": 5.0, "centre_soc": 0.2}, 0.1),
+        ("solid_diffusivity", {"negative_factor": 0.5}, 0.2),
+        ("electrolyte_transport", {"conductivity_factor": 0.5}, 1.0),
+        ("charge_transfer_kinetics", {"negative_factor": 0.5}, 1.0),
+        ("lithium_inventory_loss", {}, 0.5),
+        ("active_material_loss_negative", {}, 0.2),
+        ("active_material_loss_positive", {}, 0.2),
+        ("leakage_current", {"leak_a": 1.0}, 0.2),
+    ],
+)
+def test_every_change_changes_the_voltage(nmc, change, values, least_mv):
+    moved = voltage(nmc, Applied(change, values)) - voltage(nmc)
+    assert 1e3 * np.sqrt(np.mean(moved**2)) > least_mv
+
+
+@pytest.mark.parametrize("change", ["double_layer", "asymmetric_kinetics", "particle_size_distribution"])
+def test_changes_by_option_differ_from_their_reference(nmc, change):
+    defaults = {"asymmetric_kinetics": {"negative_alpha": 0.7}}.get(change, {})
+    reference = Applied("algebraic_surface")
+    moved = voltage(nmc, Applied(change, defaults)) - voltage(nmc, reference)
+    assert 1e3 * np.sqrt(np.mean(moved**2)) > 0.1
+
+
+def test_signs_are_physical(nmc):
+    base = voltage(nmc)
+    loaded = slice(25, 59)
+    for slower in (
+        Applied("charge_transfer_kinetics", {"positive_factor": 0.5}),
+        Applied("electrolyte_transport", {"conductivity_factor": 0.7}),
+        Applied("ambient_temperature", {"shift_k": -8.0}),
+        Applied("ocv_hysteresis", {"negative_v": 0.01}),
+    ):
+        assert np.all(voltage(nmc, slower)[loaded] < base[loaded])
+
+
+def test_a_cell_without_cooling_warms_up(nmc):
+    trace = run(Setup(nmc, "SPMe", (Applied("self_heating", {"cooling_w_m2_k": 0.0}),)), short())
+    assert trace.temperature_degc[0] == pytest.approx(25.0, abs=1e-3)
+    assert 0.05 < trace.temperature_degc[-1] - 25.0 < 2.0
+
+
+def test_an_emptied_cell_is_an_error_not_a_short_record(nmc):
+    profile = BENCH.profile("empty", [BENCH.rest(10), BENCH.pulse(1.0, 1200)], 0.1)
+    with pytest.raises(SimulationError, match="empty"):
+        run(Setup(nmc, "SPMe"), profile)
+
+
+def test_a_run_is_taken_from_the_cache(nmc, monkeypatch):
+    first = voltage(nmc)
+    monkeypatch.setattr("aesi.data.laboratory.simulator._simulate", lambda *a: pytest.fail("computed again"))
+    np.testing.assert_array_equal(voltage(nmc), first)
+
+
+def test_unknown_changes_and_values_are_refused(nmc, tmp_path):
+    with pytest.raises(DataError, match="self_heating"):
+        find_change("selfheating")
+    with pytest.raises(DataError, match="cooling"):
+        CHANGES["self_heating"].complete({"h": 1.0})
+    with pytest.raises(DataError, match="different values"):
+        voltage(nmc, Applied("double_layer"), Applied("asymmetric_kinetics"))
+    with pytest.raises(DataError, match="cannot be opened"):
+        run(Setup(tmp_path / "none.json", "SPMe"), short())
+    bad = tmp_path / "bad.json"
+    bad.write_text("{}")
+    with pytest.raises(DataError, match="no usable BPX"):
+        run(Setup(bad, "SPMe"), short())
+
+
+def test_the_instrument_writes_noise_and_steps(rng):
+    n = 20_000
+    trace = Trace(np.arange(n) * 1.0, np.zeros(n), np.full(n, 3.7), np.full(n, 25.0), np.full(n, 0.5))
+    record = Instrument(voltage_step_v=1e-3).write(trace, "x", rng, temperature=True)
+    # The standard error of a deviation from 20,000 samples is 0.5 %; the steps add (1 mV)^2 / 12.
+    assert np.std(record.voltage_v) == pytest.approx(1e-3 * np.sqrt(1 + 1 / 12), rel=0.03)
+    assert np.std(record.current_a) == pytest.approx(4e-3, rel=0.03)
+    np.testing.assert_allclose(record.voltage_v, np.round(record.voltage_v, 3), atol=1e-12)
+    assert record.temperature_degc is not None
+    assert Instrument().write(trace, "x", rng, temperature=False).temperature_degc is None
