@@ -252,6 +252,7 @@ def run_general(  # type: ignore[no-untyped-def]
     t_k = temperature[0]
     t_weights = -1.0
     watts = 0.0
+    before, last_step = np.zeros(n_e), 0.0
     fault_at, fault = -1, 0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
@@ -295,6 +296,7 @@ def run_general(  # type: ignore[no-untyped-def]
                     for i in range(m_e):
                         for j in range(n_e):
                             forcing[j] += project[i, j] * rest[i]
+                ahead = dt / last_step if last_step > 0.0 else 0.0
                 for j in range(n_e):
                     source = -psi_scale * e_rates[j] * faster * forcing[j]
                     slope = 0.0
@@ -307,8 +309,11 @@ def run_general(  # type: ignore[no-untyped-def]
                     q[j] = (
                         w_e[slot, 0, j] * q[j]
                         + (w_e[slot, 1, j] + w_e[slot, 2, j]) * source
-                        + w_e[slot, 2, j] * slope
+                        + w_e[slot, 2, j]
+                        * (slope - psi_scale * e_rates[j] * faster * ahead * (forcing[j] - before[j]))
                     )
+                before[:] = forcing
+                last_step = dt
                 c[:] = c0
                 for j in range(n_e):
                     for i in range(m_e):
@@ -411,7 +416,7 @@ def run_general(  # type: ignore[no-untyped-def]
                     u_eq = open_circuit(ocp[side], theta[u]) + rise * slope
                     power += area * y[u] * (t_k * slope - u_eq)
                 if k > 0 and not given:
-                    t_k = heated(start_k, power if backward else 0.5 * (watts + power), dt, heat)
+                    t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat)
                 watts = power
         out[0, k] = voltage
         for row in range(1, 7):
@@ -428,6 +433,15 @@ def run_general(  # type: ignore[no-untyped-def]
         if fault_at < 0 and not c_low >= 0.0:
             fault_at, fault = k, 3
     return fault_at, fault
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def mean_heat(start, end, i0, i1):  # type: ignore[no-untyped-def]
+    """Mean heat over a step whose current is a straight line: quadratic in it, by the larger end's resistance."""
+    if i0 == i1:
+        return end
+    resistance = start / (i0 * i0) if abs(i0) > abs(i1) else end / (i1 * i1)
+    return 0.5 * (start + end) - resistance * (i1 - i0) ** 2 / 6.0
 
 
 @njit(inline="always", fastmath=FASTMATH)

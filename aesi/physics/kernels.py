@@ -1,8 +1,8 @@
 """Compiled time stepping of the model where nothing but the electrolyte's diffusivity is nonlinear.
 
 Modes of solid diffusion are stepped exactly for a current that is constant or linear within a step. The
-electrolyte is stepped exactly for a constant diffusivity d0; the rest, psi(c), is held over a step
-(exponential Euler).
+electrolyte is stepped exactly for a constant diffusivity d0; the rest, psi(c), is extrapolated over a step
+from the last two (exponential Adams-Bashforth of order two).
 """
 
 import math
@@ -98,8 +98,9 @@ def run_linear(  # type: ignore[no-untyped-def]
     q, c, forcing, rest = np.zeros(n_e), np.full(m_e, c0), np.zeros(n_e), np.zeros(m_e)
     keys = np.full(CACHE_SLOTS, -1, dtype=np.int64)
     w_n, w_p = np.zeros((CACHE_SLOTS, 3, n_modes)), np.zeros((CACHE_SLOTS, 3, n_modes))
-    w_e, parts = np.zeros((CACHE_SLOTS, 4, n_e)), np.ones(CACHE_SLOTS, dtype=np.int64)
+    w_e, parts = np.zeros((CACHE_SLOTS, 5, n_e)), np.ones(CACHE_SLOTS, dtype=np.int64)
     mean_n, mean_p = theta0[0], theta0[1]
+    before, last_step = np.zeros(n_e), 0.0
     fault_at, fault = -1, 0
     last, width, g = m_e - 1, (m_e - 1) // 3 + 1, np.zeros(6)
     for k in range(n_samples):
@@ -129,6 +130,7 @@ def run_linear(  # type: ignore[no-untyped-def]
                     decay, start, end = step_weights(e_rates[j], dt / parts[slot])
                     w_e[slot, 0, j], w_e[slot, 3, j] = decay, (start + end) * e_rates[j] * psi_scale
                     w_e[slot, 1, j], w_e[slot, 2, j] = start * e_gains[j], end * e_gains[j]
+                    w_e[slot, 4, j] = end * e_rates[j] * psi_scale
             for j in range(n_modes):
                 z_n[j] = w_n[slot, 0, j] * z_n[j] - w_n[slot, 1, j] * i0 - w_n[slot, 2, j] * i1
             for j in range(n_modes):
@@ -146,13 +148,17 @@ def run_linear(  # type: ignore[no-untyped-def]
                     for i in range(m_e):
                         for j in range(n_e):
                             forcing[j] += project[i, j] * rest[i]
+                ahead = dt / parts[slot] / last_step if last_step > 0.0 else 0.0
                 for j in range(n_e):
                     q[j] = (
                         w_e[slot, 0, j] * q[j]
                         + w_e[slot, 1, j] * u0
                         + w_e[slot, 2, j] * u1
                         - w_e[slot, 3, j] * forcing[j]
+                        - w_e[slot, 4, j] * ahead * (forcing[j] - before[j])
                     )
+                before[:] = forcing
+                last_step = dt / parts[slot]
                 c[:] = c0
                 for j in range(n_e):
                     for i in range(m_e):

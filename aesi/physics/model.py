@@ -13,7 +13,7 @@ from aesi.physics.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
 DEFAULT_ELECTROLYTE_ORDER = 3
-DEFAULT_SUBSTEP_S = 2.0
+DEFAULT_SUBSTEP_S = 1.0
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ ELECTROLYTE_SPAN = 4.0
 """Tables of electrolyte properties run from zero to this many times the rest concentration."""
 WORKING_SPAN = (0.05, 2.0)
 """Concentrations, relative to rest, at which the stepping of the electrolyte has to be stable."""
-STABILITY_MARGIN = 0.55
-"""The exactly stepped diffusivity exceeds half of the largest one, so that the explicit rest cannot grow."""
+STABILITY_MARGIN = 0.76
+"""The exactly stepped diffusivity exceeds three quarters of the largest one: the explicit rest, extrapolated from
+two steps, cannot grow then, however long the step."""
 SMALLEST_DIFFUSIVITY_RATIO = 1e-3
 
 
