@@ -30,17 +30,18 @@ def _grid(targets: Array) -> Array:
     return np.unique(np.quantile(targets, levels))
 
 
-def _leaf_distributions(forest: Any, splits: Splits, targets: Array, grid: Array) -> Array:
+def _leaf_distributions(forest: Any, grid: Array) -> Array:
     """(n_leaves, g) share of each leaf's own training samples at or below each grid value."""
-    position = np.searchsorted(grid, targets)  # first grid value at or above the target
+    # quantile-forest numbers its samples by the order of their targets, from one; zero is padding.
+    ordered = np.asarray(forest.forest_.y_train)[0]
+    position = np.searchsorted(grid, ordered)  # first grid value at or above the target
     rows = []
     for tree, members in zip(forest.estimators_, forest.forest_.y_train_leaves, strict=True):
         for node in np.flatnonzero(tree.tree_.children_left < 0):
             inside = np.asarray(members[node][0])
-            inside = inside[inside > 0] - 1  # quantile-forest counts its samples from one; zero is padding
+            inside = inside[inside > 0] - 1
             counts = np.bincount(position[inside], minlength=len(grid))
             rows.append(np.cumsum(counts) / len(inside))
-    assert len(rows) == int((splits.feature < 0).sum())
     return np.array(rows)
 
 
@@ -65,7 +66,7 @@ class ForestQuantiles(QuantileModel):
         regressor.fit(task.rows, task.targets)
         splits = flatten(regressor.estimators_)
         grid = _grid(task.targets)
-        return cls(task.levels, grid, _leaf_distributions(regressor, splits, task.targets, grid), splits)
+        return cls(task.levels, grid, _leaf_distributions(regressor, grid), splits)
 
     def quantiles(self, rows: Array) -> Array:
         out = np.empty((len(rows), self.levels.size))

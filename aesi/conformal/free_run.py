@@ -114,7 +114,9 @@ class FreeRunBands:
         Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
         whole drive.
         """
-        return _symmetric(self._half_widths(np.arange(n) * dt_s, _columns(current_a, soc, dt_s)))
+        return _symmetric(
+            self._half_widths(dt_s * np.arange(n, dtype=np.float64), _columns(current_a, soc, dt_s))
+        )
 
     def intervals(self, series: ErrorSeries, free: FreeRun) -> Intervals:
         """The band along a free run of a record; `warm` is False outside the trained range, where the band is

@@ -1,10 +1,12 @@
 """The adaptive step: widen after a miss, narrow after a hit.
 
-    r_g <- r_g exp((rate [g is the sample's group] + shared rate) (1[e outside the band] - alpha))       (1)
+    r_g <- r_g exp((rate [g is the sample's group] + shared rate) (1[e outside the band] - a))       (1)
 
 r_g multiplies the half-width of the raw band about its middle; a group is a range of the current, so that
-coverage is held within each, not just on average. Whatever the residuals do, the share of misses over n steps
-is within |log r[n] - log r[0]| / (rate n) of alpha (for one group): a long-run guarantee without assumptions.
+coverage is held within each, not just on average. a = AIM alpha: on a record of some thousand samples the
+share of misses still scatters about a, and should fall below alpha more often than not. Whatever the residuals
+do, it is within |log r[n] - log r[0]| / (rate n) of a over n steps of one group: a long-run guarantee without
+assumptions.
 The rate trades speed against jitter: after a rise of the error by a factor f the band has caught up after
 about log(f) / rate misses. rate = 0 leaves the calibrated band as it is.
 
@@ -22,6 +24,7 @@ from aesi.numerics.typing import Array, BoolArray, IntArray
 
 SHARED = 0.4
 """Part of the rate with which a miss in one group moves all: a cell that drifts does so at every current."""
+AIM = 0.95
 LOG_RATIO_LIMIT = 7.0
 """|log r| is held below this (a factor of 1,100): a sensor that is stuck for hours must not drive r to zero
 or infinity, from where it would take as long to come back."""
@@ -30,7 +33,7 @@ or infinity, from where it would take as long to come back."""
 @njit(cache=True)
 def move(log_ratio: Array, group: int, missed: bool, rate: float, alpha: float) -> None:
     """Equation (1), one step, in place; log_ratio : (n_groups,)."""
-    step = rate * ((1.0 if missed else 0.0) - alpha)
+    step = rate * ((1.0 if missed else 0.0) - AIM * alpha)
     for g in range(log_ratio.size):
         moved = log_ratio[g] + SHARED * step + (step if g == group else 0.0)
         log_ratio[g] = min(max(moved, -LOG_RATIO_LIMIT), LOG_RATIO_LIMIT)

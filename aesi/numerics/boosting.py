@@ -24,14 +24,16 @@ N_BINS = 64
 
 @dataclass(frozen=True)
 class Growth:
-    """rounds of boosting, depth of each tree, learning rate, share of the rows a round sees, and the least
-    share of their weight in a leaf."""
+    """rounds of boosting, depth of each tree, learning rate, share of the rows a round sees, and what a leaf
+    holds at least: a share of their weight, and this many rows of mean weight (a tail quantile of few rows is
+    their extreme)."""
 
     rounds: int = 60
     depth: int = 5
     rate: float = 0.15
     row_share: float = 0.5
     min_leaf_share: float = 2e-3
+    min_leaf_rows: float = 25.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +86,7 @@ def fit_boosted(
     leaf = np.zeros((growth.rounds, n_leaves))
     for m in range(growth.rounds):
         sample = np.flatnonzero(rng.random(n) < growth.row_share)
-        least = growth.min_leaf_share * weights[sample].sum()
+        least = max(growth.min_leaf_share, growth.min_leaf_rows / max(1, sample.size)) * weights[sample].sum()
         _grow(bins, y, f, weights, tau, sample, growth.depth, least, feature[m], cut[m])
         _leaf_quantiles(bins, y - f, weights, tau, sample, growth.depth, feature[m], cut[m], leaf[m])
         leaf[m] *= growth.rate

@@ -1,0 +1,82 @@
+import time
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from aesi.conformal import METHODS
+from aesi.conformal.narrowest import level_pairs, narrowest
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    return METHODS["spci_linear"].fit([1e-4 * np.random.default_rng(0).standard_normal(3000)])
+
+
+def test_asking_twice_gives_the_same_interval(calibrated) -> None:
+    stream = calibrated.stream()
+    stream.update(1e-4)
+    assert stream.interval() == stream.interval()
+
+
+def test_a_gap_brings_back_the_marginal_interval(calibrated) -> None:
+    stream = calibrated.stream()
+    for error in 1e-4 * np.random.default_rng(1).standard_normal(300):
+        stream.update(float(error))
+    assert stream.interval() != calibrated.marginal_v
+    assert stream.warm
+    stream.gap()
+    assert stream.interval() == calibrated.marginal_v
+    assert not stream.warm
+
+
+def test_infinity_counts_as_missing(calibrated) -> None:
+    record = 1e-4 * np.random.default_rng(2).standard_normal(60)
+    broken, missing = record.copy(), record.copy()
+    broken[30], missing[30] = np.inf, np.nan
+    np.testing.assert_array_equal(calibrated.intervals(broken).lower_v, calibrated.intervals(missing).lower_v)
+    stream = calibrated.stream()
+    for error in broken[:31]:
+        stream.update(float(error))
+    assert stream.interval() == calibrated.marginal_v
+
+
+def test_memory_is_bounded(calibrated) -> None:
+    stream = calibrated.stream()
+    for _ in range(1000):
+        stream.update(1e-4)
+    tracemalloc.start()
+    for k in range(3000):
+        stream.update(1e-4 * (k % 7))
+    grown, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert grown < 20_000
+
+
+@pytest.mark.parametrize("name", ["spci_linear", "spci_boosted"])
+def test_a_step_takes_less_than_a_millisecond(name: str) -> None:
+    rng = np.random.default_rng(3)
+    fitted = METHODS[name].fit([1e-4 * rng.standard_normal(2000)], window=200)
+    stream = fitted.stream()
+    errors = (1e-4 * rng.standard_normal(1000)).tolist()
+    for error in errors[:300]:
+        stream.update(error)
+    started = time.process_time()
+    for error in errors[300:]:
+        stream.interval()
+        stream.update(error)
+    assert (time.process_time() - started) / 700 < 1e-3
+
+
+def test_the_narrowest_pair_wins_and_crossed_quantiles_do_not() -> None:
+    quantiles = np.array([[-3.0, -1.0, 1.0, 2.0], [1.0, -2.0, -5.0, 2.0]])
+    low, high = np.empty(2), np.empty(2)
+    narrowest(quantiles, low, high)
+    assert (low[0], high[0]) == (-1.0, 2.0)
+    assert (low[1], high[1]) == (-2.0, 2.0)
+
+
+def test_pairs_of_levels_hold_the_nominal_share() -> None:
+    levels = level_pairs(0.1, 5)
+    np.testing.assert_allclose(levels[5:] - levels[:5], 0.9)
+    np.testing.assert_allclose(level_pairs(0.1, 1), [0.05, 0.95])
