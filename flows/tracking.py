@@ -120,6 +120,8 @@ class Tracker:
 
     def model(self, folder: Path) -> None:
         """The chosen model, as a pyfunc that MLflow can serve."""
+        if not self._config.tracking.log_model:
+            return
         name = self._config.name if self._config.tracking.register_model else None
         self._outbox.put(
             {

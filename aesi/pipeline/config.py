@@ -37,13 +37,14 @@ class Section(BaseModel):
 class RepeatsConfig(Section):
     """One record that repeats a schedule, cut into its repeats (numbered from 1).
 
-    The last `valid_share` of every training repeat validates, so that validation spans the state of charge.
+    The last `valid_share` of every training repeat validates, so that validation spans the state of charge. With 0
+    the search validates on contiguous pieces of the training repeats in turn, each by models that have not seen it.
     """
 
     period_s: Positive
     train: tuple[Count, ...]
     test: tuple[Count, ...]
-    valid_share: Share = 0.2
+    valid_share: Annotated[float, Field(ge=0, lt=1)] = 0.0
 
     @model_validator(mode="after")
     def _apart(self) -> RepeatsConfig:
@@ -120,7 +121,8 @@ class LibraryConfig(Section):
 
     p_c, d : range of the highest polynomial order and of the total degree; their upper ends make the library.
     factors : most variables in a product.  special : with trigonometric and hyperbolic functions.
-    mixed : and their products with first-order terms.  inputs : None takes those of the records.
+    mixed : and their products with first-order terms.  inputs : None takes the paper's; `aesi.sparse.inputs` names
+    those that can be derived, such as I_next, the current that flows while the predicted error arises.
     """
 
     p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (0, 3)
@@ -129,6 +131,13 @@ class LibraryConfig(Section):
     special: bool = True
     mixed: bool = False
     inputs: tuple[str, ...] | None = None
+
+    @field_validator("inputs")
+    @classmethod
+    def _with_the_current(cls, value: tuple[str, ...] | None) -> tuple[str, ...] | None:
+        if value is not None and "I" not in value:
+            raise ValueError("`I`, the current, has to be among the inputs")
+        return value
 
 
 class SearchConfig(Section):
@@ -178,9 +187,13 @@ class ConformalConfig(Section):
 
 
 class TrackingConfig(Section):
-    """Where runs are tracked: an MLflow URI, or None for the SQLite store of the workspace."""
+    """Where runs are tracked: an MLflow URI, or None for the SQLite store of the workspace.
+
+    log_model : log the chosen model so that MLflow can serve it; register_model : under the experiment's name.
+    """
 
     uri: str | None = None
+    log_model: bool = True
     register_model: bool = True
     system_metrics: bool = True
 

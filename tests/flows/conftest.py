@@ -1,8 +1,66 @@
 """A workspace of its own for every test, so that no test sees another's runs."""
 
+import os
+import shutil
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
 import pytest
 
 from flows import environment
+
+ROOT = Path(__file__).resolve().parents[2]
+SMOKE = ROOT / "experiments" / "smoke.yaml"
+SMALL = (
+    "search.candidates=6",
+    "search.population=3",
+    "search.resamples=5",
+    'models=["ESPM", "AESI I", "ridge"]',
+)
+ASIDE = ("tracking.system_metrics=false", "tracking.log_model=false")
+
+
+@contextmanager
+def home(folder):
+    """The folder as the workspace, for fixtures that outlive a test."""
+    before = os.environ.get("AESI_HOME")
+    os.environ["AESI_HOME"] = str(folder)
+    environment.prepare()
+    try:
+        yield
+    finally:
+        os.environ.pop("AESI_HOME") if before is None else os.environ.update(AESI_HOME=before)
+
+
+@pytest.fixture(scope="session")
+def empty_store(tmp_path_factory):
+    """An empty MLflow database: making its tables takes seconds, copying it takes none."""
+    from flows.mlflow_store import Store
+
+    folder = tmp_path_factory.mktemp("store")
+    with home(folder):
+        Store(f"sqlite:///{folder}/mlflow.db").client._tracking_client.store.engine.dispose()
+    return folder / "mlflow.db"
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory, empty_store):
+    """A workspace in which the small experiment ran once, uninterrupted. Copy it to change it."""
+    from flows.run import start
+
+    folder = tmp_path_factory.mktemp("finished")
+    copy_store(empty_store, folder)
+    with home(folder):
+        start(SMOKE, [*SMALL, "tracking.system_metrics=false"], use_prefect=False)
+    return folder
+
+
+def copy_store(database, folder):
+    """The database with its write-ahead log."""
+    for path in database.parent.glob("mlflow.db*"):
+        shutil.copy(path, folder / path.name)
 
 
 @pytest.fixture(autouse=True)
@@ -16,6 +74,60 @@ def workspace(tmp_path, monkeypatch):
 
 
 @pytest.fixture
+def tracked(workspace, empty_store):
+    """The workspace with a tracking store in it."""
+    copy_store(empty_store, workspace)
+    return workspace
+
+
+@pytest.fixture
 def said():
     """What was said; pass `said.append` where a function to say things is wanted."""
     return []
+
+
+@pytest.fixture
+def aesi(workspace):
+    """Starts the command as a process of its own: aesi("run", ...) -> Popen."""
+    started = []
+
+    def start(*arguments, **environ):
+        command = [sys.executable, "-m", "flows.cli", *map(str, arguments)]
+        process = subprocess.Popen(
+            command,
+            cwd=workspace,
+            env=os.environ | {"PYTHONPATH": str(ROOT)} | environ,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        return process
+
+    yield start
+    for process in started:
+        if process.poll() is None:
+            process.kill()
+        process.communicate()
+
+
+@pytest.fixture
+def arguments():
+    """Arguments of an `aesi run` that takes seconds; more `--set` values may be added."""
+
+    def make(*more):
+        pairs = (part for text in (*SMALL, *ASIDE, *more) for part in ("--set", text))
+        return ["run", str(SMOKE), "--no-prefect", *pairs]
+
+    return make
+
+
+@pytest.fixture
+def run(tracked):
+    """Runs the small experiment in this process; the folder of its results."""
+    from flows.run import start
+
+    def go(*more, **options):
+        return start(SMOKE, [*SMALL, *ASIDE, *more], use_prefect=False, **options)
+
+    return go
