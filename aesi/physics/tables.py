@@ -17,9 +17,11 @@ ELECTROLYTE_SPAN = 4.0
 """Tables of electrolyte properties run from zero to this many times the rest concentration."""
 WORKING_SPAN = (0.05, 2.0)
 """Concentrations, relative to rest, at which the stepping of the electrolyte has to be stable."""
-STABILITY_MARGIN = 0.76
-"""The exactly stepped diffusivity exceeds three quarters of the largest one: the explicit rest, extrapolated from
-two steps, cannot grow then, however long the step."""
+EXTRAPOLATED_MARGIN = 0.76
+"""The exactly stepped diffusivity exceeds three quarters of the largest one where the explicit rest is extrapolated
+from two steps, so that it cannot grow, however long the step."""
+CORRECTED_MARGIN = 0.55
+"""Half of it is enough where the rest is predicted and corrected within the step."""
 SMALLEST_DIFFUSIVITY_RATIO = 1e-3
 
 
@@ -60,7 +62,7 @@ def electrolyte_diffusion(diffusivity: Relation, c0: float) -> DiffusionTable:
     top = ELECTROLYTE_SPAN * c0
     if isinstance(diffusivity, Constant):
         return DiffusionTable(diffusivity.value, np.zeros(2), top, True)
-    return _split(diffusivity, c0, top, tuple(c0 * s for s in WORKING_SPAN))
+    return _split(diffusivity, c0, top, tuple(c0 * s for s in WORKING_SPAN), EXTRAPOLATED_MARGIN)
 
 
 @lru_cache(maxsize=128)
@@ -68,10 +70,12 @@ def solid_diffusion(diffusivity: Relation) -> DiffusionTable:
     """Split of a solid diffusivity over stoichiometry."""
     if isinstance(diffusivity, Constant):
         return DiffusionTable(diffusivity.value, np.zeros(2), 1.0, True)
-    return _split(diffusivity, 0.5, 1.0, (0.0, 1.0))
+    return _split(diffusivity, 0.5, 1.0, (0.0, 1.0), CORRECTED_MARGIN)
 
 
-def _split(diffusivity: Relation, reference: float, top: float, working: tuple[float, ...]) -> DiffusionTable:
+def _split(
+    diffusivity: Relation, reference: float, top: float, working: tuple[float, ...], margin: float
+) -> DiffusionTable:
     grid = np.linspace(0.0, top, ELECTROLYTE_POINTS)
     values = diffusivity(grid)
     at_reference = float(diffusivity(np.array([reference]))[0])
@@ -80,7 +84,7 @@ def _split(diffusivity: Relation, reference: float, top: float, working: tuple[f
     values = np.where(np.isfinite(values), values, at_reference)
     values = np.maximum(values, SMALLEST_DIFFUSIVITY_RATIO * at_reference)
     largest = float(values[(grid >= working[0]) & (grid <= working[1])].max())
-    d0 = max(at_reference, STABILITY_MARGIN * largest)
+    d0 = max(at_reference, margin * largest)
     rest = values - d0
     psi = np.concatenate([[0.0], np.cumsum(0.5 * (rest[1:] + rest[:-1])) * (grid[1] - grid[0])])
     return DiffusionTable(d0, psi, top, False)
