@@ -1,0 +1,47 @@
+"""The picture of the README, drawn from a report."""
+
+import sys
+import xml.etree.ElementTree as ET
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.pipeline.report import write_discovery_report, write_run_report
+
+HOOK = Path(__file__).resolve().parents[3] / "docs" / "hooks" / "picture.py"
+
+
+@pytest.fixture(scope="module")
+def picture():
+    spec = spec_from_file_location("docs_picture", HOOK)
+    module = module_from_spec(spec)
+    sys.modules["docs_picture"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("n", [600, 9000])
+def test_it_tells_the_error_that_the_run_had(picture, views, tmp_path, n):
+    view = views.run_view(n)
+    write_run_report(tmp_path / "report.html", view)
+    picture.main(str(tmp_path / "report.html"), str(tmp_path / "out.svg"))
+    text = " ".join(ET.parse(tmp_path / "out.svg").getroot().itertext())
+    errors = [t.measured_v - t.predictions[view.chosen].free_run_v for t in view.of("test")]
+    rmse_mv = 1e3 * np.sqrt(np.mean(np.concatenate(errors) ** 2))
+    assert f"{view.chosen}: {rmse_mv:.1f} mV" in text
+
+
+def test_it_draws_a_discovery_too(picture, views, tmp_path):
+    write_discovery_report(tmp_path / "report.html", views.discovery_view(600))
+    picture.main(str(tmp_path / "report.html"), str(tmp_path / "out.svg"))
+    text = " ".join(ET.parse(tmp_path / "out.svg").getroot().itertext())
+    assert text.index("as declared") < text.index("recalibrated") < text.index("with the finding added")
+
+
+def test_another_page_is_refused(picture, tmp_path):
+    page = tmp_path / "page.html"
+    page.write_text("<html></html>")
+    with pytest.raises(SystemExit, match="not a report"):
+        picture.main(str(page), str(tmp_path / "out.svg"))
