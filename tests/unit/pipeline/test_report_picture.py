@@ -27,7 +27,7 @@ def test_it_tells_the_error_that_the_run_had(picture, views, tmp_path, n):
     view = views.run_view(n)
     write_run_report(tmp_path / "report.html", view)
     picture.main(str(tmp_path / "report.html"), str(tmp_path / "out.svg"))
-    text = " ".join(ET.parse(tmp_path / "out.svg").getroot().itertext())
+    text = "".join(ET.parse(tmp_path / "out.svg").getroot().itertext())
     errors = [t.measured_v - t.predictions[view.chosen].free_run_v for t in view.of("test")]
     rmse_mv = 1e3 * np.sqrt(np.mean(np.concatenate(errors) ** 2))
     assert f"{view.chosen}: {rmse_mv:.1f} mV" in text
@@ -36,7 +36,7 @@ def test_it_tells_the_error_that_the_run_had(picture, views, tmp_path, n):
 def test_it_draws_a_discovery_too(picture, views, tmp_path):
     write_discovery_report(tmp_path / "report.html", views.discovery_view(600))
     picture.main(str(tmp_path / "report.html"), str(tmp_path / "out.svg"))
-    text = " ".join(ET.parse(tmp_path / "out.svg").getroot().itertext())
+    text = "".join(ET.parse(tmp_path / "out.svg").getroot().itertext())
     assert text.index("as declared") < text.index("recalibrated") < text.index("with the finding added")
 
 
