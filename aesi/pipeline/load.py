@@ -20,6 +20,7 @@ from aesi.errors import ConfigError, DataError
 from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
 from aesi.pipeline.config import DataConfig, ExperimentConfig, RepeatsConfig
 from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run, Split
+from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
     from aesi.data.virtual import Experiment
@@ -103,7 +104,8 @@ def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
         piece = _repeat(series, repeats.period_s, number)
         cut = round(len(piece) * (1 - repeats.valid_share))
         train.append(piece.take(slice(0, cut)))
-        valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
+        if cut < len(piece):
+            valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
     test = [_repeat(series, repeats.period_s, number) for number in repeats.test]
     return Split(tuple(train), tuple(valid), tuple(test))
 
@@ -135,7 +137,9 @@ def _load(config: ExperimentConfig) -> Loaded:
         run = simulate(
             cell, even.time_s, even.current_a, soc0[name], effects, even.temperature_degc, config.data.hold
         )
-        series[name] = error_series(even, run, config.data.dt_s)
+        whole = error_series(even, run, config.data.dt_s)
+        # Before the record is cut: a filtered current has to know what came before a piece.
+        series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
     return Loaded(
         cell=cell,
         cell_name=path.stem,
