@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from prefect import flow
 
+from flows import environment
 from flows.console import Console
-from flows.run import Order, _experiment
+from flows.run import Order, run_order
 from flows.stages import as_tasks
 
 
@@ -22,6 +23,18 @@ def experiment(
     use_cache: bool = True,
 ) -> Path:
     """The whole job of `aesi run`: data, physics, search, ensembles, intervals, tables, figures, report."""
+    environment.prepare()
     console = Console()
     order = Order(path, tuple(overrides or ()), runner, address, resume, use_cache)
-    return _experiment(order, as_tasks(console.say), console)
+    return run_order(order, as_tasks(console.say), console)
+
+
+@flow(name="discovery", flow_run_name="{path}", validate_parameters=False, persist_result=False)
+def discovery(path: str, overrides: list[str] | None = None, out: str | None = None) -> dict[str, Any]:
+    """The whole job of `aesi discover` on the case that an experiment file describes."""
+    from flows.discover import case_and_folder, trace
+
+    environment.prepare()
+    console = Console()
+    case, folder, name = case_and_folder(path, overrides or (), Path(out) if out else None)
+    return trace(case, folder, as_tasks(console.say), console, name)

@@ -58,12 +58,18 @@ def discover(
 
 def discover_experiment(path: str, overrides: Sequence[str] = (), out: Path | None = None) -> dict[str, Any]:
     """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
+    case, folder, name = case_and_folder(path, overrides, out)
+    return discover(case, folder, experiment=name)
+
+
+def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, str]:
+    """The case of an experiment file, the folder of its results, and the name it is tracked under."""
     from aesi.pipeline.cases import case_of_experiment
     from aesi.pipeline.config import read_experiment
 
     config = read_experiment(path, overrides)
     folder = out or environment.workspace() / "runs" / config.name / "discovery"
-    return discover(case_of_experiment(config), folder, experiment=config.name)
+    return case_of_experiment(config), folder, config.name
 
 
 def _as_flow(case: Case, out: Path, experiment: str) -> dict[str, Any]:

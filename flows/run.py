@@ -66,7 +66,7 @@ def start(
         from flows.stages import plainly
 
         console = Console()
-        return _experiment(order, plainly(console.say), console)
+        return run_order(order, plainly(console.say), console)
     from flows.deployed import experiment
 
     folder: Path = experiment(
@@ -75,7 +75,7 @@ def start(
     return Path(folder)
 
 
-def _experiment(order: Order, run: Any, console: Console) -> Path:
+def run_order(order: Order, run: Any, console: Console) -> Path:
     """The flow itself; `run` runs a stage."""
     from flows.mlflow_store import Store
 
