@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from aesi.numerics.typing import AnyArray
-from aesi.pipeline.report.decimate import envelope
+from aesi.pipeline.report.decimate import Keep, envelope
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -54,40 +55,41 @@ class Embedded:
 
 def embed(fig: Figure, store: Store) -> Embedded:
     """Thin the series of `fig` for display and put their samples into `store`."""
-    import json
-
-    series = [trace for trace in fig.data if (trace.meta or {}).get("keep")]
-    names = [(trace.name, trace.yaxis, trace.meta["keep"]) for trace in series]
+    names = [(trace.name, trace.yaxis, _keep(trace)) for trace in fig.data if _keep(trace)]
     limit = max(DISPLAYED // max((names.count(name) for name in names), default=1), 200)
     content = json.loads(_without_long_series(fig))
     samples = drawn = kept = 0
     for trace, entry in zip(fig.data, content["data"], strict=True):
-        if trace in series:
-            x, y = np.asarray(trace.x, dtype=float), np.asarray(trace.y, dtype=float)
-            samples = max(samples, len(y))
-            x, y = _capped(x, y, trace.meta["keep"])
-            shown = envelope(y, limit, trace.meta["keep"])
-            kept, drawn = max(kept, len(y)), max(drawn, len(shown))
-            entry["x"], entry["y"] = _rounded(x[shown]), _rounded(y[shown])
-            if len(shown) < len(y):
-                ids = {"x": store.add(x), "y": store.add(y.astype("f4")), "limit": limit}
-                entry["meta"] = entry["meta"] | ids
+        keep = _keep(trace)
+        if keep is None:
+            continue
+        x, y = np.asarray(trace.x, dtype=float), np.asarray(trace.y, dtype=float)
+        samples = max(samples, len(y))
+        stored = envelope(y, STORED, keep)
+        x, y = x[stored], y[stored]
+        shown = envelope(y, limit, keep)
+        kept, drawn = max(kept, len(y)), max(drawn, len(shown))
+        entry["x"], entry["y"] = _rounded(x[shown]), _rounded(y[shown])
+        if len(shown) < len(y):
+            entry["meta"] |= {"x": store.add(x), "y": store.add(y.astype("f4")), "limit": limit}
     return Embedded(content, samples, drawn, kept)
 
 
+def _keep(trace: Any) -> Keep | None:
+    """Which side of its envelope a series asks for; None for what is drawn as it is."""
+    keep: Keep | None = (trace.meta or {}).get("keep")
+    return keep
+
+
 def _without_long_series(fig: Figure) -> str:
+    """Plotly's JSON with the marked series empty: they would be by far the most of it."""
     from plotly.graph_objects import Figure
 
     light = Figure(fig)
     for trace in light.data:
-        if (trace.meta or {}).get("keep"):
+        if _keep(trace):
             trace.x = trace.y = None
     return str(light.to_json())
-
-
-def _capped(x: AnyArray, y: AnyArray, keep: Any) -> tuple[AnyArray, AnyArray]:
-    rows = envelope(y, STORED, keep)
-    return x[rows], y[rows]
 
 
 def _rounded(values: AnyArray) -> list[float | None]:
