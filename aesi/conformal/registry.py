@@ -61,7 +61,7 @@ METHODS: dict[str, Method] = {
         SplitConformal(),
         SplitConformal("aci", RATE),
         EnbPI(),
-        SPCI(name="spci_forest", fitter=published_forest, view="lags", use_current=False),
+        SPCI(name="spci_forest", fitter=published_forest, view="lags", use_current=False, rows_a_column=3),
         SPCI(name="spci_forest_features", rate=RATE, fitter=feature_forest),
         SPCI(name="spci_linear", rate=RATE, fitter=LinearQuantiles.fit),
         SPCI(name="spci_boosted", rate=RATE, fitter=boosted, n_betas=1),

@@ -23,8 +23,6 @@ from aesi.conformal.scale import Scale
 from aesi.errors import FitError
 from aesi.numerics.typing import Array, BoolArray
 
-ROWS_A_COLUMN = 10
-"""Calibration rows that a regression needs for each feature."""
 N_BLOCKS = 25
 N_FOLDS = 5
 ENOUGH_ROWS = 20_000
@@ -34,12 +32,14 @@ ENOUGH_ROWS = 20_000
 @dataclass(frozen=True, kw_only=True)
 class SPCI(Method):
     """fitter : the regressor.  view : what it sees of the history.  n_betas : pairs of levels to choose from.
-    use_current : whether the current, where given, is among its features and its groups."""
+    use_current : whether the current, where given, is among its features and its groups.
+    rows_a_column : calibration rows that the regressor needs for each feature."""
 
     fitter: Fitter
     view: View = "features"
     n_betas: int = 5
     use_current: bool = True
+    rows_a_column: int = 10
 
     def band(self, data: Calibration) -> tuple[Band, Scale]:
         currents = data.currents if self.use_current else None
@@ -60,10 +60,11 @@ class SPCI(Method):
 
     def _check_enough(self, rows: Array, history: History) -> None:
         n, p = rows.shape
-        if n < ROWS_A_COLUMN * p:
+        needed = self.rows_a_column * p
+        if n < needed:
             raise FitError(
                 f"{self.name} has {n} calibration residuals with {history.needed} samples of history "
-                f"before them, and needs {ROWS_A_COLUMN * p}; give more, a shorter window, or use 'split'."
+                f"before them, and needs {needed}; give more, a shorter window, or use 'split'."
             )
 
 

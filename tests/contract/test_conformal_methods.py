@@ -23,7 +23,7 @@ def series(n: int, seed: int) -> np.ndarray:
 
 @pytest.fixture(scope="module", params=sorted(METHODS))
 def calibrated(request: pytest.FixtureRequest) -> Calibrated:
-    return METHODS[request.param].fit([series(2500, 1), series(1500, 2)], window=WINDOW)
+    return METHODS[request.param].fit([series(1000, 1), series(600, 2)], window=WINDOW)
 
 
 def test_covers_near_the_nominal_level(calibrated: Calibrated) -> None:
@@ -60,7 +60,7 @@ def test_the_stream_gives_the_intervals_of_the_replay(calibrated: Calibrated) ->
 
 @pytest.fixture(scope="module", params=sorted(METHODS))
 def driven(request: pytest.FixtureRequest) -> Calibrated:
-    pairs = [driven_series(3000, seed) for seed in (1, 2)]
+    pairs = [driven_series(1500, seed) for seed in (1, 2)]
     errors, currents = zip(*pairs, strict=True)
     return METHODS[request.param].fit(errors, window=WINDOW, current_a=currents)
 
@@ -153,7 +153,7 @@ def _put_arrays(value, arrays):
 def test_fitting_twice_gives_the_same_intervals() -> None:
     for method in METHODS.values():
         first, second = (
-            method.fit([series(1500, 1)], window=WINDOW).intervals(series(300, 2)) for _ in range(2)
+            method.fit([series(700, 1)], window=WINDOW).intervals(series(200, 2)) for _ in range(2)
         )
         np.testing.assert_array_equal(first.lower_v, second.lower_v)
 
