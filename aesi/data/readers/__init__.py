@@ -10,16 +10,21 @@ from aesi.errors import DataError
 GZIP_MAGIC = b"\x1f\x8b"
 PARQUET_MAGIC = b"PAR1"
 OFFICE_MAGIC = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # .xlsx and .xls
+CYCLER_SUFFIXES = (".mpt", ".nda", ".ndax")
 MATLAB_MAGIC = (b"MATLAB", b"\x89HDF")
 
 
 def open_table(path: str | Path) -> Table:
-    """The reader for a file, chosen by its first bytes and not by its name.
+    """The reader for a file: cyclers' own by their suffix, all others by their first bytes.
 
     Raises DataError where there is no such file, it is empty, or it is no text table and no Parquet file.
     """
     file = Path(path)
     magic = _first_bytes(file)
+    if file.suffix.lower() in CYCLER_SUFFIXES:
+        from aesi.data.readers.cycler import CyclerTable
+
+        return CyclerTable(file)
     if magic.startswith(PARQUET_MAGIC):
         from aesi.data.readers.parquet import ParquetTable
 
