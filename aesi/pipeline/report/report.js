@@ -53,8 +53,8 @@
         const to = low + Math.floor(((b + 1) * (high - low)) / buckets);
         let smallest = from, largest = from;
         for (let i = from; i < to; i++) {
-          if (y[i] < y[smallest]) smallest = i;
-          if (y[i] > y[largest]) largest = i;
+          if (y[i] < y[smallest] || isNaN(y[smallest])) smallest = i;
+          if (y[i] > y[largest] || isNaN(y[largest])) largest = i;
         }
         if (keep === "min") rows.push(smallest);
         else if (keep === "max") rows.push(largest);

@@ -50,6 +50,17 @@ def persistence_finding(model: Row) -> str:
     )
 
 
+def outside_finding(model: Row) -> str:
+    """How much of the test data the model was not trained for, in words."""
+    share = _figure(model, "free_run", "outside_pct")
+    if not share:
+        return ""
+    return (
+        f"{share:.1f} % of the test samples lie outside the range the correction was trained on; its inputs are "
+        "held at the edge there, and its intervals are not calibrated."
+    )
+
+
 def interval_finding(model: Row) -> str:
     """Coverage against the nominal level, in words."""
     keys = ("nominal_pct", "coverage_pct", "average_width_v", "worst_bin_coverage_pct")

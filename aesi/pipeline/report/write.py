@@ -39,7 +39,11 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         chosen=chosen,
         physics=view.model(view.physics) or {"name": view.physics},
         finding=words.run_finding(view),
-        sentences=[s for s in (words.persistence_finding(chosen), words.interval_finding(chosen)) if s],
+        sentences=[
+            sentence
+            for tell in (words.persistence_finding, words.interval_finding, words.outside_finding)
+            if (sentence := tell(chosen))
+        ],
         tables=tables.all_tables(view.models),
         models=predicted_models(view),
     )

@@ -70,6 +70,16 @@ def test_the_measurement_is_inside_the_drawn_band_exactly_where_it_is_inside_the
     np.testing.assert_array_equal(drawn, inside)
 
 
+def test_samples_outside_the_trained_range_are_marked_and_no_others(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    outside = np.arange(500) >= 450
+    fig = records.voltage_figure([replace(trace, outside=outside)], "ESPM + AESI I", "ESPM")
+    marked = next(t for t in fig.data if t.name.startswith("outside"))
+    np.testing.assert_array_equal(np.isfinite(marked.y), outside)
+    inside = records.voltage_figure([trace], "ESPM + AESI I", "ESPM")
+    assert not any(t.name.startswith("outside") for t in inside.data)
+
+
 def test_records_stand_end_to_end_without_overlap(views):
     rng = np.random.default_rng(0)
     placed, unit = records.end_to_end([views.trace(n, "test", 100, rng) for n in "ab"])

@@ -31,6 +31,11 @@ def test_a_model_that_diverged_has_no_figures_to_tell(views, figures):
     assert words.interval_finding(broken.models[1]) == ""
 
 
+def test_extrapolation_is_told_where_there_is_any():
+    assert "12.5 % of the test samples" in words.outside_finding({"free_run": {"outside_pct": 12.5}})
+    assert words.outside_finding({"free_run": {"outside_pct": 0.0}}) == ""
+
+
 def test_choosing_no_correction_is_said_plainly(views):
     text = words.run_finding(replace(views.run_view(200), chosen="ESPM"))
     assert text.startswith("No correction")

@@ -134,6 +134,7 @@ def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure
             line(fig, item.x, prediction.free_run_v, chosen, style.BLUE, first=first)
             line(fig, item.x, _error(trace, prediction.free_run_v), chosen, style.BLUE, 2, first=False)
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, first=first, width=1.0)
+    _mark_outside(fig, placed)
     _mark_records(fig, placed)
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="error, mV", row=2, zeroline=True)
@@ -238,6 +239,17 @@ def _mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
                 xshift=3,
                 font={"size": 10, "color": style.GREY},
             )
+
+
+def _mark_outside(fig: Figure, placed: Sequence[Placed]) -> None:
+    """A thick line along zero error where an input lies outside the range the models were trained on."""
+    first = True
+    for item in placed:
+        outside = getattr(item.trace, "outside", None)
+        if outside is not None and outside.any():
+            y = np.where(outside, 0.0, np.nan)
+            line(fig, item.x, y, "outside the trained range", style.ORANGE, 2, first, 5.0)
+            first = False
 
 
 def _time_title(placed: Sequence[Placed], unit: str) -> str:
