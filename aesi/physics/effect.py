@@ -2,11 +2,10 @@
 
 An effect acts at one or more of four places, each a function of plain values that returns changed copies:
 
-    on_model    the cell and the constitutive choices of the model          (EspmModel, **parameters) ->
-    EspmModel on_record   time, current and temperature that the cell really saw      (Record, **parameters)
-    -> Record on_voltage  a voltage in series with the cell, and states of its own    (Trace, **parameters)
-    -> Contribution on_reading  the voltage as the instrument wrote it                      (Trace,
-    **parameters) -> (n,) V
+    on_model     (EspmModel, **parameters) -> EspmModel       the cell and the model's constitutive choices
+    on_record    (Record, **parameters) -> Record             time, current, temperature that the cell really saw
+    on_voltage   (Trace, **parameters) -> Contribution        a voltage in series with the cell, with own states
+    on_reading   (Trace, **parameters) -> (n,) V              the voltage as the instrument wrote it
 
 Nothing in the core knows an effect by name: a new one is a file, a line of registration and a test, or a
 file of the user's own that `load_effect` reads.
