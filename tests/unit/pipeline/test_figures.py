@@ -80,6 +80,16 @@ def test_samples_outside_the_trained_range_are_marked_and_no_others(views):
     assert not any(t.name.startswith("outside") for t in inside.data)
 
 
+def test_a_caption_speaks_of_a_band_only_where_one_is_drawn(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    prediction = replace(trace.predictions["ESPM + AESI I"], free_run_lower_v=None)
+    without = replace(trace, predictions={"ESPM + AESI I": prediction})
+    captions = [
+        records.voltage_figure([t], "ESPM + AESI I", "ESPM").layout.meta["caption"] for t in (trace, without)
+    ]
+    assert ["band" in caption for caption in captions] == [True, False]
+
+
 def test_records_stand_end_to_end_without_overlap(views):
     rng = np.random.default_rng(0)
     placed, unit = records.end_to_end([views.trace(n, "test", 100, rng) for n in "ab"])

@@ -59,8 +59,8 @@ def front_figure(candidates: Sequence[Row]) -> Figure:
         "exponentformat": "power",
         "minor": {"dtick": "D1", "ticks": "outside"},
     }
-    fig.update_xaxes(title_text="out-of-bag loss, scaled MSE", **powers)
-    fig.update_yaxes(title_text="validation loss, scaled MSE", **powers)
+    fig.update_xaxes(title_text="out-of-bag loss, MSE over that of the physics", **powers)
+    fig.update_yaxes(title_text="validation loss, MSE over that of the physics", **powers)
     return fig
 
 

@@ -142,9 +142,10 @@ def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure
     role = traces[0].role
     caption = (
         f"Top: measured voltage, {physics} alone, and {chosen} in free run (no measured voltage after the "
-        "first sample of a record). Bottom: measured minus model; the measurement lies inside the band "
-        "where the band contains zero."
+        "first sample of a record). Bottom: measured minus model."
     )
+    if any(trace.name.startswith("band") for trace in fig.data):
+        caption += " The measurement lies inside the band where the band contains zero."
     return style.framed(
         fig, f"Voltage on the {_role_word(role)} records", caption, 560, hovermode="x unified"
     )
