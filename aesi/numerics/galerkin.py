@@ -82,9 +82,10 @@ class StackModes:
     """Diffusion through negative electrode, separator, positive electrode, by one polynomial a layer.
 
     q_k :  dq_k/dt = -lam_k (project Phi(c))_k + (gain^T i)_k,  c = c0 + to_nodes q, for Phi' = D(c).
-    lam : (n,), lam[0] = 0.  gain : (2 regions, n) of a source i_r, spread evenly over a region; regions count from
-    the current collector of the negative electrode, then from that of the positive.
-    to_nodes : (m, n).  project : (n, m).  gauss : (6 regions, m) three Gauss points in each region.
+    lam : (n,), lam[0] = 0.  gain : (2 regions, n) of a source i_r, spread evenly over a region; regions
+    count from the current collector of the negative electrode, then from that of the positive.
+    to_nodes : (m, n).  project : (n, m).  gauss : (6 regions + 3, m) three Gauss points in each region, then
+    in the separator.
     mean : (m,) weights of the average over the whole thickness.  salt : (m,) weights of the salt content.
     """
 
@@ -110,7 +111,8 @@ def stack_modes(
 ) -> StackModes:
     """Modes for layers of given thickness (m), porosity and transport efficiency.
 
-    order : polynomial degree of a layer.  regions : equal parts of each electrode that carry currents of their own.
+    order : polynomial degree of a layer.  regions : equal parts of each electrode that carry currents of
+    their own.
     """
     m = 3 * order + 1
     x, w = legendre.leggauss(order + 2)
@@ -127,7 +129,10 @@ def stack_modes(
         mean[rows] += half * w @ value
     lam, v = eigh(stiff, mass)
     lam[0] = 0.0
-    source, gauss = np.zeros((2 * regions, m)), np.zeros((6 * regions, m))
+    source, gauss = np.zeros((2 * regions, m)), np.zeros((6 * regions + 3, m))
+    gauss[6 * regions :, order : 2 * order + 1] = (
+        legendre.legvander(2.0 * GAUSS_3 - 1.0, order) @ to_coefficients
+    )
     for side, rows in enumerate((slice(0, order + 1), slice(2 * order, m))):
         for part in range(regions):
             at = part if side == 0 else regions - 1 - part  # position from the left
@@ -150,21 +155,22 @@ def stack_modes(
 def ohmic_shares(regions: int) -> tuple[Array, Array]:
     """Mean ohmic drops in an electrode cut into equal regions, per current that reacts in each.
 
-    Currents y_r are counted from the collector. Returns (solid, salt), each (regions, regions), so that L/sigma
-    solid @ y is the drop from the collector to the mean of each region's solid, and L/kappa salt @ y that from the
-    mean of each region's electrolyte to the separator. One region: 1/3 and 1/3.
+    Currents y_r are counted from the collector. Returns solid (regions, regions) and salt (regions, regions,
+    regions): L/sigma solid @ y is the drop from the collector to the mean of each region's solid, and the
+    sum over m of L/kappa_m salt[:, m] @ y that from the mean of each region's electrolyte through the
+    regions m to the separator. One region: 1/3 and 1/3.
     """
     total = np.ones(regions)
     ionic = np.tril(
         np.ones((regions + 1, regions)), -1
     )  # ionic current at each interface, from the collector
     solid_current = total - ionic
-    solid, salt = np.zeros((regions, regions)), np.zeros((regions, regions))
+    solid, salt = np.zeros((regions, regions)), np.zeros((regions, regions, regions))
     for r in range(regions):
         solid[r] = solid_current[r] / 3.0 + solid_current[r + 1] / 6.0
-        salt[r] = ionic[r] / 6.0 + ionic[r + 1] / 3.0
+        salt[r, r] = ionic[r] / 6.0 + ionic[r + 1] / 3.0
         for before in range(r):
             solid[r] += 0.5 * (solid_current[before] + solid_current[before + 1])
         for after in range(r + 1, regions):
-            salt[r] += 0.5 * (ionic[after] + ionic[after + 1])
+            salt[r, after] = 0.5 * (ionic[after] + ionic[after + 1])
     return _locked(solid / regions), _locked(salt / regions)

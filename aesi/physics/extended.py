@@ -133,21 +133,15 @@ def _capacity(model: EspmModel, electrode: Electrode, interface: Interface) -> f
 
 
 def _ohmic(model: EspmModel) -> tuple[Array, Array]:
-    """(2, regions, regions): ohm m2 of the solid, and of the electrolyte times its conductivity."""
+    """Ohm m2 of the solid (2, regions, regions), and of the electrolyte times its conductivity, by region crossed."""
     n, p = model.cell.negative, model.cell.positive
-    solid, salt = (_contrasted(m, model.region_contrast) for m in ohmic_shares(model.regions))
+    solid, salt = ohmic_shares(model.regions)
     return (
         np.array([solid * n.thickness_m / n.conductivity_s_m, solid * p.thickness_m / p.conductivity_s_m]),
         np.array(
             [salt * n.thickness_m / n.transport_efficiency, salt * p.thickness_m / p.transport_efficiency]
         ),
     )
-
-
-def _contrasted(drops: Array, contrast: float) -> Array:
-    """Drops of all regions, their differences from region to region scaled."""
-    mean = drops.mean(axis=0, keepdims=True)
-    return mean + contrast * (drops - mean)
 
 
 def _energies(cell: Cell) -> Array:

@@ -84,9 +84,9 @@ def end_weight(z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, fastmath=FASTMATH)
 def solve_electrode(  # type: ignore[no-untyped-def]
-    lo, hi, regions, side, total, dt, thermal, temperature_rise, kappa, chi,
+    lo, hi, regions, side, total, dt, thermal, temperature_rise, chi,
     region_of, share, exchange, exchange_factor, alpha, capacity, plating, plated,
-    theta_pred, give, ocp, entropic, ohm_solid, ohm_salt, salt, log_salt, region_salt,
+    theta_pred, give, ocp, entropic, ohm, salt, log_salt, region_salt,
     y, theta, delta, dl_current, region_total, plating_current, work,
 ):  # fmt: skip
     """Currents y[lo:hi] of the units of one electrode; returns Phi.
@@ -150,7 +150,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                 gain[i] += d_extra * slope[i]
         if n == 1 and capacity == 0.0 and plating[0] == 0.0:
             delta[first] = potential[0]
-            return potential[0] + (ohm_solid[0, 0] + ohm_salt[0, 0] / kappa) * total + chi * log_salt[first]
+            return potential[0] + ohm[0, 0] * total + chi * log_salt[first]
         if step == 0:
             phi = potential[0]
         worst = 0.0
@@ -161,12 +161,12 @@ def solve_electrode(  # type: ignore[no-untyped-def]
             r = region_of[lo + i]
             residual = potential[i] + chi * log_salt[first + r] - phi
             for v in range(regions):
-                residual += (ohm_solid[r, v] + ohm_salt[r, v] / kappa) * region_total[first + v]
+                residual += ohm[r, v] * region_total[first + v]
             matrix[i, n + 1] = -residual
             worst = max(worst, abs(residual))
             for j in range(n):
                 q = region_of[lo + j]
-                matrix[i, j] = (ohm_solid[r, q] + ohm_salt[r, q] / kappa) * gain[j]
+                matrix[i, j] = ohm[r, q] * gain[j]
             matrix[i, i] += slope[i]
             matrix[i, n] = -1.0
         for j in range(n):
@@ -183,6 +183,29 @@ def solve_electrode(  # type: ignore[no-untyped-def]
         delta[first + r] = new_delta[r]
         dl_current[first + r] = new_current[r]
     return phi
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def local_conductivity(table, salt, first, unit):  # type: ignore[no-untyped-def]
+    """Harmonic mean of the conductivity over three Gauss points."""
+    k1, k2 = lookup(table, salt[first] * unit), lookup(table, salt[first + 1] * unit)
+    k3 = lookup(table, salt[first + 2] * unit)
+    return 18.0 / (5.0 / k1 + 8.0 / k2 + 5.0 / k3)
+
+
+@njit(cache=True, fastmath=FASTMATH)
+def drops(solid, salt, kappa, first, contrast, ohm):  # type: ignore[no-untyped-def]
+    """ohm[r, v] : drop of region r per current of region v, differences between regions times `contrast`."""
+    regions = ohm.shape[0]
+    for v in range(regions):
+        mean = 0.0
+        for r in range(regions):
+            ohm[r, v] = solid[r, v]
+            for m in range(r, regions):
+                ohm[r, v] += salt[r, m, v] / kappa[first + m]
+            mean += ohm[r, v] / regions
+        for r in range(regions):
+            ohm[r, v] = mean + contrast * (ohm[r, v] - mean)
 
 
 @njit(cache=True, fastmath=FASTMATH)
@@ -238,7 +261,8 @@ def run_general(  # type: ignore[no-untyped-def]
     give, y = np.zeros(n_units), np.zeros(n_units)
     nodes, force, force_end = np.zeros(n_nodes), np.zeros(n_modes + 1), np.zeros(n_modes + 1)
     q, c, forcing, rest = np.zeros(n_e), np.full(m_e, c0), np.zeros(n_e), np.zeros(m_e)
-    salt, log_salt, region_salt = np.ones(6 * regions), np.zeros(2 * regions), np.ones(2 * regions)
+    salt, log_salt, region_salt = np.ones(gauss.shape[0]), np.zeros(2 * regions), np.ones(2 * regions)
+    kappa, ohm = np.ones(2 * regions), np.zeros((regions, regions))
     deviation, region_total = np.zeros(2 * regions), np.zeros(2 * regions)
     delta, dl_current = np.zeros(2 * regions), np.zeros(2 * regions)
     plated, plating_current = np.zeros(regions), np.zeros(regions)
@@ -351,7 +375,7 @@ def run_general(  # type: ignore[no-untyped-def]
             for j in range(m_e):
                 c_mean += mean[j] * c[j]
                 c_low = min(c_low, c[j])
-            for i in range(6 * regions):
+            for i in range(gauss.shape[0]):
                 g = 0.0
                 for j in range(m_e):
                     g += gauss[i, j] * c[j]
@@ -376,7 +400,14 @@ def run_general(  # type: ignore[no-untyped-def]
             inverse = 1.0 / (GAS * reference_k) - 1.0 / (GAS * t_k)
             thermal = GAS_OVER_FARADAY * t_k
             chi = 2.0 * one_minus_t * thermal
-            kappa = lookup(kappa_table, c_mean / top) * math.exp(energies[5] * inverse)
+            faster = math.exp(energies[5] * inverse)
+            kappa_separator = lookup(kappa_table, c_mean / top) * faster
+            if regions == 1:
+                kappa[:] = kappa_separator
+            else:
+                kappa_separator = local_conductivity(kappa_table, salt, 6 * regions, c0 / top) * faster
+                for r in range(2 * regions):
+                    kappa[r] = local_conductivity(kappa_table, salt, 3 * r, c0 / top) * faster
             phi_n, phi_p = 0.0, 0.0
             for side in range(2):
                 lo, hi = (0, split) if side == 0 else (split, n_units)
@@ -384,11 +415,12 @@ def run_general(  # type: ignore[no-untyped-def]
                 for u in range(lo, hi):  # start from the last deviations
                     held = y[u] - share[u] * (j0 if side == 0 else -j0) if k > 0 else 0.0
                     y[u] = share[u] * total + held
+                drops(ohm_solid[side], ohm_salt[side], kappa, side * regions, contrast, ohm)
                 phi = solve_electrode(
-                    lo, hi, regions, side, total, dt, thermal, rise, kappa, chi,
+                    lo, hi, regions, side, total, dt, thermal, rise, chi,
                     units[:, 1], share, exchange, math.exp(energies[2 + side] * inverse),
                     alpha[side], capacity[side], plating, plated,
-                    pred, give, ocp[side], entropic[side], ohm_solid[side], ohm_salt[side],
+                    pred, give, ocp[side], entropic[side], ohm,
                     salt, log_salt, region_salt, y, theta, delta, dl_current, region_total, plating_current, work,
                 )  # fmt: skip
                 if side == 0:
@@ -407,7 +439,7 @@ def run_general(  # type: ignore[no-untyped-def]
             if plating[0] > 0.0:
                 for r in range(regions):
                     plated[r] = max(plated[r] - plating_to_c * plating_current[r] * dt, 0.0)
-            voltage = phi_p - phi_n - j1 * separator / kappa - i1 * contact
+            voltage = phi_p - phi_n - j1 * separator / kappa_separator - i1 * contact
             if heat[0] > 0.0:
                 power = -i1 * voltage
                 for u in range(n_units):

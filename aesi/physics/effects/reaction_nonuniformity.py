@@ -6,7 +6,7 @@
 Each region has a particle of its own and reacts with the electrolyte there. strength s replaces what differs between
 regions by s times the difference: 1 is the full model, 0 one reaction everywhere.
 
-Leaves out what happens within a quarter of an electrode, and conductivity that varies across it. Holds for thick
+Leaves out what happens within a quarter of an electrode. Holds for thick
 electrodes, high rates, poor electrolyte, and flat open-circuit potentials.
 
 Source: Doyle, Fuller & Newman, J. Electrochem. Soc. 140 (1993) 1526, doi:10.1149/1.2221597, on four regions.
