@@ -66,8 +66,12 @@ def tables(
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
 ) -> None:
     """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
+    from flows.console import Console
+    from flows.mlflow_store import Store
     from flows.tables import tables_of
+    from flows.tracking import deliver_leftovers
 
+    deliver_leftovers(Store(uri), Console().say)
     typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from flows.mlflow_store import KIND, Store
+from flows.tracking import deliver_leftovers
 
 pytestmark = pytest.mark.slow
 
@@ -191,6 +192,7 @@ def test_a_server_that_goes_away_in_mid_run_gets_everything_when_it_is_back(work
         assert run.returncode == 0, said
         assert "does not answer" in said
         store = Store(uri)
+        deliver_leftovers(store, print)  # as the next `aesi run` or `aesi tables` does
         (parent,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
         assert parent.info.status == "FINISHED"
         children = store.children(store.find_experiment("smoke"), parent.info.run_id)
