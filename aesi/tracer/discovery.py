@@ -21,7 +21,7 @@ from aesi.tracer.fit import Fit, fit_hypothesis
 from aesi.tracer.knobs import SOC0
 from aesi.tracer.outcome import FileOutcome, States, outcomes, polarisation_v, simulated, test_rmse_v
 from aesi.tracer.problem import TOLERANCES, Problem
-from aesi.tracer.records import Record, noise_floor_v, prepare, prepare_all
+from aesi.tracer.records import Record, noise_floor_v, prepare_all, prepare_test
 from aesi.tracer.search import Admission, Archive, Scored, Search, context_of, select
 from aesi.tracer.tell_apart import experiment
 from aesi.tracer.verdict import Verdict, judge
@@ -96,7 +96,7 @@ def discover(
     records = prepare_all(cell, measurements, soc0, 0.0 if tests else holdout)
     for record in records:
         check_record(cell, record)
-    tested = tuple(prepare(cell, data, soc0, 0.0) for data in tests)
+    tested = tuple(prepare_test(cell, data, measurements, soc0) for data in tests)
     there = {active.id for active in given} - set(TOLERANCES)
     tried = {name: effect for name, effect in effects.items() if name != NUMERICS and name not in there}
     problem = _refined(Problem(cell, records, tried, fixed=tuple(given)), effects.get(NUMERICS))
@@ -123,8 +123,8 @@ def _refined(problem: Problem, numerics: Effect | None) -> Problem:
     moved, noise = [], _noise_v(problem)
     for record in problem.records:
         seen = record.thin.take(slice(0, record.n_fit))
-        coarse = problem.voltage(seen, record.soc0, problem.fixed, record.hold)
-        moved.append(problem.voltage(seen, record.soc0, finer, record.hold) - coarse)
+        coarse = problem.voltage(seen, record.soc0, problem.fixed, record.thin_hold)
+        moved.append(problem.voltage(seen, record.soc0, finer, record.thin_hold) - coarse)
     shift = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
     return replace(problem, fixed=finer) if shift > NUMERICS_SHARE * noise else problem
 

@@ -73,19 +73,19 @@ def simulated(problem: Problem, fit: Fit | None, record: Record, index: int | No
     of
     charge is then the one given, or the one at which the fitted model rests at its first voltage.
     """
-    data = record.thin if thin else record.data
+    data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
     if fit is None:
-        return problem.run(data, record.soc0, problem.fixed, record.hold)
+        return problem.run(data, record.soc0, problem.fixed, hold)
     values = fit.values
     effects = problem.active(values)
     if index is not None:
-        return problem.run(data, values[SOC0][str(index)], effects, record.hold)
+        return problem.run(data, values[SOC0][str(index)], effects, hold)
     if record.soc0_given or record.rest_voltage_v is None:
-        return problem.run(data, record.soc0, effects, record.hold)
+        return problem.run(data, record.soc0, effects, hold)
     try:
-        return problem.run(data, None, effects, record.hold, record.rest_voltage_v)
+        return problem.run(data, None, effects, hold, record.rest_voltage_v)
     except AesiError:
-        return problem.run(data, record.soc0, effects, record.hold)
+        return problem.run(data, record.soc0, effects, hold)
 
 
 def outcomes(
@@ -101,7 +101,7 @@ def outcomes(
             out.append(_outcome(record, "test", slice(cut, len(record.data)), runs, rng))
     for record in tests:
         runs = {s: simulated(problem, fit, record, None, thin=False) for s, fit in states.items()}
-        out.append(_outcome(record, "test", slice(0, len(record.data)), runs, rng))
+        out.append(_outcome(record, "test", slice(record.seen_rows, len(record.data)), runs, rng))
     return tuple(out)
 
 
@@ -135,7 +135,10 @@ def rmse_difference(
 
 def test_rmse_v(problem: Problem, fit: Fit, tests: Sequence[Record]) -> float:
     """RMSE on what the fits have not seen (on the fit part where there is nothing else), thinned, V."""
-    parts = [r.thin.voltage_v - simulated(problem, fit, r, None, thin=True).voltage_v for r in tests]
+    parts = []
+    for record in tests:
+        run = simulated(problem, fit, record, None, thin=True)
+        parts += [(record.thin.voltage_v - run.voltage_v)[record.seen_rows_thin :]]
     for index, record in enumerate(problem.records):
         if not tests and record.n_fit < len(record.thin):
             run = simulated(problem, fit, record, index, thin=True)

@@ -17,6 +17,7 @@ from aesi.physics.effect import ActiveEffect, Effect
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.knobs import SOC0, Knob, free_knobs, soc_knob, tolerated_knob, values_by_owner
 from aesi.tracer.records import Record
+from aesi.tracer.stepping import stepping
 
 TOLERANCES: Mapping[str, Mapping[str, float] | float] = {
     "solid_diffusivity": 0.03,
@@ -86,7 +87,7 @@ class Problem:
             effects = self.active(values)
             for i, record in enumerate(self.records):
                 seen = record.thin.take(slice(0, record.n_fit))
-                out.append(self.voltage(seen, values[SOC0][str(i)], effects, record.hold))
+                out.append(self.voltage(seen, values[SOC0][str(i)], effects, record.thin_hold))
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
         if not all(np.isfinite(v).all() for v in out):
@@ -98,7 +99,7 @@ class Problem:
         record = self.records[0]
         try:
             effects = tuple(self.effects[name].activate() for name in hypothesis)
-            self.run(record.thin.take(slice(0, record.n_fit)), record.soc0, effects, record.hold)
+            self.run(record.thin.take(slice(0, record.n_fit)), record.soc0, effects, record.thin_hold)
         except AesiError as error:
             return str(error)
         return "no start of the fit could be simulated."
@@ -118,7 +119,7 @@ class Problem:
             data.time_s,
             data.current_a,
             soc0,
-            effects,
+            (*effects, *stepping(data)),
             None,
             hold,
             rest_voltage_v=rest_voltage_v,

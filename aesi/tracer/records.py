@@ -21,7 +21,12 @@ THIN_STEP_S = 1.0
 """Fits see at most one sample a second: nothing in the catalogue is faster than a sample and slower than
 noise."""
 FIT_SAMPLES = 12_000
+STEADY_SAMPLES = 600
+STEADY_C_RATE = 0.01
+STEADY_SHARE = 0.01
 SLOW_SAMPLING_S = 5.0
+CONTINUATION_STEPS = 3.0
+"""A file that starts within this many samples of another's end, on the same clock, continues it."""
 OTHER_STATE = 0.05
 REST_C_RATE = 1.0 / 50.0
 NEAR_REST_C_RATE = 1.0 / 8.0
@@ -35,11 +40,11 @@ SMALLEST_NOISE_V = 5e-5
 class Record:
     """One measurement as the tracer uses it.
 
-    data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits
-    may see.
-    fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of
-    charge
-    and what it is uncertain by.  noise_v : deviation of the sensor's white noise, in `thin`.
+    data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
+    fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of charge
+    and what it is uncertain by.  seen_rows : rows at the start that only lead to what is judged.
+    hold, thin_hold : how the current runs between the samples of either.  noise_v, noise_full_v : deviation of the
+    white noise in `thin` and in `data`.
     """
 
     data: Measurement
@@ -49,16 +54,25 @@ class Record:
     soc0: float
     soc0_sd: float
     hold: Hold
+    thin_hold: Hold
     noise_v: float
     noise_full_v: float
     rest_voltage_v: float | None = None
     soc0_given: bool = False
+    seen_rows: int = 0
     notes: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
         """The measurement's name."""
         return self.data.name
+
+    @property
+    def seen_rows_thin(self) -> int:
+        """Rows of `thin` that only serve to get to the part that is judged."""
+        if not self.seen_rows:
+            return 0
+        return int(np.searchsorted(self.thin.time_s, self.data.time_s[self.seen_rows]))
 
     @property
     def fit_rows_full(self) -> int:
@@ -95,11 +109,11 @@ def prepare(
     holdout : share of the time, at the end, that fits may not see (0 for none).
     Raises DataError where the record is too short or its initial state cannot be known.
     """
-    hold: Hold = (
-        "backward" if float(np.max(np.diff(data.time_s[:]), initial=0.0)) > SLOW_SAMPLING_S else "linear"
-    )
-    thin = thinned(data, step_s)
-    duration = data.time_s[-1] - data.time_s[0]
+    gaps = np.diff(data.time_s)
+    hold: Hold = "backward" if float(gaps.max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
+    duration = float(data.time_s[-1] - data.time_s[0])
+    thin = thinned(data, max(step_s, duration / STEADY_SAMPLES) if _steady(cell, data) else step_s)
+    thin_hold: Hold = hold if thin is data else "linear"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     start, sd, notes = _initial_state(cell, data, soc0)
@@ -107,7 +121,44 @@ def prepare(
     noise_full = noise if thin is data else noise_floor_v(data.voltage_v, data.current_a)
     rest = rest_voltage_v(cell, data) if at_rest(cell, data) else None
     given = soc0 is not None and start == soc0
-    return Record(data, thin, n_fit, until, start, sd, hold, noise, noise_full, rest, given, notes)
+    return Record(
+        data, thin, n_fit, until, start, sd, hold, thin_hold, noise, noise_full, rest, given, notes=notes
+    )
+
+
+def _steady(cell: Cell, data: Measurement) -> bool:
+    """True for constant-current tests, whose voltage needs few samples to be described."""
+    changes = np.abs(np.diff(data.current_a)) > STEADY_C_RATE * cell.nominal_capacity_ah
+    return float(np.mean(changes)) < STEADY_SHARE
+
+
+def prepare_test(cell: Cell, data: Measurement, seen: Sequence[Measurement], soc0: float | None) -> Record:
+    """A record that chooses nothing.
+
+    Where it is the continuation of a record that fits have seen, or has such a record as its beginning, the model
+    runs through that and only what comes after is judged.
+    """
+    for known in seen:
+        n = len(known)
+        same = len(data) > n and np.array_equal(data.time_s[:n], known.time_s)
+        if same and np.array_equal(data.voltage_v[:n], known.voltage_v):
+            return replace(prepare(cell, data, soc0, 0.0), seen_rows=n)
+        gap = float(data.time_s[0] - known.time_s[-1])
+        if 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s))):
+            return replace(prepare(cell, _joined(known, data), soc0, 0.0), seen_rows=n)
+    return prepare(cell, data, soc0, 0.0)
+
+
+def _joined(first: Measurement, second: Measurement) -> Measurement:
+    temperatures = (first.temperature_degc, second.temperature_degc)
+    both = None not in temperatures
+    return replace(
+        second,
+        time_s=np.concatenate([first.time_s, second.time_s]),
+        current_a=np.concatenate([first.current_a, second.current_a]),
+        voltage_v=np.concatenate([first.voltage_v, second.voltage_v]),
+        temperature_degc=np.concatenate([t for t in temperatures if t is not None]) if both else None,
+    )
 
 
 def prepare_all(

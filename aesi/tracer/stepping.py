@@ -1,0 +1,39 @@
+"""Longer steps of the nonlinear part where a record asks for no more: slow tests cost as little as short ones."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from aesi.parameters import Parameter
+from aesi.physics.effect import ActiveEffect, Effect
+from aesi.physics.model import DEFAULT_SUBSTEP_S, EspmModel
+from aesi.records import Measurement
+
+LONGEST_STEP_S = 60.0
+STEPS_A_SAMPLE = 4.0
+
+PARAMETERS = {
+    "substep_s": Parameter(
+        DEFAULT_SUBSTEP_S,
+        "s",
+        bounds=(0.1, LONGEST_STEP_S),
+        source="a minute is short beside diffusion at C/20",
+    )
+}
+
+
+def longer_steps(model: EspmModel, *, substep_s: float) -> EspmModel:
+    """The model with another longest step."""
+    return replace(model, substep_s=substep_s)
+
+
+EFFECT = Effect("longer_steps", "instrument", __doc__ or "", PARAMETERS, on_model=longer_steps)
+
+
+def stepping(data: Measurement) -> tuple[ActiveEffect, ...]:
+    """What a record is simulated with: nothing, or longer steps where its samples are far apart."""
+    spacing = float(np.median(np.diff(data.time_s)))
+    step = min(spacing / STEPS_A_SAMPLE, LONGEST_STEP_S)
+    return (EFFECT.activate(substep_s=step),) if step > DEFAULT_SUBSTEP_S else ()
