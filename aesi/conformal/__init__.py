@@ -4,6 +4,15 @@ from aesi.conformal.calibrated import Calibrated, Stream
 from aesi.conformal.free_run import WHOLE_DRIVE, FreeRunBands
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.method import Method
-from aesi.conformal.registry import METHODS
+from aesi.conformal.registry import DEFAULT_METHOD, METHODS
 
-__all__ = ["METHODS", "WHOLE_DRIVE", "Calibrated", "FreeRunBands", "Intervals", "Method", "Stream"]
+__all__ = [
+    "DEFAULT_METHOD",
+    "METHODS",
+    "WHOLE_DRIVE",
+    "Calibrated",
+    "FreeRunBands",
+    "Intervals",
+    "Method",
+    "Stream",
+]

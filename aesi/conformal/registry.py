@@ -55,6 +55,10 @@ def boosted(task: FitTask) -> QuantileModel:
     return NormalisedQuantiles.fit(task, inner)
 
 
+DEFAULT_METHOD = "spci_boosted"
+"""Best interval score on measured cells, and level with the linear method on virtual ones, when it is given
+the current; calibrate and predict with `current_a`."""
+
 METHODS: dict[str, Method] = {
     method.name: method
     for method in (
