@@ -96,7 +96,7 @@ def _require(request, data_set):
 
 
 def _run_python(body, where, namespace):
-    """Plain code is executed; a session with prompts is compared with what it shows."""
+    """Plain code is executed; a transcript with prompts is compared with what it shows."""
     if not body.startswith(">>> "):
         with contextlib.redirect_stdout(io.StringIO()):
             exec(compile(body, where, "exec"), namespace)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.pipeline.figures import before_and_after_maps, paper_figures
-from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records
+from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records, timeline
 from aesi.pipeline.report.views import BootstrapView
 
 
@@ -92,14 +92,14 @@ def test_a_caption_speaks_of_a_band_only_where_one_is_drawn(views):
 
 def test_records_stand_end_to_end_without_overlap(views):
     rng = np.random.default_rng(0)
-    placed, unit = records.end_to_end([views.trace(n, "test", 100, rng) for n in "ab"])
+    placed, unit = timeline.end_to_end([views.trace(n, "test", 100, rng) for n in "ab"])
     assert unit == "s"
     assert placed[0].x[-1] <= placed[1].x[0]
 
 
 def test_long_tests_are_shown_in_hours(views):
     trace = views.trace("t", "test", 500, np.random.default_rng(0))
-    placed, unit = records.end_to_end([replace(trace, time_s=trace.time_s * 1000)])
+    placed, unit = timeline.end_to_end([replace(trace, time_s=trace.time_s * 1000)])
     assert unit == "h"
     assert placed[0].x[-1] == pytest.approx(49_900 / 3600)
 

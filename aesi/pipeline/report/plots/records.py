@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
+from aesi.pipeline.report.plots.timeline import (
+    Placed,
+    band,
+    end_to_end,
+    line,
+    mark_outside,
+    mark_records,
+    stack,
+    time_title,
+)
 from aesi.pipeline.report.views import DiscoveryTrace, Trace
 
 if TYPE_CHECKING:
@@ -18,84 +27,9 @@ if TYPE_CHECKING:
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
 
 
-@dataclass(frozen=True)
-class Placed:
-    """A record and where it starts on the common time axis, in the axis's unit."""
-
-    trace: Trace | DiscoveryTrace
-    x: Array
-
-
-def end_to_end(traces: Sequence[Trace | DiscoveryTrace]) -> tuple[list[Placed], str]:
-    """Records one after the other on one axis, and that axis's unit."""
-    spans = [float(t.time_s[-1] - t.time_s[0]) for t in traces]
-    unit, divisor = style.time_unit(sum(spans))
-    starts = np.concatenate([[0.0], np.cumsum(spans)])
-    placed = [Placed(t, (t.time_s - t.time_s[0] + s) / divisor) for t, s in zip(traces, starts, strict=False)]
-    return placed, unit
-
-
-def line(
-    fig: Figure,
-    x: Array,
-    y: Array,
-    name: str,
-    colour: str,
-    row: int = 1,
-    first: bool = True,
-    width: float = 1.2,
-) -> None:
-    """A series over time; the page thins it out for display and refines it on zoom."""
-    fig.add_scatter(
-        x=x,
-        y=y,
-        mode="lines",
-        name=name,
-        legendgroup=name,
-        showlegend=first,
-        line={"color": colour, "width": width},
-        meta={"keep": "minmax"},
-        row=row,
-        col=1,
-    )
-
-
-def band(
-    fig: Figure,
-    x: Array,
-    low: Array,
-    high: Array,
-    name: str,
-    colour: str,
-    row: int = 1,
-    first: bool = True,
-    edge: float = 0.0,
-) -> None:
-    """A shaded band between two series; `edge` is the width of its outline, px."""
-    look = {
-        "mode": "lines",
-        "line": {"width": edge, "color": colour},
-        "legendgroup": name,
-        "hoverinfo": "skip",
-    }
-    fig.add_scatter(x=x, y=low, name=name, showlegend=False, meta={"keep": "min"}, row=row, col=1, **look)
-    fig.add_scatter(
-        x=x,
-        y=high,
-        name=name,
-        showlegend=first,
-        fill="tonexty",
-        fillcolor=style.translucent(colour),
-        meta={"keep": "max"},
-        row=row,
-        col=1,
-        **look,
-    )
-
-
 def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
     """Current or voltage of every record by role; `quantity` is `current` or `voltage`."""
-    fig = _stack(1)
+    fig = stack(1)
     label = {"current": "current, A (discharge > 0)", "voltage": "voltage, V"}[quantity]
     placed, unit = end_to_end(traces)
     colours = {"train": style.BLUE, "valid": style.ORANGE, "test": style.GREEN}
@@ -107,8 +41,8 @@ def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
         role = ROLE_NAMES[trace.role]
         line(fig, item.x, y, role, colours[trace.role], first=role not in seen)
         seen.add(role)
-    _mark_records(fig, placed)
-    fig.update_xaxes(title_text=_time_title(placed, unit))
+    mark_records(fig, placed)
+    fig.update_xaxes(title_text=time_title(placed, unit))
     fig.update_yaxes(title_text=label)
     caption = f"Measured {quantity} of the training (I), validation (II) and test (III) records."
     return style.framed(fig, f"{quantity.capitalize()} profile", caption, 320, hovermode="x unified")
@@ -116,7 +50,7 @@ def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
 
 def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure:
     """Measured, physics and hybrid voltage in free run, and the error of both beneath, with its band."""
-    fig = _stack(2)
+    fig = stack(2)
     placed, unit = end_to_end(traces)
     for i, item in enumerate(placed):
         trace = item.trace
@@ -134,11 +68,11 @@ def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure
             line(fig, item.x, prediction.free_run_v, chosen, style.BLUE, first=first)
             line(fig, item.x, _error(trace, prediction.free_run_v), chosen, style.BLUE, 2, first=False)
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, first=first, width=1.0)
-    _mark_outside(fig, placed)
-    _mark_records(fig, placed)
+    mark_outside(fig, placed)
+    mark_records(fig, placed)
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="error, mV", row=2, zeroline=True)
-    fig.update_xaxes(title_text=_time_title(placed, unit), row=2)
+    fig.update_xaxes(title_text=time_title(placed, unit), row=2)
     role = traces[0].role
     caption = (
         f"Top: measured voltage, {physics} alone, and {chosen} in free run (no measured voltage after the "
@@ -153,7 +87,7 @@ def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure
 
 def residual_figure(traces: Sequence[DiscoveryTrace], labels: dict[str, str]) -> Figure:
     """Measured voltage, current, and the residual before, recalibrated and after, over time."""
-    fig = _stack(3, (0.3, 0.2, 0.5))
+    fig = stack(3, (0.3, 0.2, 0.5))
     placed, unit = end_to_end(traces)
     for i, item in enumerate(placed):
         trace = item.trace
@@ -163,11 +97,11 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: dict[str, str]) ->
         for state, label in labels.items():
             error = (trace.measured_v - getattr(trace, f"{state}_v")) * style.MILLIVOLT
             line(fig, item.x, error, label, style.STATE_COLOURS[state], 3, i == 0)
-    _mark_records(fig, placed)
+    mark_records(fig, placed)
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="current, A", row=2)
     fig.update_yaxes(title_text="residual, mV", zeroline=True, row=3)
-    fig.update_xaxes(title_text=_time_title(placed, unit), row=3)
+    fig.update_xaxes(title_text=time_title(placed, unit), row=3)
     part = "data that chose nothing" if traces[0].part == "test" else "the data the loop was fitted on"
     caption = f"Residual (measured minus model) over time on {part}; discharge current is positive."
     return style.framed(
@@ -182,12 +116,12 @@ def interval_figure(traces: Sequence[Trace], model: str, zoom_s: float | None = 
         return None
     if zoom_s is not None:
         usable = [_liveliest(usable, zoom_s)]
-    fig = _stack(2)
+    fig = stack(2)
     placed, unit = end_to_end(usable)
     for i, item in enumerate(placed):
         _add_interval(fig, item, model, first=i == 0)
-    _mark_records(fig, placed)
-    fig.update_xaxes(title_text=_time_title(placed, unit), row=2)
+    mark_records(fig, placed)
+    fig.update_xaxes(title_text=time_title(placed, unit), row=2)
     fig.update_yaxes(title_text="voltage error, mV", row=1)
     fig.update_yaxes(title_text="minus prediction, mV", zeroline=True, row=2)
     title = f"Prediction intervals of {model}"
@@ -214,47 +148,6 @@ def _add_interval(fig: Figure, item: Placed, model: str, first: bool) -> None:
     line(fig, item.x, centre, "predicted error", style.BLUE, first=first)
     line(fig, item.x, error - centre, "measured error", style.MEASURED, 2, False, 0.8)
     band(fig, item.x, low - centre, high - centre, "interval", style.BLUE, 2, False, edge=1.2)
-
-
-def _stack(rows: int, heights: tuple[float, ...] | None = None) -> Figure:
-    from plotly.subplots import make_subplots
-
-    return make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.04, row_heights=heights)
-
-
-def _mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
-    """A dotted line where a record begins, and its name on top where there is room."""
-    for item in placed[:-1]:
-        fig.add_vline(x=float(item.x[-1]), line={"width": 1, "dash": "dot", "color": style.GREY})
-    if len(placed) > 1:
-        for item in placed:
-            fig.add_annotation(
-                x=float(item.x[0]),
-                y=1,
-                xref="x",
-                yref="y domain",
-                text=item.trace.name,
-                showarrow=False,
-                xanchor="left",
-                yanchor="top",
-                xshift=3,
-                font={"size": 10, "color": style.GREY},
-            )
-
-
-def _mark_outside(fig: Figure, placed: Sequence[Placed]) -> None:
-    """A thick line along zero error where an input lies outside the range the models were trained on."""
-    first = True
-    for item in placed:
-        outside = getattr(item.trace, "outside", None)
-        if outside is not None and outside.any():
-            y = np.where(outside, 0.0, np.nan)
-            line(fig, item.x, y, "outside the trained range", style.ORANGE, 2, first, 5.0)
-            first = False
-
-
-def _time_title(placed: Sequence[Placed], unit: str) -> str:
-    return f"time, records end to end, {unit}" if len(placed) > 1 else f"time, {unit}"
 
 
 def _error(trace: Trace, model_v: Array) -> Array:

@@ -1,0 +1,134 @@
+"""What figures over time share: records end to end on one axis, lines, bands and marks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.pipeline.report import style
+from aesi.pipeline.report.views import DiscoveryTrace, Trace
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A record and where it starts on the common time axis, in the axis's unit."""
+
+    trace: Trace | DiscoveryTrace
+    x: Array
+
+
+def end_to_end(traces: Sequence[Trace | DiscoveryTrace]) -> tuple[list[Placed], str]:
+    """Records one after the other on one axis, and that axis's unit."""
+    spans = [float(t.time_s[-1] - t.time_s[0]) for t in traces]
+    unit, divisor = style.time_unit(sum(spans))
+    starts = np.concatenate([[0.0], np.cumsum(spans)])
+    placed = [Placed(t, (t.time_s - t.time_s[0] + s) / divisor) for t, s in zip(traces, starts, strict=False)]
+    return placed, unit
+
+
+def line(
+    fig: Figure,
+    x: Array,
+    y: Array,
+    name: str,
+    colour: str,
+    row: int = 1,
+    first: bool = True,
+    width: float = 1.2,
+) -> None:
+    """A series over time; the page thins it out for display and refines it on zoom."""
+    fig.add_scatter(
+        x=x,
+        y=y,
+        mode="lines",
+        name=name,
+        legendgroup=name,
+        showlegend=first,
+        line={"color": colour, "width": width},
+        meta={"keep": "minmax"},
+        row=row,
+        col=1,
+    )
+
+
+def band(
+    fig: Figure,
+    x: Array,
+    low: Array,
+    high: Array,
+    name: str,
+    colour: str,
+    row: int = 1,
+    first: bool = True,
+    edge: float = 0.0,
+) -> None:
+    """A shaded band between two series; `edge` is the width of its outline, px."""
+    look = {
+        "mode": "lines",
+        "line": {"width": edge, "color": colour},
+        "legendgroup": name,
+        "hoverinfo": "skip",
+    }
+    fig.add_scatter(x=x, y=low, name=name, showlegend=False, meta={"keep": "min"}, row=row, col=1, **look)
+    fig.add_scatter(
+        x=x,
+        y=high,
+        name=name,
+        showlegend=first,
+        fill="tonexty",
+        fillcolor=style.translucent(colour),
+        meta={"keep": "max"},
+        row=row,
+        col=1,
+        **look,
+    )
+
+
+def stack(rows: int, heights: tuple[float, ...] | None = None) -> Figure:
+    """Panels above each other on one time axis."""
+    from plotly.subplots import make_subplots
+
+    return make_subplots(rows=rows, cols=1, shared_xaxes=True, vertical_spacing=0.04, row_heights=heights)
+
+
+def mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
+    """A dotted line where a record begins, and its name on top where there is room."""
+    for item in placed[:-1]:
+        fig.add_vline(x=float(item.x[-1]), line={"width": 1, "dash": "dot", "color": style.GREY})
+    if len(placed) > 1:
+        for item in placed:
+            fig.add_annotation(
+                x=float(item.x[0]),
+                y=1,
+                xref="x",
+                yref="y domain",
+                text=item.trace.name,
+                showarrow=False,
+                xanchor="left",
+                yanchor="top",
+                xshift=3,
+                font={"size": 10, "color": style.GREY},
+            )
+
+
+def mark_outside(fig: Figure, placed: Sequence[Placed]) -> None:
+    """A thick line along zero error where an input lies outside the range the models were trained on."""
+    first = True
+    for item in placed:
+        outside = getattr(item.trace, "outside", None)
+        if outside is not None and outside.any():
+            y = np.where(outside, 0.0, np.nan)
+            line(fig, item.x, y, "outside the trained range", style.ORANGE, 2, first, 5.0)
+            first = False
+
+
+def time_title(placed: Sequence[Placed], unit: str) -> str:
+    """Title of the time axis."""
+    return f"time, records end to end, {unit}" if len(placed) > 1 else f"time, {unit}"
