@@ -69,7 +69,7 @@ def effect_values(text: str) -> tuple[str, dict[str, float]]:
             values[parameter.strip()] = float(value)
         except ValueError:
             raise InputError(
-                f"--effect {text}: {item!r} has to read parameter=number, as in series_resistance:R=1e-3."
+                f"--effect {text}: {item!r} has to read parameter=number, as in series_resistance:resistance_ohm=1e-3."
             ) from None
         if not equals:
             raise InputError(f"--effect {text}: {item!r} has to read parameter=number.")

@@ -7,9 +7,11 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
+import pandas as pd
 import pytest
 
-from flows import environment
+from flows import cli, environment
 
 ROOT = Path(__file__).resolve().parents[2]
 SMOKE = ROOT / "experiments" / "smoke.yaml"
@@ -131,3 +133,33 @@ def run(tracked):
         return start(SMOKE, [*SMALL, *ASIDE, *more], use_prefect=False, **options)
 
     return go
+
+
+@pytest.fixture
+def call(monkeypatch, capsys):
+    """Runs `aesi` in this process: exit code, stdout, stderr."""
+
+    def go(*arguments):
+        monkeypatch.setattr(sys, "argv", ["aesi", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        out, err = capsys.readouterr()
+        return ended.value.code or 0, out, err
+
+    return go
+
+
+@pytest.fixture
+def cell():
+    """The project's 30 Ah cell."""
+    return ROOT / "experiments" / "cells" / "nmc_30ah.bpx.json"
+
+
+@pytest.fixture
+def current(tmp_path):
+    """Ten minutes of a drive-like current, without voltage."""
+    time_s = np.arange(0.0, 600.0)
+    current_a = 30 * np.sin(time_s / 40) ** 3
+    path = tmp_path / "current.csv"
+    pd.DataFrame({"time_s": time_s, "current_a": current_a}).to_csv(path, index=False)
+    return path

@@ -5,6 +5,7 @@ import re
 import time
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from flows.mlflow_store import KIND, Store
@@ -124,6 +125,34 @@ def test_tables_come_from_the_store_alone(finished, tmp_path, monkeypatch):
     assert 'model,"MSER train, %"' in tables_of("smoke", "csv", uri=uri)
     tables_of("smoke", figures=tmp_path / "figures", uri=uri)
     assert (tmp_path / "figures" / folder.name / "report.html").stat().st_size > 100
+
+
+def test_predict_in_both_regimes(call, finished, current, tmp_path):
+    (model,) = (finished / "runs/smoke").glob("*/model")
+    code, _, err = call(
+        "predict", "--model", model, "--current", current, "--out", tmp_path / "p.csv", "--soc0", 0.6
+    )
+    assert code == 0, err
+    free = pd.read_csv(tmp_path / "p.csv")
+    assert {"time_s", "current_a", "voltage_v", "lower_v", "upper_v"} <= set(free)
+    code, _, err = call(
+        "predict", "--model", model, "--current", current, "--out", tmp_path / "q.csv", "--measured"
+    )
+    assert code == 2
+    assert "has no voltage_v" in err
+    free[["time_s", "current_a", "voltage_v"]].to_csv(tmp_path / "measured.csv", index=False)
+    code, _, err = call(
+        "predict",
+        "--model",
+        model,
+        "--current",
+        tmp_path / "measured.csv",
+        "--out",
+        tmp_path / "q.csv",
+        "--measured",
+    )
+    assert code == 0, err
+    assert (pd.read_csv(tmp_path / "q.csv")["upper_v"][5:] > free["voltage_v"][5:] - 1.0).all()
 
 
 def test_seeds_become_mean_and_spread(run):
