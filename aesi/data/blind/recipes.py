@@ -39,7 +39,8 @@ class Recipe:
 
     values : magnitude m and capacity in Ah -> values of the laboratory's change, or of the instrument's fault.
     change : the laboratory's change, or None where the fault is the instrument's.
-    also : answers that data of this kind cannot tell from it.
+    also : answers that data of this kind cannot tell from it.  most : the largest m that is still physical.
+    radial_points : of the two runs whose difference counts; their mesh error cancels.
     """
 
     label: str
@@ -125,6 +126,7 @@ RECIPES: dict[str, Recipe] = {
         _algebraic,
         most=30.0,
         also=("clock_skew",),
+        radial_points=25,
     ),
     "negative_sloped_diffusivity": Recipe(
         "concentration_dependent_diffusivity",
@@ -173,6 +175,7 @@ RECIPES: dict[str, Recipe] = {
         "asymmetric_kinetics",
         _algebraic,
         most=3.5,
+        radial_points=25,
     ),
     "lithium_inventory_loss": Recipe(
         "lithium_inventory_loss", lambda m, q: {"negative_stoichiometry": 0.02 * m}, "lithium_inventory_loss"

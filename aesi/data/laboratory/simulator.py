@@ -32,8 +32,9 @@ EDGE_SHARE = 0.15
 """A change of the current between two rows by this share of its range is an edge."""
 MOST_EDGES = 400
 MOST_STEPS = 40_000
-CHARGE_TOLERANCE = 2e-4
-"""Of the nominal capacity; at 1e-5 relative tolerance, 3e-5 has been seen."""
+CHARGE_TOLERANCE = 6e-4
+"""Of the nominal capacity. The solver's own error has been seen at 3.8e-4 over 8,820 s at 10 Hz; a pulse of 2 s at
+2C that is stepped over makes 1.1e-3."""
 MESH: dict[Model, dict[str, int]] = {
     "SPMe": {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 60, "r_p": 60, "R_n": 12, "R_p": 12},
     "DFN": {"x_n": 12, "x_s": 8, "x_p": 12, "r_n": 25, "r_p": 25, "R_n": 12, "R_p": 12},
