@@ -145,7 +145,7 @@ def search(
     population: int = 20,
     constraints: Constraints | None = None,
     weights: FitnessWeights | None = None,
-    warm_start: Sequence[Genome] = (),
+    warm_start: Sequence[Genome] | None = None,
     shared: bool = False,
 ) -> SearchResult:
     """Search until the study holds `n_trials` finished trials; continue what `storage` already holds.
@@ -154,7 +154,8 @@ def search(
     that share a storage and `name` share the study.
     on_candidate : called with index, genome and outcome as each is evaluated.
     evaluate_one : what evaluates a candidate; evaluate_many, if given, evaluates a generation instead.
-    population : candidates in a generation.  warm_start : genomes to begin with.
+    population : candidates in a generation.
+    warm_start : genomes to begin with; None takes `GenomeSpace.plain_starts`, () none.
     shared : other processes work on the study now; then indices under evaluation are marked in the storage
     (a candidate that two take in the same instant is evaluated twice).
     The same seed gives the same candidates, interrupted or not, as long as one process searches.
@@ -164,7 +165,7 @@ def search(
     if space.size != len(problem.library):
         raise ConfigError(f"the genome space has {space.size} terms, the library {len(problem.library)}.")
     constraints = constraints or Constraints()
-    sampler = TermSampler(space, seed, population, warm_start)
+    sampler = TermSampler(space, seed, population, space.plain_starts() if warm_start is None else warm_start)
     study = _open(storage, name, sampler)
 
     def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:

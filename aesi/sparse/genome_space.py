@@ -47,6 +47,28 @@ class GenomeSpace:
             bool(rng.integers(2)),
         )
 
+    def plain_starts(self) -> tuple[Genome, ...]:
+        """What a user would try first: the whole library under a strong ridge, with and without feedback.
+
+        A search that begins with them never ends below them. Begun at random alone, searches of 100 to 200
+        candidates on a measured cell now and then stayed with a dozen terms and half of the reduction.
+        """
+        extents = {(min(1, self.p_c[1]), min(2, self.d[1])), (self.p_c[1], self.d[1])}
+        return tuple(
+            Genome.of(
+                np.ones(self.size, dtype=bool),
+                float(np.clip(lambda1, *self.lambda1)),
+                self.lambda2[0],
+                float(np.mean(self.tau)),
+                p_c,
+                d,
+                feedback,
+            )
+            for lambda1 in (1.0, 100.0)
+            for p_c, d in sorted(extents)
+            for feedback in (False, True)
+        )
+
     def child(self, mother: Genome, father: Genome, rng: np.random.Generator) -> Genome:
         """Each gene and each term from either parent, then mutation."""
         parents = (mother.to_dict(), father.to_dict())

@@ -34,9 +34,8 @@ def plain_ridge(problem: Problem, seed: int = 0) -> SparseModel:
 
 
 def _grid(problem: Problem) -> Iterator[Genome]:
-    orders = range(1, int(problem.library.orders.max()) + 1)
-    for p_c in orders:
-        for d in range(p_c, int(problem.library.degrees.max()) + 1):
-            for feedback in (False, True):
-                for lambda1 in np.geomspace(1e-6, 1e3, 10):
-                    yield Genome.whole(problem.library, float(lambda1), 0.0, 0.5, p_c, d, feedback)
+    top = int(problem.library.orders.max()), int(problem.library.degrees.max())
+    for p_c, d in sorted({(min(1, top[0]), min(2, top[1])), (min(2, top[0]), min(3, top[1])), top}):
+        for feedback in (False, True):
+            for lambda1 in np.geomspace(1e-6, 1e3, 10):
+                yield Genome.whole(problem.library, float(lambda1), 0.0, 0.5, p_c, d, feedback)

@@ -3,7 +3,7 @@
 The rows are handed to PySINDy as a triangular factor R with R' R = [Theta y]' [Theta y]. That poses STLSQ the
 identical problem, |R_y - R_Theta xi|**2 = |y - Theta xi|**2 + const., in as many rows as there are terms.
 
-Tuning: the genome, its ranges, operators, losses and fitness of the AESI search, with generations of 20 of
+Tuning: the genome, its ranges, starts, operators, losses and fitness of the AESI search, with generations of 20 of
 which the better half are parents. Without resamples the loss on left-out pieces stands in for out-of-bag.
 
 da Silva et al., arXiv:2411.12935.
@@ -39,10 +39,12 @@ def tuned_sindy_c(
     space = space or GenomeSpace.of(problem.library)
     rng = np.random.default_rng([seed, 1])
     alive: list[Single] = []
+    starts = list(space.plain_starts())
     reason = ""
-    for start in range(0, candidates, population):
-        for _ in range(min(population, candidates - start)):
-            outcome = evaluate_sindy_c(problem, _proposal(space, alive, population, rng))
+    for begun in range(0, candidates, population):
+        for _ in range(min(population, candidates - begun)):
+            genome = starts.pop(0) if starts else _proposal(space, alive, population, rng)
+            outcome = evaluate_sindy_c(problem, genome)
             if isinstance(outcome, Failed):
                 reason = outcome.reason
             else:
