@@ -1,0 +1,32 @@
+"""`aesi calibrate`: fit the model's own parameters, write the cell and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from aesi.pipeline.calibrate import calibrate_files
+from aesi.records import Measurement
+from flows import environment
+from flows.console import Console
+
+
+def calibrate(
+    cell: Path, measurements: Sequence[Measurement], out: Path, soc0: float | None = None, seed: int = 0
+) -> dict[str, Any]:
+    """Calibrate and say what came of it; returns the report."""
+    environment.prepare()
+    console = Console()
+    console.say(f"Fitting the model's own parameters to {', '.join(m.name for m in measurements)} ...")
+    content = calibrate_files(cell, measurements, out, soc0, seed)
+    for row in content["files"]:
+        console.say(
+            f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after"
+        )
+    for text in (*content["undetermined"], *content["notes"]):
+        console.say(f"  {text}")
+    if content["at_bounds"]:
+        console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")
+    console.say(f"Written: {out} and {out.with_suffix('.report.md')}")
+    return content
