@@ -29,7 +29,7 @@ def renew_weights(dt, faster, units, rates, e_rates, w, w_e):  # type: ignore[no
         w_e[0, j], w_e[1, j], w_e[2, j] = step_weights(e_rates[j] * faster[2], dt)
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(inline="always", fastmath=FASTMATH)
 def step_electrolyte(  # type: ignore[no-untyped-def]
     j0, j1, deviation, ahead, strength, one_minus_t, rates, gains, w, project, psi, top, to_nodes, c0,
     q, c, rest, forcing, before,
@@ -64,7 +64,7 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
             c[i] += to_nodes[i, j] * q[j]
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(inline="always", fastmath=FASTMATH)
 def step_particle(  # type: ignore[no-untyped-def]
     mean, z, u0, u1, dt, rates, gains, lump, w, strength, at, project, psi, nodes, force, force_end
 ):
@@ -103,7 +103,7 @@ def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-u
             force[j] += project[j, i] * value
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(inline="always", fastmath=FASTMATH)
 def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
     """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
 
