@@ -20,6 +20,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
 from aesi.pipeline.report.decimate import envelope
+from aesi.pipeline.report.plots.timeline import OUTSIDE
 
 WIDTH, HEIGHT = 860, 300
 LEFT, RIGHT, TOP, BOTTOM = 64, 16, 56, 44
@@ -58,10 +59,11 @@ def main(report: str, out: str) -> None:
 
 
 def series_of(figure: dict[str, Any], axis: str, arrays: dict[str, Any]) -> list[Series]:
-    """The lines on the error axis, records of one name together; bands are left out."""
+    """The lines on the error axis, records of one name together; bands and marks are left out."""
     lines: dict[str, list[dict[str, Any]]] = {}
     for trace in figure["data"]:
-        if trace.get("yaxis") == axis and trace["meta"]["keep"] == "minmax":
+        is_line = trace["meta"]["keep"] == "minmax" and trace["name"] != OUTSIDE
+        if trace.get("yaxis") == axis and is_line:
             lines.setdefault(trace["name"], []).append(trace)
     return [
         Series(name, traces[0]["line"]["color"], tuple(_samples(trace, arrays) for trace in traces))

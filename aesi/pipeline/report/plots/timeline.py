@@ -15,6 +15,8 @@ from aesi.pipeline.report.views import DiscoveryTrace, Trace
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
+OUTSIDE = "outside the trained range"
+
 
 @dataclass(frozen=True)
 class Placed:
@@ -125,7 +127,7 @@ def mark_outside(fig: Figure, placed: Sequence[Placed]) -> None:
         outside = getattr(item.trace, "outside", None)
         if outside is not None and outside.any():
             y = np.where(outside, 0.0, np.nan)
-            line(fig, item.x, y, "outside the trained range", style.ORANGE, 2, first, 5.0)
+            line(fig, item.x, y, OUTSIDE, style.ORANGE, 2, first, 5.0)
             first = False
 
 
