@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.numerics.metrics import pearson
-from aesi.numerics.typing import Array, BoolArray, IntArray
+from aesi.numerics.typing import Array, IntArray
 from aesi.records import Failed
 from aesi.sparse.ensemble import Ensemble, best_members, combine
 from aesi.sparse.genome import Genome
@@ -23,7 +23,7 @@ from aesi.sparse.model import SparseModel
 from aesi.sparse.problem import Problem
 from aesi.sparse.stridge import STRidge
 
-_ROWS_AT_ONCE = 4096
+_ROWS_AT_ONCE = 1024
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     if not alive.any():
         return Failed(f"every coefficient is below lambda2 = {genome.lambda2:g} in every resample")
     losses = np.full(len(fits), np.inf)
-    losses[alive] = _out_of_bag(problem, active, fits[alive], problem.counts[alive] == 0)
+    losses[alive] = _out_of_bag(problem, active, fits[alive], np.flatnonzero(alive))
     best = best_members(losses, problem.options.best)
     if not len(best):
         return Failed("every resample diverges in free run")
@@ -156,25 +156,23 @@ def fitness(losses: tuple[float, float, float], library_size: int, weights: Fitn
     return 1.0 - (weights.oob * oob + weights.valid * valid + weights.sparse * sparse / library_size)
 
 
-def _out_of_bag(problem: Problem, active: IntArray, fits: Array, unseen: BoolArray) -> Array:
+def _out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
     """(models,) mean squared error of each on the rows it has not seen, relative to the bare model."""
     squared = np.zeros(len(fits))
-    bare = np.zeros(len(fits))
     state = np.zeros(len(fits))
-    free = problem.options.regime == "free_run"
+    every = len(resamples) == problem.unseen.shape[1]
     for a in range(0, len(problem.target), _ROWS_AT_ONCE):
         rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
         drive, functions = drive_of(problem, active, fits, rows)
-        if free:
+        if problem.options.regime == "free_run":
             prediction = free_predictions(problem, drive, functions, rows, problem.restart[rows], state)
         else:
             prediction = one_step_predictions(problem, drive, functions, rows)
-        weighted = np.where(unseen[:, rows], problem.row_weights[rows], 0.0).T
-        target = problem.target[rows, None]
-        squared += np.einsum("kj,kj->j", weighted, np.square(target - prediction))
-        bare += np.square(target[:, 0] - problem.zero) @ weighted
+        unseen = problem.unseen[rows] if every else problem.unseen[rows][:, resamples]
+        left = np.subtract(problem.target[rows, None], prediction)
+        squared += np.where(unseen, np.square(left, out=left), 0.0).sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = squared / bare
+        ratio = squared / problem.unseen_bare[resamples]
     return np.where(np.isfinite(ratio), ratio, np.inf)
 
 

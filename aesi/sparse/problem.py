@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Literal
 
@@ -177,6 +178,16 @@ class Problem:
     def zero(self) -> float:
         """The scaled error at which the physics model is exact."""
         return float(self.scaling.error_to_scaled(np.array(0.0)))
+
+    @cached_property
+    def unseen(self) -> BoolArray:
+        """(n, resamples) the out-of-bag rows of each resample."""
+        return np.ascontiguousarray(self.counts.T == 0)
+
+    @cached_property
+    def unseen_bare(self) -> Array:
+        """(resamples,) summed squares of the scaled error of the bare model over the out-of-bag rows."""
+        return np.asarray(np.square(self.target - self.zero) @ self.unseen)
 
     def weights(self, resample: int) -> Array:
         """(n,) what each row counts in a resample."""
