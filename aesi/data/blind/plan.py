@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from aesi.data.blind.case import CaseSpec
+from aesi.data.blind.duty import duty
 from aesi.data.blind.recipes import RECIPES
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.simulator import Model
@@ -16,7 +17,9 @@ M50 = "lg_m50"
 FILES = {NMC: "nmc_30ah.bpx.json", M50: "lg_m50_chen2020.bpx.json"}
 RATES = {NMC: 1.0, M50: 0.7}
 """The LG M50 is an energy cell, with higher resistances; its currents stay lower."""
-SOC0 = {NMC: (0.8, 0.95), M50: (0.7, 0.85)}
+SOC0 = {NMC: (0.8, 0.95), M50: (0.6, 0.75)}
+PLATING_SOC0 = (0.65, 0.75)
+"""Fast charges go on from there without leaving the window of voltage by more than pulses do."""
 TARGETS_MV = (2.0, 4.0, 8.0)
 TOLERANCE = 0.05
 SLOW = ("particle_size_distribution",)
@@ -47,7 +50,8 @@ def plan(seed: int = 0) -> tuple[CaseSpec, ...]:
             wanted.append(((name,), NMC, TARGETS_MV[1], "SPMe"))
             continue
         wanted += [((name,), NMC, target, "SPMe") for target in TARGETS_MV[:2]]
-        wanted.append(((name,), M50, TARGETS_MV[2], "SPMe"))
+        if RECIPES[name].duty is duty:  # fast charges take the LG M50 far beyond its upper voltage
+            wanted.append(((name,), M50, TARGETS_MV[2], "SPMe"))
     wanted += [(("series_resistance",), NMC, 6.0, "DFN"), (("ocv_hysteresis",), M50, 6.0, "DFN")]
     wanted += [(pair, cell, 6.0, "SPMe") for pair, cell in zip(PAIRS, (NMC, M50) * 4, strict=True)]
     wanted += [((name,), cell, 6.0, "SPMe") for name in STRANGERS for cell in (NMC, M50)]
@@ -71,7 +75,7 @@ def _spec(
     number: int, recipes: tuple[str, ...], cell: str, target_mv: float, model: Model, rng: np.random.Generator
 ) -> CaseSpec:
     moderate = model == "DFN"
-    low, high = SOC0[cell]
+    low, high = PLATING_SOC0 if recipes == ("lithium_plating",) else SOC0[cell]
     return CaseSpec(
         name=f"b{number:03d}",
         cell=cell,
