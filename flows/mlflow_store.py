@@ -261,7 +261,7 @@ def _passes(error: BaseException | None) -> bool:
             return True
         if isinstance(error, OSError) and error.errno in PASSING:
             return True
-        if "database is locked" in str(error):
+        if "database is locked" in str(error) or "disk is full" in str(error):
             return True
         error = error.__cause__ or error.__context__
     return False
