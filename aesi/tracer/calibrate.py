@@ -26,7 +26,7 @@ from aesi.tracer.records import Record, prepare_all
 
 MODEL_ERROR_V = 3e-3
 """What a calibrated single-particle model is expected to miss: the weight of a sample."""
-OCP_TOLERANCE_V = 0.02
+OCP_TOLERANCE_V = 0.05
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
 RATES = ("solid_diffusivity", "charge_transfer_kinetics", "electrolyte_transport", "series_resistance")
 STEPS = 10

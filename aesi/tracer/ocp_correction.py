@@ -21,7 +21,7 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 from aesi.physics.relations import Sum, Table
 
-KNOTS = 15
+KNOTS = 19
 GRID = 241
 BEYOND = 0.06
 """Stoichiometry to which the table goes on beyond the declared range."""

@@ -52,13 +52,18 @@ class Scored:
 
 @dataclass(frozen=True)
 class Admission:
-    """Whether an effect may be added, and why not."""
+    """Whether an effect may be added, and why not.
+
+    gain_v, placebo_v : what it and the best placebo take off the held-out residual, V.  over_placebo : how many times
+    better it is, in what it brings or in what it leaves, whichever says more.
+    """
 
     admitted: bool
     reason: str
     evidence_nats: float
     gain_v: float
     placebo_v: float
+    over_placebo: float
 
 
 class Archive:
@@ -203,9 +208,8 @@ class Search:
         noise = float(np.mean([r.noise_v for r in self.problem.records]))
         left = max(child.held_out_rmse_v**2 - noise**2, (MATERIAL_SHARE * noise) ** 2)
         left_by_placebo = parent.held_out_rmse_v**2 - placebo - noise**2
-        beaten = gain - placebo >= (PLACEBO_MARGIN_SHARE * noise) ** 2 and (
-            gain >= PLACEBO_FACTOR * placebo or left <= left_by_placebo / PLACEBO_FACTOR
-        )
+        over = max(gain / max(placebo, 1e-4 * noise**2), left_by_placebo / left)
+        beaten = gain - placebo >= (PLACEBO_MARGIN_SHARE * noise) ** 2 and over >= PLACEBO_FACTOR
         verdict = [
             (nats < EVIDENCE_NATS, f"brings {nats:.1f} nats, {EVIDENCE_NATS:g} are asked for"),
             (gain < (MATERIAL_SHARE * noise) ** 2, "moves the voltage by less than the noise hides"),
@@ -214,7 +218,7 @@ class Search:
         ]
         reasons = [reason for failed, reason in verdict if failed]
         root = float(np.sqrt(max(gain, 0.0)))
-        return Admission(not reasons, "; ".join(reasons), nats, root, float(np.sqrt(placebo)))
+        return Admission(not reasons, "; ".join(reasons), nats, root, float(np.sqrt(placebo)), over)
 
 
 def select(search: Search, max_effects: int) -> list[Scored] | None:

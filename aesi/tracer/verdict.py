@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from aesi.tracer.search import EVIDENCE_NATS, MATERIAL_SHARE, PLACEBO_FACTOR, Scored, Search
+from aesi.tracer.search import EVIDENCE_NATS, MATERIAL_SHARE, Scored, Search
 
 Word = Literal["found", "none", "unknown"]
 
@@ -159,8 +159,7 @@ def _confidence(search: Search, steps: Sequence[Scored], groups: tuple[tuple[str
     parent = search.without(chosen, chosen.hypothesis[-1])
     if parent is not None:
         admission = search.admit(parent, chosen)
-        over_placebo = admission.gain_v**2 / max(PLACEBO_FACTOR * admission.placebo_v**2, 1e-12)
-        lead = min(lead, 10.0 * float(np.log(max(over_placebo, 1.0))) + TEMPERATURE)
+        lead = min(lead, 10.0 * float(np.log(max(admission.over_placebo, 1.0))))
     return _sigmoid(lead / TEMPERATURE)
 
 

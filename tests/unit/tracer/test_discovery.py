@@ -1,0 +1,96 @@
+"""The whole loop on small synthetic records with a few effects, and what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.errors import DataError
+from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
+from aesi.tracer import discover
+
+
+def test_an_ohmic_drop_is_found_with_its_size(cell, few, make):
+    data = make((CATALOGUE["series_resistance"].activate(resistance_ohm=2e-4),))
+    found = discover(cell, [data], soc0=0.9, effects=few)
+    assert found.verdict.word == "found"
+    assert found.verdict.effects == ("series_resistance",)
+    best = found.candidates[0]
+    assert best.effect == "series_resistance"
+    estimate = best.parameters["resistance_ohm"]
+    assert estimate.low <= 2e-4 <= estimate.high
+    test = next(f for f in found.files if f.part == "test")
+    assert test.errors("after").rmse_v < 1.1e-3 < test.errors("before").rmse_v
+    assert found.model_effects[-1].parameters["resistance_ohm"] == pytest.approx(2e-4, rel=0.05)
+
+
+def test_a_cell_as_declared_lacks_nothing(cell, few, make):
+    found = discover(cell, [make()], soc0=0.9, effects=few)
+    assert found.verdict.word == "none"
+    assert found.verdict.effects == ()
+    assert found.verdict.confidence > 0.8
+    assert found.explained_after.total_v < 0.5e-3
+
+
+def test_a_wave_that_no_effect_makes_is_unknown(cell, few, make):
+    data = make()
+    wave = 8e-3 * np.sign(np.sin(data.time_s / 90.0 + np.sin(data.time_s / 310.0)))
+    found = discover(cell, [replace(data, voltage_v=data.voltage_v + wave)], soc0=0.9, effects=few)
+    assert found.verdict.word == "unknown"
+    assert found.verdict.effects == ()
+    assert found.verdict.structured_v == pytest.approx(8e-3, rel=0.2)
+
+
+def test_the_same_seed_gives_the_same_answer_and_the_archive_spares_the_fits(cell, few, make, tmp_path):
+    data = make((CATALOGUE["current_sensor_gain"].activate(gain=1.03),))
+    archive = tmp_path / "fits.jsonl"
+    first = discover(cell, [data], soc0=0.9, effects=few, archive=archive)
+    again = discover(cell, [data], soc0=0.9, effects=few, archive=archive)
+    assert again.verdict.effects == first.verdict.effects == ("current_sensor_gain",)
+    assert again.candidates[0].score == pytest.approx(first.candidates[0].score, abs=0.5)
+    assert again.simulations < first.simulations / 5
+    torn = archive.read_text().rstrip()[:-40]  # killed while writing
+    archive.write_text(torn)
+    assert discover(cell, [data], soc0=0.9, effects=few, archive=archive).verdict.effects == first.verdict.effects
+
+
+def test_test_files_choose_nothing(cell, few, make):
+    effect = (CATALOGUE["series_resistance"].activate(resistance_ohm=2e-4),)
+    data, test = make(effect), make(effect, seed=2)
+    found = discover(cell, [data], [test], soc0=0.9, effects=few)
+    spoiled = replace(test, voltage_v=test.voltage_v + 0.02 * np.sin(test.time_s / 50))
+    other = discover(cell, [data], [spoiled], soc0=0.9, effects=few)
+    assert other.verdict == found.verdict
+    assert [c.score for c in other.candidates] == [c.score for c in found.candidates]
+    assert {f.part for f in found.files} == {"fit", "test"}
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda m: m.take(slice(0, 120)), "too little to decide"),
+        (lambda m: replace(m, current_a=0.001 * m.current_a), "does not respond"),
+        (lambda m: replace(m, voltage_v=m.voltage_v - 2.0), "outside the range"),
+        (lambda m: replace(m, current_a=m.current_a + 300.0), "state of charge"),
+        (lambda m: replace(m, voltage_v=m.voltage_v * 0.5 + 1.4), "another cell"),
+    ],
+)
+def test_what_cannot_decide_is_refused_in_one_sentence(cell, few, make, change, sentence):
+    with pytest.raises(DataError, match=sentence) as caught:
+        discover(cell, [change(make())], soc0=0.9, effects=few)
+    assert "\n" not in str(caught.value)
+
+
+def test_no_measurement_is_refused(cell, few):
+    with pytest.raises(DataError, match="at least one"):
+        discover(cell, [], effects=few)
+
+
+def test_an_effect_that_cannot_be_simulated_is_left_out_and_said(cell, make):
+    bare = replace(cell, density_kg_m3=None, specific_heat_j_kg_k=None, volume_m3=None, surface_area_m2=None)
+    effects = {n: CATALOGUE[n] for n in ("series_resistance", "self_heating")}
+    found = discover(bare, [make()], soc0=0.9, effects=effects)
+    assert isinstance(make(), Measurement)
+    assert [c.effect for c in found.candidates] == ["series_resistance"]
+    assert any(note.startswith("self_heating: not tried") for note in found.notes)
