@@ -53,3 +53,8 @@ def prepare() -> None:
     for name, value in QUIET.items():
         os.environ.setdefault(name, value)
     os.environ.setdefault("PREFECT_HOME", str(state() / "prefect"))
+
+
+def make_prefect_home() -> None:
+    """Prefect makes its home folder but not the folders above it, and cannot start its server without."""
+    Path(os.environ["PREFECT_HOME"]).expanduser().mkdir(parents=True, exist_ok=True)

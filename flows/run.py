@@ -67,6 +67,7 @@ def start(
 
         console = Console()
         return run_order(order, plainly(console.say), console)
+    environment.make_prefect_home()
     from flows.deployed import experiment
 
     folder: Path = experiment(
