@@ -87,7 +87,7 @@ def test_exchangeable_residuals_over_seeds(name: str) -> None:
     hits = 0
     for seed in range(SEEDS):
         rng = np.random.default_rng(1000 + seed)
-        past, record = 1e-3 * rng.standard_t(4, 1500), 1e-3 * rng.standard_t(4, 120)
+        past, record = 1e-3 * rng.standard_t(4, 600), 1e-3 * rng.standard_t(4, 60)
         hits += int(METHODS[name].fit([past], window=50).intervals(record).covers(record)[-1])
     # EnbPI's rank on 50 samples gives (51 * 0.9) / 51; the adaptive ones aim at 0.905: 0.9 stands for both.
     low, high = binom.ppf([0.0005, 0.9995], SEEDS, 0.90)
