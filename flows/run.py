@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from flows.mlflow_store import Store
     from flows.tracking import Tracker
 
+NO_SERVER = "connect to ephemeral Prefect API server"
 UNFINISHED = ("running", "killed", "failed")
 
 
@@ -62,16 +63,30 @@ def start(
     environment.prepare()
     order = Order(str(path), tuple(overrides), runner, address, resume, use_cache)
     order.config()  # bad input is refused before anything is started
-    if not use_prefect:
-        from flows.stages import plainly
+    if use_prefect:
+        try:
+            return _under_prefect(order)
+        except RuntimeError as error:
+            if NO_SERVER not in str(error):
+                raise
+            Console().say("Prefect's temporary server did not start in time; the stages run without it.")
+    from flows.stages import plainly
 
-        console = Console()
-        return run_order(order, plainly(console.say), console)
-    environment.make_prefect_home()
+    console = Console()
+    return run_order(order, plainly(console.say), console)
+
+
+def _under_prefect(order: Order) -> Path:
+    environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
     from flows.deployed import experiment
 
     folder: Path = experiment(
-        str(path), list(overrides), runner=runner, address=address, resume=resume, use_cache=use_cache
+        order.path,
+        list(order.overrides),
+        runner=order.runner,
+        address=order.address,
+        resume=order.resume,
+        use_cache=order.use_cache,
     )
     return Path(folder)
 

@@ -55,6 +55,7 @@ class Result:
 def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     """Write everything below `folder`; returns the content of summary.json."""
     folder.mkdir(parents=True, exist_ok=True)
+    rows = [finite(row) for row in result.evaluation.rows]
     summary = {
         "schema": SCHEMA,
         "experiment": result.config.name,
@@ -64,12 +65,12 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
         "notes": list(notes(result)),
-        "models": [finite(row) for row in result.evaluation.rows],
+        "models": rows,
     }
     hybrid(result).save(folder / "model")
     for format in ("md", "tex"):
-        (folder / f"tables.{format}").write_text(tables.render(summary["models"], format), encoding="utf-8")
-    write_run_report(folder / "report.html", run_view(result, summary["models"]))
+        (folder / f"tables.{format}").write_text(tables.render(rows, format), encoding="utf-8")
+    write_run_report(folder / "report.html", run_view(result, rows))
     text = json.dumps(summary, indent=1, allow_nan=False)
     (folder / "summary.json").write_text(text, encoding="utf-8")
     return summary

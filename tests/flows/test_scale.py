@@ -91,6 +91,16 @@ def test_two_runs_on_one_experiment_share_candidates_and_both_end(aesi, argument
     assert len(list((tracked / ".aesi/cache/candidates").glob("??/*.bin"))) == 6
 
 
+def test_the_command_starts_prefect_in_an_empty_workspace(aesi, arguments, workspace):
+    given = [each for each in arguments() if each != "--no-prefect"]
+    process = aesi(*given)
+    _, said = process.communicate(timeout=240)
+    assert process.returncode == 0, said
+    assert "Failed to create" not in said
+    assert "did not start" not in said
+    assert (workspace / ".aesi" / "prefect" / "prefect.db").is_file()
+
+
 def test_a_flow_runs_under_prefect(tracked, finished, monkeypatch):
     from prefect.testing.utilities import prefect_test_harness
 
