@@ -74,7 +74,6 @@ def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tu
 
 def _as_flow(case: Case, out: Path, experiment: str) -> dict[str, Any]:
     environment.make_prefect_home()
-    environment.make_prefect_home()
     from prefect import flow
 
     from flows.stages import as_tasks

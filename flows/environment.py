@@ -46,11 +46,6 @@ def state() -> Path:
     return workspace() / ".aesi"
 
 
-def make_prefect_home() -> None:
-    """The folder PREFECT_HOME names."""
-    Path(os.environ["PREFECT_HOME"]).expanduser().mkdir(parents=True, exist_ok=True)
-
-
 def prepare() -> None:
     """Set what is not set: one thread a process (processes are the unit of parallel work), no telemetry."""
     for name in THREAD_VARIABLES:
