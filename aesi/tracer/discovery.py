@@ -24,7 +24,7 @@ from aesi.tracer.problem import TOLERANCES, Problem
 from aesi.tracer.records import Record, noise_floor_v, prepare_all, prepare_test
 from aesi.tracer.search import Admission, Archive, Scored, Search, context_of, select
 from aesi.tracer.tell_apart import experiment
-from aesi.tracer.verdict import Verdict, judge
+from aesi.tracer.verdict import Verdict, judge, tolerance_v
 
 NUMERICS = "numerical_error"
 NUMERICS_SHARE = 0.1
@@ -105,7 +105,7 @@ def discover(
     search = Search(problem, np.random.default_rng(seed), Archive(archive, context_of(problem)))
     if progress is not None:
         search.report = lambda scored, admission: progress("+".join(scored.hypothesis), scored, admission)
-    steps = select(search, max_effects)
+    steps = select(search, max_effects, lambda base, current: _explained_enough(problem, base, current))
     if steps is None:
         raise DataError(
             f"the model of {cell.name} cannot be simulated on {records[0].name}; check the cell file."
@@ -145,6 +145,14 @@ def _with_noise_of_residual(problem: Problem) -> Problem:
         noise = noise_floor_v(base.residual_v[rows], record.thin.current_a[: record.n_fit])
         records.append(replace(record, noise_v=min(record.noise_v, noise)))
     return replace(problem, records=tuple(records))
+
+
+def _explained_enough(problem: Problem, base: Scored, current: Scored) -> bool:
+    """Is what is left within what a model may miss?"""
+    before = base.structured_v if current.hypothesis else 0.0
+    return current.structured_v <= tolerance_v(
+        _noise_v(problem), polarisation_v(problem, current.fit), before
+    )
 
 
 def _noise_v(problem: Problem) -> float:

@@ -20,6 +20,7 @@ from aesi.tracer.score import held_out_rmse_v, placebo_gain, structured_v
 ABREAST = 3
 """Hypotheses of a size that are grown further: the best single effect need not be half of the best pair."""
 GROWN_FULLY = 6
+ABREAST_WHEN_LOST, GROWN_WHEN_LOST = 2, 4
 """Effects that are fitted in full on top of each of them, the most promising by a linear estimate."""
 EVIDENCE_NATS = 10.0
 """What an effect has to bring beyond its own complexity: the price of having tried some twenty others."""
@@ -221,8 +222,10 @@ class Search:
         return Admission(not reasons, "; ".join(reasons), nats, root, float(np.sqrt(placebo)), over)
 
 
-def select(search: Search, max_effects: int) -> list[Scored] | None:
-    """Add effects one at a time while that is admitted.
+def select(search: Search, max_effects: int, enough: Callable[[Scored, Scored], bool]) -> list[Scored] | None:
+    """Add effects one at a time while that is admitted and the rest is not explained well enough.
+
+    enough : (empty hypothesis, current one) -> True where what is left is within what a model may miss.
 
     Returns the chosen hypothesis after each addition, the empty one first; None where not even that one can
     be
@@ -238,21 +241,16 @@ def select(search: Search, max_effects: int) -> list[Scored] | None:
         if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
             steps.append(best)
         hopeless = size > 1 and len(steps[-1].hypothesis) < size
-        if size == max_effects or hopeless or _nothing_left(search, steps[-1]):
+        if size == max_effects or hopeless or enough(base, steps[-1]):
             break
-        front = _grown(search, _abreast(front, steps[-1]))
+        lost = len(steps) == 1
+        parents = _abreast(front, steps[-1])[: ABREAST_WHEN_LOST if lost else ABREAST]
+        front = _grown(search, parents, GROWN_WHEN_LOST if lost else GROWN_FULLY)
     return steps
 
 
-def _nothing_left(search: Search, current: Scored) -> bool:
-    """No further effect could be material: less is left than the share of the noise that it would have to
-    move."""
-    noise = float(np.mean([r.noise_v for r in search.problem.records]))
-    return current.structured_v < MATERIAL_SHARE * noise
-
-
-def _grown(search: Search, parents: list[Scored]) -> list[Scored]:
-    children = [c for p in parents for c in search.grow(p, GROWN_FULLY)]
+def _grown(search: Search, parents: list[Scored], limit: int) -> list[Scored]:
+    children = [c for p in parents for c in search.grow(p, limit)]
     return list({frozenset(c.hypothesis): c for c in children}.values())
 
 

@@ -150,17 +150,19 @@ def _confidence(search: Search, steps: Sequence[Scored], groups: tuple[tuple[str
     for other in search.scored.values():
         if other is None or other is chosen or _covered(chosen.hypothesis, other.hypothesis, twins):
             continue
-        lead = min(
-            lead,
-            chosen.evidence
-            - other.evidence
-            + EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0),
-        )
+        dearer = EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0)
+        ahead = chosen.evidence - other.evidence + dearer
+        lead = min(lead, max(ahead, 0.0) if _doubtful(steps[0], other) else ahead)
     parent = search.without(chosen, chosen.hypothesis[-1])
     if parent is not None:
         admission = search.admit(parent, chosen)
         lead = min(lead, 10.0 * float(np.log(max(admission.over_placebo, 1.0))))
     return _sigmoid(lead / TEMPERATURE)
+
+
+def _doubtful(base: Scored, other: Scored) -> bool:
+    """A rival that ends on a bound or explains nothing unseen may cost certainty, but does not win."""
+    return bool(other.fit.at_bounds) or other.held_out_rmse_v >= base.held_out_rmse_v
 
 
 def _covered(chosen: Sequence[str], other: Sequence[str], twins: dict[str, set[str]]) -> bool:
