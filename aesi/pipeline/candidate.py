@@ -9,8 +9,9 @@ import numpy as np
 
 from aesi.conformal import METHODS, Method
 from aesi.errors import AesiError, ConfigError
+from aesi.numerics.typing import Array
 from aesi.pipeline.config import ExperimentConfig
-from aesi.records import Failed
+from aesi.records import ErrorSeries, Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
 
 
@@ -18,8 +19,8 @@ from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
 class Scored:
     """A candidate with the one-step intervals of its AESI I.
 
-    coverage_pct, width_v : share of validation samples covered, and mean width in V; None without validation
-    records, or where the residuals cannot be calibrated (`note` says why).
+    coverage_pct, width_v : share of validation samples covered, and mean width in V; None where the residuals
+    cannot be calibrated (`note` says why).
     """
 
     candidate: Candidate
@@ -29,33 +30,45 @@ class Scored:
 
 
 def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> Scored | Failed:
-    """Evaluate a genome and calibrate its intervals: on honest residuals of the training records."""
+    """Evaluate a genome, calibrate its intervals on honest residuals, and judge them on validation data."""
     outcome = evaluate(problem, genome, weights(config))
     if isinstance(outcome, Failed):
         return outcome
-    if not problem.split.valid:
-        return Scored(outcome)
+    calibration, judged = _roles(problem, outcome)
     conformal = config.conformal
     try:
         calibrated = method(config).fit(
-            [honest.one_step_v for honest in outcome.residuals],
-            conformal.alpha,
-            conformal.window,
-            np.random.default_rng(config.seed),
+            calibration, conformal.alpha, conformal.window, np.random.default_rng(config.seed)
         )
     except AesiError as error:
         return Scored(outcome, note=str(error))
     covered, widths = [], []
-    for record in problem.split.valid:
-        residual = (record.error_v - outcome.bagging.one_step(record))[1:]
+    for residual in judged:
+        known = np.isfinite(residual)
         intervals = calibrated.intervals(residual)
-        covered.append(intervals.covers(residual))
-        widths.append(intervals.width_v)
+        covered.append(intervals.covers(residual)[known])
+        widths.append(intervals.width_v[known])
     return Scored(
         outcome,
         coverage_pct=100.0 * float(np.concatenate(covered).mean()),
         width_v=float(np.concatenate(widths).mean()),
     )
+
+
+def _roles(problem: Problem, candidate: Candidate) -> tuple[list[Array], list[Array]]:
+    """Residuals to calibrate on and to judge on: the validation records, or where there are none the middle
+    training record, by models and a calibration that have not seen it."""
+    honest = [each.one_step_v for each in candidate.residuals]
+    if problem.split.valid:
+        return honest, [_residual(candidate, record) for record in problem.split.valid]
+    if len(honest) == 1:
+        honest = np.array_split(honest[0], 2)
+    middle = len(honest) // 2
+    return honest[:middle] + honest[middle + 1 :], [honest[middle]]
+
+
+def _residual(candidate: Candidate, record: ErrorSeries) -> Array:
+    return (record.error_v - candidate.bagging.one_step(record))[1:]
 
 
 def scorer(problem: Problem, config: ExperimentConfig) -> partial[Scored | Failed]:
