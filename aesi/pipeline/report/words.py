@@ -99,7 +99,8 @@ def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
         parts.append(f"the declared model of {view.cell} lacks {listed(groups['physics'])}")
     if "parameter" in groups:
         names = listed(groups["parameter"])
-        parts.append(f"{names} of {view.cell} {_verb(groups['parameter'])} not as declared")
+        subject = f"its {names}" if parts else f"{names} of {view.cell}"
+        parts.append(f"{subject} {_verb(groups['parameter'])} not as declared")
     if "instrument" in groups:
         parts.append(f"the data, not the cell, show {listed(groups['instrument'])}")
     text = "; ".join(parts)

@@ -75,6 +75,14 @@ def test_a_wrong_parameter_and_a_fault_are_not_called_missing_physics(views, eff
     assert words.discovery_finding(found).startswith(phrase)
 
 
+def test_the_cell_is_named_once(views):
+    view = views.discovery_view(200)
+    found = replace(view, discovery={**view.discovery, "effects": ["self_heating", "ambient_temperature"]})
+    text = words.discovery_finding(found)
+    assert "lacks self-heating; its ambient temperature is not as declared" in text
+    assert text.count(view.cell) == 1
+
+
 def test_a_partial_find_says_that_something_is_left(views):
     view = views.discovery_view(200, verdict="unknown")
     partial = replace(view, discovery={**view.discovery, "effects": ["self_heating"]})
