@@ -29,6 +29,12 @@ MODEL_ERROR_V = 3e-3
 OCP_TOLERANCE_V = 0.05
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
 RATES = ("solid_diffusivity", "charge_transfer_kinetics", "electrolyte_transport", "series_resistance")
+TYPICAL_SOLID_EA_J_MOL = 30e3
+TYPICAL_RATE_EA_J_MOL = 35e3
+TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
+"""Where the file declares none: a cell answers to temperature, and data at one temperature cannot say how much.
+Diffusion and rates as in the parametrisation of O'Regan et al., Electrochim. Acta 425 (2022) 140700, rounded; the
+electrolyte as in the BPX example cell."""
 STEPS = 10
 STARTS = 3
 SPREAD = 0.35
@@ -78,6 +84,8 @@ def calibrate(
     for data in measurements:
         check_measurement(cell, data)
     start, notes = sized(cell, measurements)
+    start, more = with_activation(start)
+    notes = (*notes, *more)
     records = tuple(_with_model_error(r) for r in prepare_all(start, measurements, soc0, 0.0))
     for record in records:
         check_record(start, record)
@@ -132,6 +140,39 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
     note = f"capacity {known:.3f} Ah by a full discharge, {cell.capacity_ah:.3f} Ah declared"
     scaled = replace(cell, electrode_area_m2=cell.electrode_area_m2 * factor, nominal_capacity_ah=known)
     return scaled, (f"{note}; the electrode area is scaled by {factor:.3f}.",)
+
+
+def with_activation(cell: Cell) -> tuple[Cell, tuple[str, ...]]:
+    """The cell with typical activation energies where it declares none, and a sentence that names them."""
+    filled = []
+    changed = cell
+    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+        changes = {}
+        if not electrode.diffusivity_ea_j_mol:
+            changes["diffusivity_ea_j_mol"] = TYPICAL_SOLID_EA_J_MOL
+        if not electrode.rate_ea_j_mol:
+            changes["rate_ea_j_mol"] = TYPICAL_RATE_EA_J_MOL
+        if changes:
+            with_side = changed.with_negative if side == "negative" else changed.with_positive
+            changed = with_side(**changes)
+            filled += [
+                f"{side} {name.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for name, v in changes.items()
+            ]
+    electrolyte = {
+        name: TYPICAL_ELECTROLYTE_EA_J_MOL
+        for name in ("conductivity_ea_j_mol", "diffusivity_ea_j_mol")
+        if not getattr(cell.electrolyte, name)
+    }
+    if electrolyte:
+        changed = changed.with_electrolyte(**electrolyte)
+        filled += [
+            f"electrolyte {n.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for n, v in electrolyte.items()
+        ]
+    if not filled:
+        return cell, ()
+    return changed, (
+        f"no activation energy is declared for these, typical ones are taken: {', '.join(filled)}.",
+    )
 
 
 def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:

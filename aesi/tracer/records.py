@@ -28,6 +28,7 @@ SLOW_SAMPLING_S = 5.0
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 OTHER_STATE = 0.05
+BEYOND_FULL_V = 0.05
 REST_C_RATE = 1.0 / 50.0
 NEAR_REST_C_RATE = 1.0 / 8.0
 SOC_TOLERANCE = 0.0007
@@ -206,6 +207,14 @@ def thinned(data: Measurement, step_s: float) -> Measurement:
     )
 
 
+def _nearly_full_or_empty(cell: Cell, voltage_v: float) -> float | None:
+    """One or nought where a rest voltage lies a little beyond what the cell file reaches, None further out."""
+    empty, full = (float(v) for v in cell.rest_voltage_v(np.array([0.0, 1.0])))
+    if full <= voltage_v <= full + BEYOND_FULL_V:
+        return 1.0
+    return 0.0 if empty - BEYOND_FULL_V <= voltage_v <= empty else None
+
+
 def at_rest(cell: Cell, data: Measurement) -> bool:
     """True where the first sample carries (nearly) no current."""
     return abs(float(data.current_a[0])) <= REST_C_RATE * cell.nominal_capacity_ah
@@ -232,9 +241,10 @@ def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[f
     try:
         inferred = initial_soc(cell, rest_voltage_v(cell, data))
     except SimulationError as error:
-        if soc0 is None:
+        nearest = _nearly_full_or_empty(cell, rest_voltage_v(cell, data))
+        if soc0 is None and nearest is None:
             raise DataError(str(error)) from None
-        inferred = soc0
+        inferred = soc0 if soc0 is not None else float(nearest or 0.0)
     if soc0 is not None and abs(inferred - soc0) <= OTHER_STATE:
         return soc0, SOC_TOLERANCE, ()
     notes = []

@@ -67,10 +67,10 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     V.
     """
     base, chosen = steps[0], steps[-1]
-    allowed = tolerance_v(noise_v, polarisation_v, base.structured_v if len(chosen.hypothesis) else 0.0)
-    left = chosen.structured_v
+    before, left = beyond(base, noise_v), beyond(chosen, noise_v)
+    allowed = tolerance_v(noise_v, polarisation_v, before if len(chosen.hypothesis) else 0.0)
     if left > allowed:
-        return _unknown(search, steps, left, allowed)
+        return _unknown(search, steps, before, left, allowed)
     if not chosen.hypothesis:
         confidence = _sigmoid((EVIDENCE_NATS - _best_rival(search, base)) / TEMPERATURE)
         reason = (
@@ -78,15 +78,20 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
         )
         return Verdict("none", (), (), confidence, left, allowed, reason)
     groups = look_alikes(search, chosen)
-    reason = f"{1e3 * base.structured_v:.2f} mV beyond the noise before, {1e3 * left:.2f} mV after"
+    reason = f"{1e3 * before:.2f} mV beyond the noise before, {1e3 * left:.2f} mV after"
     return Verdict(
         "found", chosen.hypothesis, groups, _confidence(search, steps, groups), left, allowed, reason
     )
 
 
-def _unknown(search: Search, steps: Sequence[Scored], left: float, allowed: float) -> Verdict:
-    base, chosen = steps[0], steps[-1]
-    taken = 1.0 - (left / base.structured_v) ** 2
+def beyond(scored: Scored, noise_v: float) -> float:
+    """Root mean square of what a hypothesis leaves beyond white noise, V."""
+    return float(np.sqrt(max(scored.fit.rmse_v**2 - noise_v**2, 0.0)))
+
+
+def _unknown(search: Search, steps: Sequence[Scored], before: float, left: float, allowed: float) -> Verdict:
+    chosen = steps[-1]
+    taken = 1.0 - (left / before) ** 2
     named = chosen.hypothesis if taken >= SUFFICIENT_SHARE else ()
     groups = look_alikes(search, chosen) if named else ()
     reason = (

@@ -10,7 +10,13 @@ from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
-FEW = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "solid_diffusivity", "ocv_hysteresis")
+FEW = (
+    "series_resistance",
+    "current_sensor_gain",
+    "voltage_sensor_offset",
+    "solid_diffusivity",
+    "ocv_hysteresis",
+)
 NOISE_V = 1e-3
 
 

@@ -52,7 +52,10 @@ def test_the_same_seed_gives_the_same_answer_and_the_archive_spares_the_fits(cel
     assert again.simulations < first.simulations / 5
     torn = archive.read_text().rstrip()[:-40]  # killed while writing
     archive.write_text(torn)
-    assert discover(cell, [data], soc0=0.9, effects=few, archive=archive).verdict.effects == first.verdict.effects
+    assert (
+        discover(cell, [data], soc0=0.9, effects=few, archive=archive).verdict.effects
+        == first.verdict.effects
+    )
 
 
 def test_test_files_choose_nothing(cell, few, make):
