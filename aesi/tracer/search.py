@@ -225,7 +225,8 @@ class Search:
 def select(search: Search, max_effects: int, enough: Callable[[Scored, Scored], bool]) -> list[Scored] | None:
     """Add effects one at a time while that is admitted and the rest is not explained well enough.
 
-    enough : (empty hypothesis, current one) -> True where what is left is within what a model may miss.
+    enough : (empty hypothesis, current one) -> True where what is left is within what a model may miss; such a
+    hypothesis goes before one that has more evidence but leaves structure.
 
     Returns the chosen hypothesis after each addition, the empty one first; None where not even that one can
     be
@@ -237,7 +238,8 @@ def select(search: Search, max_effects: int, enough: Callable[[Scored, Scored], 
     steps, front = [base], search.grow(base)
     for size in range(1, max_effects + 1):
         needed = [s for s in front if _all_needed(search, s)]
-        best = max(needed, key=lambda s: s.evidence, default=None)
+        sufficient = [s for s in needed if enough(base, s)]
+        best = max(sufficient or needed, key=lambda s: s.evidence, default=None)
         if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
             steps.append(best)
         hopeless = size > 1 and len(steps[-1].hypothesis) < size

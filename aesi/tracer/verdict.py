@@ -147,7 +147,9 @@ def _best_rival(search: Search, base: Scored) -> float:
     return best
 
 
-def _confidence(search: Search, steps: Sequence[Scored], groups: tuple[tuple[str, ...], ...]) -> float:
+def _confidence(
+    search: Search, steps: Sequence[Scored], groups: tuple[tuple[str, ...], ...], allowed: float
+) -> float:
     """How far the chosen hypothesis (with its look-alikes) is ahead of everything else, as a probability."""
     chosen = steps[-1]
     twins = {g[0]: set(g) for g in groups}
@@ -157,7 +159,7 @@ def _confidence(search: Search, steps: Sequence[Scored], groups: tuple[tuple[str
             continue
         dearer = EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0)
         ahead = chosen.evidence - other.evidence + dearer
-        lead = min(lead, max(ahead, 0.0) if _doubtful(steps[0], other) else ahead)
+        lead = min(lead, max(ahead, 0.0) if _doubtful(steps[0], other, allowed) else ahead)
     parent = search.without(chosen, chosen.hypothesis[-1])
     if parent is not None:
         admission = search.admit(parent, chosen)
@@ -165,9 +167,10 @@ def _confidence(search: Search, steps: Sequence[Scored], groups: tuple[tuple[str
     return _sigmoid(lead / TEMPERATURE)
 
 
-def _doubtful(base: Scored, other: Scored) -> bool:
-    """A rival that ends on a bound or explains nothing unseen may cost certainty, but does not win."""
-    return bool(other.fit.at_bounds) or other.held_out_rmse_v >= base.held_out_rmse_v
+def _doubtful(base: Scored, other: Scored, allowed: float) -> bool:
+    """A rival that ends on a bound, explains nothing unseen or leaves structure may cost certainty, but cannot win."""
+    worse = other.held_out_rmse_v >= base.held_out_rmse_v
+    return bool(other.fit.at_bounds) or worse or other.structured_v > allowed
 
 
 def _covered(chosen: Sequence[str], other: Sequence[str], twins: dict[str, set[str]]) -> bool:
