@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from aesi.conformal import METHODS, Method
+from aesi.conformal.candidate import validation_scores
 from aesi.errors import AesiError, ConfigError
 from aesi.numerics.typing import Array
 from aesi.pipeline.config import ExperimentConfig
@@ -37,38 +38,44 @@ def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> Scored 
     calibration, judged = _roles(problem, outcome)
     conformal = config.conformal
     try:
-        calibrated = method(config).fit(
-            calibration, conformal.alpha, conformal.window, np.random.default_rng(config.seed)
+        scores = validation_scores(
+            method(config),
+            [residual for residual, _ in calibration],
+            [residual for residual, _ in judged],
+            conformal.alpha,
+            conformal.window,
+            np.random.default_rng(config.seed),
+            current_a=[current for _, current in calibration],
+            valid_current_a=[current for _, current in judged],
         )
     except AesiError as error:
         return Scored(outcome, note=str(error))
-    covered, widths = [], []
-    for residual in judged:
-        known = np.isfinite(residual)
-        intervals = calibrated.intervals(residual)
-        covered.append(intervals.covers(residual)[known])
-        widths.append(intervals.width_v[known])
-    return Scored(
-        outcome,
-        coverage_pct=100.0 * float(np.concatenate(covered).mean()),
-        width_v=float(np.concatenate(widths).mean()),
-    )
+    return Scored(outcome, coverage_pct=100.0 * scores.coverage, width_v=scores.mean_width_v)
 
 
-def _roles(problem: Problem, candidate: Candidate) -> tuple[list[Array], list[Array]]:
+_Driven = tuple[Array, Array]
+"""One-step residuals of a record, V, and the current they arose under, A."""
+
+
+def _roles(problem: Problem, candidate: Candidate) -> tuple[list[_Driven], list[_Driven]]:
     """Residuals to calibrate on and to judge on: the validation records, or where there are none the middle
     training record, by models and a calibration that have not seen it."""
-    honest = [each.one_step_v for each in candidate.residuals]
+    honest = [
+        (each.one_step_v, record.current_a[1:])
+        for each, record in zip(candidate.residuals, problem.split.train, strict=True)
+    ]
     if problem.split.valid:
         return honest, [_residual(candidate, record) for record in problem.split.valid]
     if len(honest) == 1:
-        honest = np.array_split(honest[0], 2)
+        residual, current = honest[0]
+        cut = len(residual) // 2
+        honest = [(residual[:cut], current[:cut]), (residual[cut:], current[cut:])]
     middle = len(honest) // 2
     return honest[:middle] + honest[middle + 1 :], [honest[middle]]
 
 
-def _residual(candidate: Candidate, record: ErrorSeries) -> Array:
-    return (record.error_v - candidate.bagging.one_step(record))[1:]
+def _residual(candidate: Candidate, record: ErrorSeries) -> _Driven:
+    return (record.error_v - candidate.bagging.one_step(record))[1:], record.current_a[1:]
 
 
 def scorer(problem: Problem, config: ExperimentConfig) -> partial[Scored | Failed]:

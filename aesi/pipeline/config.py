@@ -179,7 +179,7 @@ class SearchConfig(Section):
 class ConformalConfig(Section):
     """Prediction intervals: `method` is a name in `aesi.conformal.METHODS`; horizons for free-run bands."""
 
-    method: str = "spci_linear"
+    method: str = "spci_boosted"
     alpha: Share = 0.1
     window: Annotated[int, Field(ge=2)] = 200
     horizons_s: tuple[Positive, ...] = (1.0, 10.0, 60.0)

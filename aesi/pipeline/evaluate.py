@@ -78,7 +78,7 @@ def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
         series=series,
         free=free,
         one_step=prediction,
-        intervals=None if one.intervals is None else one.intervals.intervals(residual),
+        intervals=None if one.intervals is None else one.intervals.intervals(residual, series.current_a),
         bands=None if one.bands is None else one.bands.intervals(series, free),
     )
 

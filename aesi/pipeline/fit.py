@@ -8,7 +8,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,10 +19,14 @@ from aesi.pipeline.candidate import method
 from aesi.pipeline.config import ExperimentConfig
 from aesi.pipeline.load import Loaded
 from aesi.records import ErrorModel, ErrorSeries
-from aesi.sparse import Candidate, HonestResiduals, Options, Problem
+from aesi.sparse import Candidate, Options, Problem
+from aesi.sparse.fold_models import fold_models
 from aesi.sparse.yardsticks import Bare, Persistence
 
 SEARCHED = ("AESI I", "AESI II")
+
+_Unseen = tuple[ErrorModel, ErrorSeries]
+"""A model and a record that it was not fitted to."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +76,13 @@ def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) 
 def conformalise(
     models: Sequence[Fitted], problem: Problem, chosen: Candidate, config: ExperimentConfig
 ) -> tuple[Fitted, ...]:
-    """The models with intervals and bands, calibrated on residuals of records it was not fitted to.
+    """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
-    The ensembles: each training piece by a model fitted without it, and the validation records. The others:
-    the validation records, which they were not fitted to either.
+    All: the validation records. The ensembles also each training piece, by a model fitted without it. Models
+    that were fitted to nothing also the training records.
     """
-    return tuple(_conformalised(one, problem, chosen, config) for one in models)
+    unseen: list[_Unseen] = list(fold_models(problem, chosen))
+    return tuple(_conformalised(one, unseen, problem, config) for one in models)
 
 
 def _model(
@@ -98,73 +102,67 @@ def _model(
     return baseline, len(getattr(baseline, "terms", ()))
 
 
-def _conformalised(one: Fitted, problem: Problem, chosen: Candidate, config: ExperimentConfig) -> Fitted:
-    conformal = config.conformal
-    residuals = [_one_step_residual(one.model, series) for series in problem.split.valid]
-    pieces = [_piece(one.model, series, conformal.horizons_s) for series in problem.split.valid]
+def _conformalised(
+    one: Fitted, unseen: Sequence[_Unseen], problem: Problem, config: ExperimentConfig
+) -> Fitted:
+    pairs: list[_Unseen] = [(one.model, series) for series in problem.split.valid]
     if one.model.name in SEARCHED:
-        residuals += [honest.one_step_v for honest in chosen.residuals]
-        for honest, series in zip(chosen.residuals, problem.split.train, strict=True):
-            pieces += _left_out(honest, series)
+        pairs += unseen
+    elif isinstance(one.model, Bare | Persistence):
+        pairs += [(one.model, series) for series in problem.split.train]
+    if not pairs:
+        return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []
     try:
-        rng = np.random.default_rng(config.seed)
-        intervals = method(config).fit(residuals, conformal.alpha, conformal.window, rng)
+        intervals = _intervals(pairs, config)
     except FitError as error:
         notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
     try:
-        bands = _bands(pieces, problem.dt_s, config)
+        bands = _bands(pairs, problem.dt_s, config)
     except FitError as error:
         notes.append(f"{one.model.name} has no bands in free run: {error}")
     return replace(one, intervals=intervals, bands=bands, notes=tuple(notes))
 
 
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """Honest prediction errors over a continuous stretch: in free run from its first sample, and by horizon."""
-
-    series: ErrorSeries
-    free_run_v: Array
-    by_horizon: dict[float, Array]
-
-
-def _piece(model: ErrorModel, series: ErrorSeries, horizons_s: Sequence[float]) -> _Piece:
-    by_horizon = {}
-    for horizon in horizons_s:
-        steps = max(1, round(horizon / series.dt_s))
-        error = series.error_v - model.k_step(series, steps)
-        error[:steps] = np.nan
-        by_horizon[horizon] = error
-    return _Piece(series, series.error_v - model.free_run(series).error_v, by_horizon)
-
-
-def _left_out(honest: HonestResiduals, series: ErrorSeries) -> list[_Piece]:
-    """The free runs of the fold models over the pieces they were not fitted to; a divergence is left out."""
-    edges = [*honest.starts, len(honest.free_run_v)]
-    pieces = []
-    for start, stop in pairwise(edges):
-        error = honest.free_run_v[start:stop]
-        pieces.append(
-            _Piece(series.take(slice(start + 1, stop + 1)), np.where(np.isfinite(error), error, np.nan), {})
-        )
-    return pieces
-
-
-def _bands(pieces: Sequence[_Piece], dt_s: float, config: ExperimentConfig) -> FreeRunBands:
+def _intervals(pairs: Sequence[_Unseen], config: ExperimentConfig) -> Calibrated:
     conformal = config.conformal
-    by_horizon: dict[float, list[Array]] = {
-        horizon: [piece.by_horizon.get(horizon, np.full(len(piece.series), np.nan)) for piece in pieces]
+    return method(config).fit(
+        [(series.error_v - model.one_step(series))[1:] for model, series in pairs],
+        conformal.alpha,
+        conformal.window,
+        np.random.default_rng(config.seed),
+        current_a=[series.current_a[1:] for _, series in pairs],
+    )
+
+
+def _bands(pairs: Sequence[_Unseen], dt_s: float, config: ExperimentConfig) -> FreeRunBands:
+    conformal = config.conformal
+    by_horizon = {
+        horizon: [_ahead(model, series, horizon) for model, series in pairs]
         for horizon in conformal.horizons_s
     }
-    by_horizon[WHOLE_DRIVE] = [piece.free_run_v for piece in pieces]
+    by_horizon[WHOLE_DRIVE] = [_freely(model, series) for model, series in pairs]
     return FreeRunBands.fit(
         by_horizon,
         dt_s,
         conformal.alpha,
-        current_a=[piece.series.current_a for piece in pieces],
-        soc=[piece.series.soc for piece in pieces],
+        current_a=[series.current_a for _, series in pairs],
+        soc=[series.soc for _, series in pairs],
     )
 
 
-def _one_step_residual(model: ErrorModel, series: ErrorSeries) -> Array:
-    return (series.error_v - model.one_step(series))[1:]
+def _ahead(model: ErrorModel, series: ErrorSeries, horizon_s: float) -> Array:
+    """(n,) V left by predictions from a measurement `horizon_s` earlier; NaN where there is none so early."""
+    steps = max(1, round(horizon_s / series.dt_s))
+    left = series.error_v - model.k_step(series, steps)
+    left[:steps] = np.nan
+    return left
+
+
+def _freely(model: ErrorModel, series: ErrorSeries) -> Array:
+    """(n,) V left by a free run from the first sample; NaN from a divergence on."""
+    run = model.free_run(series)
+    left = series.error_v - run.error_v
+    if run.diverged_at is not None:
+        left[run.diverged_at :] = np.nan
+    return left

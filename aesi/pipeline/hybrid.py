@@ -216,7 +216,7 @@ class HybridModel:
         if self.intervals is not None:
             residual = series.error_v - error
             residual[0] = np.nan
-            band = self.intervals.intervals(residual)
+            band = self.intervals.intervals(residual, series.current_a)
             low, high = band.lower_v, band.upper_v
         alpha = None if self.intervals is None else self.intervals.alpha
         return _prediction(series, error, low, high, self.correction.outside(series), alpha)
