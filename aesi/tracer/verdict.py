@@ -80,7 +80,7 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     groups = look_alikes(search, chosen)
     reason = f"{1e3 * before:.2f} mV beyond the noise before, {1e3 * left:.2f} mV after"
     return Verdict(
-        "found", chosen.hypothesis, groups, _confidence(search, steps, groups), left, allowed, reason
+        "found", chosen.hypothesis, groups, _confidence(search, steps, groups, allowed), left, allowed, reason
     )
 
 
