@@ -1,0 +1,85 @@
+"""Load, fit, conformalise, judge: on a record whose answer is known (1.5 mohm too little declared)."""
+
+import numpy as np
+import pytest
+from small_experiment import NOISE_V, experiment, fitted, write_record
+
+from aesi.errors import DataError
+from aesi.pipeline.evaluate import evaluate
+from aesi.pipeline.load import load
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    return write_record(tmp_path_factory.mktemp("record"))
+
+
+@pytest.fixture(scope="module")
+def evaluation(record):
+    loaded, _, models = fitted(record)
+    return evaluate(models, loaded.split)
+
+
+def row(evaluation, name):
+    return next(each for each in evaluation.rows if each["name"] == name)
+
+
+def test_the_error_is_the_missing_resistance(record):
+    split = load(experiment(record)).split
+    assert [series.name for series in split.train] == ["repeat 1", "repeat 3", "repeat 5"]
+    assert not split.valid
+    for series in (*split.train, *split.test):
+        rest = series.error_v + 1.5e-3 * series.current_a
+        assert np.std(rest) == pytest.approx(NOISE_V, rel=0.1)
+
+
+def test_a_validation_share_is_cut_from_the_end_of_every_training_repeat(record):
+    config = experiment(record)
+    repeats = config.data.repeats.model_copy(update={"valid_share": 0.25})
+    split = load(
+        config.model_copy(update={"data": config.data.model_copy(update={"repeats": repeats})})
+    ).split
+    assert [len(series) for series in split.train] == [450, 450, 450]
+    assert [len(series) for series in split.valid] == [150, 150, 150]
+
+
+def test_a_repeat_the_record_does_not_have_is_named(record):
+    config = experiment(record)
+    repeats = config.data.repeats.model_copy(update={"test": (9,)})
+    with pytest.raises(DataError, match="has no repeat 9 of 600 s"):
+        load(config.model_copy(update={"data": config.data.model_copy(update={"repeats": repeats})}))
+
+
+def test_the_correction_finds_the_ohmic_drop_in_free_run(evaluation):
+    assert row(evaluation, "ESPM")["free_run"]["test_mser_pct"] == pytest.approx(0.0, abs=1e-9)
+    # What is left is the noise: of about 45 mV of drop, 1 mV.
+    for name in ("AESI I", "AESI II"):
+        assert row(evaluation, name)["free_run"]["test_rmse_mv"] < 2.5
+
+
+def test_one_step_stands_beside_persistence(evaluation):
+    step = row(evaluation, "AESI I")["one_step"]
+    assert step["test_rmse_mv"] < step["persistence_rmse_mv"]
+    horizons = row(evaluation, "AESI I")["k_step"]
+    assert set(horizons) == {"1", "10", "60"}
+
+
+def test_intervals_cover_about_what_they_claim(evaluation):
+    for name in ("ESPM", "AESI I", "AESI II"):
+        intervals = row(evaluation, name)["intervals"]
+        # 1,198 test samples at 90 %: five standard deviations of a binomial are 4.3 points.
+        assert abs(intervals["coverage_pct"] - 90.0) < 4.3
+        assert intervals["average_width_v"] > 0
+
+
+def test_bands_of_a_free_run_cover(evaluation):
+    bands = row(evaluation, "AESI I")["free_run_intervals"]
+    assert bands["coverage_pct"] > 80.0
+    assert bands["average_width_v"] < 0.05
+
+
+def test_every_record_has_a_trace_of_every_model(evaluation):
+    assert [trace.role for trace in evaluation.traces] == ["train"] * 3 + ["test"] * 2
+    for trace in evaluation.traces:
+        assert set(trace.predictions) == {"ESPM", "AESI I", "AESI II"}
+        assert len(trace.measured_v) == len(trace.predictions["AESI I"].free_run_v)

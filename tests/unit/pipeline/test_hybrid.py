@@ -1,0 +1,121 @@
+"""The saved product: data alone, the same predictions after a round trip, and stated behaviour off its path."""
+
+import json
+
+import numpy as np
+import pytest
+from small_experiment import SOC0, experiment, fitted, write_record
+
+import aesi
+from aesi.errors import DataError, InputError
+from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.hybrid import HybridModel
+from aesi.pipeline.load import load
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory):
+    return write_record(tmp_path_factory.mktemp("record"))
+
+
+@pytest.fixture(scope="module")
+def data(record):
+    return aesi.read_measurement(record)
+
+
+@pytest.fixture(scope="module")
+def model(record):
+    loaded, _, models = fitted(record)
+    one = next(each for each in models if each.model.name == "AESI I")
+    return HybridModel(
+        cell=loaded.cell,
+        correction=one.model,
+        intervals=one.intervals,
+        bands=one.bands,
+        dt_s=1.0,
+        hold="backward",
+        soc0=SOC0,
+    )
+
+
+def test_the_folder_holds_no_pickle_and_predicts_the_same(model, data, tmp_path):
+    folder = model.save(tmp_path / "model")
+    assert {path.suffix for path in folder.iterdir()} == {".json", ".npz"}
+    again = aesi.HybridModel.load(folder)
+    for voltage_v in (None, data.voltage_v):
+        first = model.predict(data.time_s, data.current_a, SOC0, voltage_v)
+        second = again.predict(data.time_s, data.current_a, SOC0, voltage_v)
+        np.testing.assert_allclose(second.voltage_v, first.voltage_v, atol=1e-12)
+        np.testing.assert_allclose(second.lower_v, first.lower_v, atol=1e-12)
+        np.testing.assert_allclose(second.upper_v, first.upper_v, atol=1e-12)
+
+
+def test_both_regimes_beat_the_physics_and_carry_bands(model, data):
+    for voltage_v in (None, data.voltage_v):
+        prediction = model.predict(data.time_s, data.current_a, SOC0, voltage_v)
+        left = np.sqrt(np.mean((data.voltage_v - prediction.voltage_v) ** 2))
+        bare = np.sqrt(np.mean((data.voltage_v - prediction.physics_v) ** 2))
+        assert left < 0.1 * bare
+        assert (prediction.upper_v > prediction.lower_v).all()
+        inside = (data.voltage_v >= prediction.lower_v) & (data.voltage_v <= prediction.upper_v)
+        assert inside[1:].mean() > 0.8
+
+
+def test_another_sampling_is_brought_to_the_models_own_and_back(model, data):
+    rows = np.r_[0:1000:2, 1000 : len(data) : 5]
+    prediction = model.predict(data.time_s[rows], data.current_a[rows], SOC0)
+    assert len(prediction.voltage_v) == len(rows)
+    assert np.isfinite(prediction.voltage_v).all()
+
+
+def test_one_step_finds_its_start_from_the_rest_voltage(model, data):
+    prediction = model.predict(data.time_s, data.current_a, voltage_v=data.voltage_v)
+    assert prediction.soc[0] == pytest.approx(SOC0, abs=5e-3)
+
+
+def test_inputs_beyond_the_trained_range_are_flagged(model, data):
+    prediction = model.predict(data.time_s, 1.5 * data.current_a, SOC0)
+    beyond = np.abs(1.5 * data.current_a) > np.abs(data.current_a).max()
+    assert prediction.outside[beyond].all()
+
+
+def test_a_missing_voltage_is_refused_with_its_row(model, data):
+    voltage_v = data.voltage_v.copy()
+    voltage_v[7] = np.nan
+    with pytest.raises(DataError, match=r"no value in row 7 \(7 s\)"):
+        model.predict(data.time_s, data.current_a, SOC0, voltage_v)
+
+
+def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
+    effect = CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)
+    folder = HybridModel(model.cell, (effect,), hold="backward").save(tmp_path / "physics")
+    again = HybridModel.load(folder)
+    assert again.effects == (effect,)
+    prediction = again.predict(data.time_s, data.current_a, SOC0)
+    assert np.sqrt(np.mean((data.voltage_v - prediction.voltage_v) ** 2)) < 1.1e-3
+    assert np.isnan(prediction.lower_v).all()
+    with pytest.raises(DataError, match="needs soc0"):
+        again.predict(data.time_s, data.current_a)
+
+
+@pytest.mark.parametrize("damage", ["missing", "schema", "arrays", "part"])
+def test_a_damaged_folder_is_named(model, tmp_path, damage):
+    folder = model.save(tmp_path / "model")
+    if damage == "missing":
+        (folder / "model.json").unlink()
+    elif damage == "schema":
+        (folder / "model.json").write_text(json.dumps({"schema": "another/9"}))
+    elif damage == "arrays":
+        (folder / "arrays.npz").write_bytes(b"PK not a zip")
+    else:
+        (folder / "correction.json").unlink()
+    with pytest.raises(InputError, match=str(folder)):
+        HybridModel.load(folder)
+
+
+def test_a_record_of_other_sampling_is_loaded_at_the_experiments_step(record):
+    config = experiment(record)
+    coarse = config.model_copy(update={"data": config.data.model_copy(update={"dt_s": 2.0})})
+    loaded = load(coarse)
+    assert loaded.split.train[0].dt_s == 2.0
+    assert any("Resampled" in note for note in loaded.notes)
