@@ -1,4 +1,4 @@
-"""What `aesi run` leaves in its folder: report.html, tables.md, tables.tex, model/ and summary.json."""
+"""What `aesi run` leaves in its folder: report.html, figures/, tables.md, tables.tex, model/ and summary.json."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ from typing import Any
 from aesi.pipeline import tables
 from aesi.pipeline.config import ExperimentConfig
 from aesi.pipeline.evaluate import Evaluation
+from aesi.pipeline.figures import paper_figures
 from aesi.pipeline.fit import Fitted
 from aesi.pipeline.hybrid import HybridModel
 from aesi.pipeline.load import Loaded
-from aesi.pipeline.report import write_run_report
+from aesi.pipeline.report import write_figures, write_run_report
 from aesi.pipeline.report.views import BootstrapView, RunView
 from aesi.sparse import Candidate, Problem, SparseModel
+from aesi.sparse.ranking import svd_ranking
 
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
@@ -70,7 +72,9 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     hybrid(result).save(folder / "model")
     for format in ("md", "tex"):
         (folder / f"tables.{format}").write_text(tables.render(rows, format), encoding="utf-8")
-    write_run_report(folder / "report.html", run_view(result, rows))
+    view = run_view(result, rows)
+    write_run_report(folder / "report.html", view)
+    write_figures(folder / "figures" / "paper.html", f"{view.experiment}: figures", paper_figures(view))
     text = json.dumps(summary, indent=1, allow_nan=False)
     (folder / "summary.json").write_text(text, encoding="utf-8")
     return summary
@@ -110,7 +114,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         models=tuple(rows),
         traces=result.evaluation.traces,
         candidates=tuple(result.candidates),
-        terms=tuple(_terms(result.chosen)),
+        terms=tuple(_terms(result)),
         bootstrap=BootstrapView(
             n=counts.shape[1], block=options.block or 0, unique_fraction=(counts > 0).mean(axis=1)
         ),
@@ -142,8 +146,12 @@ def finite(value: Any) -> Any:
     return value
 
 
-def _terms(chosen: Candidate) -> list[dict[str, Any]]:
+def _terms(result: Result) -> list[dict[str, Any]]:
+    """Terms of both ensembles; the importance is that in the ensemble the product is made of."""
+    chosen = result.chosen
     bagging, stability = chosen.bagging.coefficient_table(), chosen.stability.coefficient_table()
+    best = chosen.stability if result.best == chosen.stability.name else chosen.bagging
+    importance = dict(svd_ranking(best, result.problem.split.train))
     inclusion: dict[str, float] = {}
     for model in (chosen.stability, chosen.bagging):
         if model.inclusion is not None:
@@ -152,6 +160,7 @@ def _terms(chosen: Candidate) -> list[dict[str, Any]]:
     return [
         {
             "term": name,
+            "importance": importance.get(name),
             "bagging": bagging.get(name),
             "stability": stability.get(name),
             "inclusion": inclusion.get(name),

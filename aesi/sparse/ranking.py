@@ -39,6 +39,8 @@ def svd_ranking(model: SparseModel, records: Sequence[ErrorSeries]) -> list[tupl
         evaluate_terms(model.library.terms, model.scaling.apply(variables)) * model.coefficients[:, None]
     )
     kept = [j for j, term in enumerate(model.library.terms) if term.factors]
+    if not kept:
+        return []
     scores = svd_scores(np.asfortranarray(features[kept].T))
     order = np.argsort(-scores, kind="stable")
     return [(model.terms[kept[j]], float(scores[j])) for j in order]

@@ -68,6 +68,14 @@ def test_a_run_leaves_its_outputs(finished):
         assert (folder / name).stat().st_size > 100
 
 
+@pytest.mark.parametrize("page", ["report.html", "figures/paper.html"])
+def test_the_figures_of_the_paper_are_drawn(finished, page):
+    (folder,) = (finished / "runs" / "smoke").iterdir()
+    content = (folder / page).read_text()
+    for figure in ("bootstrap_coverage", "error_map_after", "violin", "ranking", "intervals_1"):
+        assert f'"{figure}":' in content
+
+
 def test_everything_is_tracked(finished):
     store, parent, children = tracked_runs(workspace=finished)
     assert parent.info.status == "FINISHED"
@@ -124,7 +132,8 @@ def test_tables_come_from_the_store_alone(finished, tmp_path, monkeypatch):
     assert tables_of("smoke", "tex", uri=uri).count(r"\begin{tabular}") == before.count("|---|")
     assert 'model,"MSER train, %"' in tables_of("smoke", "csv", uri=uri)
     tables_of("smoke", figures=tmp_path / "figures", uri=uri)
-    assert (tmp_path / "figures" / folder.name / "report.html").stat().st_size > 100
+    for page in ("report.html", "figures/paper.html"):
+        assert (tmp_path / "figures" / folder.name / page).read_bytes() == (folder / page).read_bytes()
 
 
 def test_predict_in_both_regimes(call, finished, current, tmp_path):

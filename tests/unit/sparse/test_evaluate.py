@@ -8,7 +8,8 @@ from aesi.errors import DataError
 from aesi.numerics.metrics import mser
 from aesi.records import Failed, Split
 from aesi.sparse import Candidate, FitnessWeights, Genome, Options, Problem, evaluate, fitness
-from aesi.sparse.ranking import svd_scores
+from aesi.sparse.library import Library, Term
+from aesi.sparse.ranking import svd_ranking, svd_scores
 
 
 def whole(problem, lambda1=1e-3, lambda2=1e-3, **others):
@@ -204,3 +205,19 @@ def test_svd_scores_of_orthogonal_features_are_their_squared_sizes():
     # Orthogonal columns are their own singular vectors: score = sigma_j**2 / sum(sigma).
     features = np.asfortranarray(np.array([[3.0, 0.0], [0.0, 1.0], [0.0, 0.0]]))
     np.testing.assert_allclose(svd_scores(features), [9 / 4, 1 / 4])
+
+
+def test_the_current_that_makes_the_error_is_ranked_first(problem, split):
+    model = evaluate(problem, whole(problem, 1e-2, 2e-2, feedback=False)).bagging
+    ranking = svd_ranking(model, split.train)
+    assert {name for name, _ in ranking} == set(model.terms) - {"1"}
+    assert all(name.endswith("(I)") for name, _ in ranking[:3])
+    assert [score for _, score in ranking] == sorted((score for _, score in ranking), reverse=True)
+
+
+def test_a_constant_ranks_nothing(problem, split):
+    model = evaluate(problem, whole(problem, 1e-2, 2e-2, feedback=False)).bagging
+    constant = replace(
+        model, library=Library(model.library.variables, (Term(),)), coefficients=np.array([0.1])
+    )
+    assert svd_ranking(constant, split.train) == []
