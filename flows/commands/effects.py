@@ -39,7 +39,7 @@ def effects(
 
 
 def _page(effect: Effect) -> str:
-    lines = [f"{effect.id} ({effect.kind})", "", effect.equation, "", f"Holds: {effect.validity}"]
+    lines = [f"{effect.id} ({effect.kind})", "", effect.equation, "", effect.validity]
     lines += [f"Source: {effect.source}", "", "Parameters:"]
     for name, parameter in effect.parameters.items():
         low, high = parameter.bounds
