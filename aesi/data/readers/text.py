@@ -13,7 +13,8 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO, cast
@@ -79,9 +80,10 @@ class TextTable:
     def where(self, row: int) -> str:
         """The row and its line, blank lines and preamble counted."""
         try:
-            for number, (line, _) in enumerate(self._rows()):
-                if number == row:
-                    return f"row {row + 1} (line {line})"
+            with closing(self._rows()) as rows:
+                for number, (line, _) in enumerate(rows):
+                    if number == row:
+                        return f"row {row + 1} (line {line})"
         except (*DAMAGED, OSError, UnicodeError, csv.Error):
             pass
         return f"row {row + 1}"
@@ -130,8 +132,11 @@ class TextTable:
     def _text(self) -> io.TextIOWrapper:
         return io.TextIOWrapper(self._bytes(), encoding=self._layout.encoding, errors="replace")
 
-    def _rows(self) -> Iterator[tuple[int, list[str]]]:
-        """Line number and cells of each row below the header; blank lines are passed over."""
+    def _rows(self) -> Generator[tuple[int, list[str]], None, None]:
+        """Line number and cells of each row below the header; blank lines are passed over.
+
+        To be closed: left half way, it would hold the file open for as long as an error's traceback lives.
+        """
         with self._text() as text:
             for _ in range(self._layout.lines_before_data):
                 text.readline()
@@ -145,28 +150,31 @@ class TextTable:
 
         Returns the number of rows where it finds no fault.
         """
-        width, decimal = len(self.header), self._layout.decimal
         row = -1
         try:
-            for row, (line, cells) in enumerate(self._rows()):
-                place = f"{self.path.name}, row {row + 1} (line {line})"
-                if len(cells) != width:
-                    raise DataError(
-                        f"{place}: {len(cells)} cells where the header has {width}; the row is cut short or "
-                        "damaged: correct or remove it."
-                    )
-                for position in positions:
-                    cell = cells[position].strip()
-                    if cell not in MISSING and not NUMBER.fullmatch(cell.replace(decimal, ".")):
-                        raise DataError(
-                            f"{place}: column {self.header[position]!r} holds {cell[:40]!r}, which is not a "
-                            f"number{_advice(cell)}."
-                        )
+            with closing(self._rows()) as rows:
+                for row, (line, cells) in enumerate(rows):
+                    self._check(f"{self.path.name}, row {row + 1} (line {line})", cells, positions)
         except DAMAGED as error:
             raise self._damaged(error) from None
         except (csv.Error, UnicodeError, OSError) as error:
             raise DataError(f"{self.path.name} is damaged: {error}.") from None
         return row + 1
+
+    def _check(self, place: str, cells: list[str], positions: tuple[int, ...]) -> None:
+        width = len(self.header)
+        if len(cells) != width:
+            raise DataError(
+                f"{place}: {len(cells)} cells where the header has {width}; the row is cut short or damaged: "
+                "correct or remove it."
+            )
+        for position in positions:
+            cell = cells[position].strip()
+            if cell not in MISSING and not NUMBER.fullmatch(cell.replace(self._layout.decimal, ".")):
+                raise DataError(
+                    f"{place}: column {self.header[position]!r} holds {cell[:40]!r}, which is not a "
+                    f"number{_advice(cell)}."
+                )
 
     def _damaged(self, error: Exception) -> DataError:
         return DataError(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.data import read_measurement
+from aesi.data.readers.text import TextTable
 from aesi.errors import DataError
 
 N = 200
@@ -242,3 +243,14 @@ def test_decimation_keeps_the_charge_and_is_said(tmp_path):
 @pytest.mark.parametrize("options", [{"sign": "positive"}, {"duplicates": "all"}, {"columns": {"x": "y"}}])
 def test_unknown_options_are_refused(tmp_path, options):
     refusal(tmp_path, text(), **options)
+
+
+@pytest.mark.parametrize("line", ["8.0,x,3.6", "8.0,5.0", "1.0,5.0,3.6"], ids=["word", "short", "runs back"])
+def test_a_refused_file_is_closed_while_its_error_lives(tmp_path, monkeypatch, line):
+    opened = []
+    original = TextTable._bytes
+    monkeypatch.setattr(TextTable, "_bytes", lambda table: opened.append(original(table)) or opened[-1])
+    with pytest.raises(DataError):
+        read_measurement(written(tmp_path, with_line(10, line)))
+    assert len(opened) >= 3  # a look at the head, the columns, and the search for the row
+    assert all(stream.closed for stream in opened)
