@@ -1,8 +1,8 @@
 """The shape of the house: imports point down, the package stands without its platform, help is instant."""
 
+import resource
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -44,13 +44,19 @@ def test_imports_point_down():
 def test_help_answers_within_a_second(arguments):
     seconds = []
     for _ in range(3):  # the first may have to read the interpreter's files from disk
-        started = time.perf_counter()
+        before = busy_s()
         done = subprocess.run(
             [sys.executable, "-m", "flows.cli", *arguments], capture_output=True, check=True
         )
-        seconds.append(time.perf_counter() - started)
+        seconds.append(busy_s() - before)
         assert b"Usage" in done.stdout
     assert min(seconds) < 1.0
+
+
+def busy_s() -> float:
+    """CPU time of the processes that ended so far: on a machine with other work, the clock tells of that."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def test_help_loads_nothing_heavy():
