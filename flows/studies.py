@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import FitError
-from aesi.pipeline.candidate import Scored, scorer, weights
+from aesi.pipeline.candidate import Scored, genome_space, scorer, weights
 from aesi.pipeline.config import ExperimentConfig
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, Problem
@@ -21,7 +21,6 @@ from flows.evaluation import Evaluation, Tally
 from flows.outcomes import Outcomes, open_outcomes
 from flows.pool import LocalPool, Pool
 from flows.search import Constraints, SearchResult, search
-from flows.term_sampler import GenomeSpace
 
 OnScored = Callable[[int, Genome, Scored | Failed], None]
 """Told of each candidate: its number, its genome, what became of it."""
@@ -97,11 +96,11 @@ def run_study(
             seed=config.seed,
             on_candidate=on_candidate,
             evaluate_many=evaluate_many,
-            space=_space(problem, config),
+            space=genome_space(problem, config),
             population=config.search.population,
             constraints=Constraints(config.search.pearson_train, config.search.pearson_valid),
             weights=weights(config),
-            warm_start=_warm_start(problem, config),
+            warm_start=None if config.search.warm_start else (),
         )
     finally:
         pool.close()
@@ -170,36 +169,3 @@ class _Builder:
 
     def __getstate__(self) -> dict[str, Any]:
         return {"_shared": None, "_recipe": self._recipe}
-
-
-def _space(problem: Problem, config: ExperimentConfig) -> GenomeSpace:
-    search, library = config.search, config.library
-    return GenomeSpace(
-        len(problem.library), search.lambda1, search.lambda2, search.tau, library.p_c, library.d
-    )
-
-
-def _warm_start(problem: Problem, config: ExperimentConfig) -> list[Genome]:
-    """A few plain candidates to begin with: the whole library under a strong ridge, without and with memory.
-
-    They are what a user would try first, so the search never ends below them.
-    """
-    if not config.search.warm_start:
-        return []
-    (l1_low, l1_high), (l2_low, _) = config.search.lambda1, config.search.lambda2
-    starts = []
-    for lambda1 in (1.0, 100.0):
-        for p_c, d in ((min(1, config.library.p_c[1]), min(2, config.library.d[1])), _top(config)):
-            for feedback in (False, True):
-                ridge = min(max(lambda1, l1_low), l1_high)
-                starts.append(Genome.whole(problem.library, ridge, l2_low, 0.5, p_c, d, feedback))
-    return list(dict.fromkeys(starts))[: config.search.population // 2]
-
-
-def _top(config: ExperimentConfig) -> tuple[int, int]:
-    return config.library.p_c[1], config.library.d[1]
-
-
-def _best(scored: dict[int, Scored | Failed]) -> str:
-    values = [one.candidate.fitness for one in scored.values() if isinstance(one, Scored)]
-    return f"best fitness {max(values):.3f}" if values else "none feasible yet"

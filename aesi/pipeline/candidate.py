@@ -14,6 +14,7 @@ from aesi.numerics.typing import Array
 from aesi.pipeline.config import ExperimentConfig
 from aesi.records import ErrorSeries, Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
+from aesi.sparse.genome_space import GenomeSpace
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +87,14 @@ def scorer(problem: Problem, config: ExperimentConfig) -> partial[Scored | Faile
 def weights(config: ExperimentConfig) -> FitnessWeights:
     """gamma of the scalar fitness."""
     return FitnessWeights(*config.search.weights)
+
+
+def genome_space(problem: Problem, config: ExperimentConfig) -> GenomeSpace:
+    """The ranges of the genes that the experiment names."""
+    search, library = config.search, config.library
+    return GenomeSpace(
+        len(problem.library), search.lambda1, search.lambda2, search.tau, library.p_c, library.d
+    )
 
 
 def method(config: ExperimentConfig) -> Method:

@@ -15,11 +15,12 @@ from aesi.conformal import Calibrated, FreeRunBands
 from aesi.conformal.free_run import WHOLE_DRIVE
 from aesi.errors import FitError
 from aesi.numerics.typing import Array
-from aesi.pipeline.candidate import method
+from aesi.pipeline.candidate import genome_space, method
 from aesi.pipeline.config import ExperimentConfig
 from aesi.pipeline.load import Loaded
 from aesi.records import ErrorModel, ErrorSeries
 from aesi.sparse import Candidate, Options, Problem
+from aesi.sparse.baselines import BASELINES, Tuning
 from aesi.sparse.fold_models import fold_models
 from aesi.sparse.yardsticks import Bare, Persistence
 
@@ -96,10 +97,13 @@ def _model(
         return Bare(), 0
     if name == "persistence":
         return Persistence(), 0
-    from aesi.sparse.baselines import BASELINES
-
-    baseline = BASELINES[name](problem, config.seed)
+    baseline = BASELINES[name](problem, _tuning(problem, config))
     return baseline, len(getattr(baseline, "terms", ()))
+
+
+def _tuning(problem: Problem, config: ExperimentConfig) -> Tuning:
+    search = config.search
+    return Tuning(config.seed, search.candidates, search.population, genome_space(problem, config))
 
 
 def _conformalised(

@@ -1,7 +1,6 @@
 """The same checks over every model of the voltage error."""
 
 import sys
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from sparse_records import make_record
 
 from aesi.records import Split
 from aesi.sparse import Candidate, Genome, Options, Problem, evaluate
-from aesi.sparse.baselines import BASELINES, tuned_sindy_c
+from aesi.sparse.baselines import BASELINES, Tuning
 from aesi.sparse.yardsticks import Bare, Persistence
 
 NAMES = ("AESI I", "AESI II", "ESPM", "persistence", *BASELINES)
@@ -27,8 +26,7 @@ def models():
     assert isinstance(candidate, Candidate)
     found = {"AESI I": candidate.bagging, "AESI II": candidate.stability, "ESPM": Bare()}
     found["persistence"] = Persistence()
-    few = {"SINDy-C": partial(tuned_sindy_c, candidates=20)}
-    return found | {name: few.get(name, fit)(problem, 0) for name, fit in BASELINES.items()}
+    return found | {name: fit(problem, Tuning(candidates=20)) for name, fit in BASELINES.items()}
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,18 +1,33 @@
-"""What a user would pick instead, on the same features, splits and regimes; each a function of problem and seed."""
+"""What a user would pick instead, on the same features, splits and regimes; each a function of problem and tuning."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from aesi.records import ErrorModel
 from aesi.sparse.baselines.boosting import gradient_boosting
 from aesi.sparse.baselines.ridge import plain_ridge
 from aesi.sparse.baselines.sindy_c import tuned_sindy_c
+from aesi.sparse.genome_space import GenomeSpace
 from aesi.sparse.problem import Problem
 
-BASELINES: dict[str, Callable[[Problem, int], ErrorModel]] = {
-    "SINDy-C": tuned_sindy_c,
-    "ridge": plain_ridge,
-    "gradient boosting": gradient_boosting,
-}
-"""Name -> function of the problem and a seed."""
 
-__all__ = ["BASELINES", "gradient_boosting", "plain_ridge", "tuned_sindy_c"]
+@dataclass(frozen=True)
+class Tuning:
+    """What a baseline may spend, the same as the search: candidates, generation size, ranges (None: the widest)."""
+
+    seed: int = 0
+    candidates: int = 200
+    population: int = 20
+    space: GenomeSpace | None = None
+
+
+BASELINES: dict[str, Callable[[Problem, Tuning], ErrorModel]] = {
+    "SINDy-C": lambda problem, tuning: tuned_sindy_c(
+        problem, tuning.seed, tuning.candidates, tuning.population, tuning.space
+    ),
+    "ridge": lambda problem, _: plain_ridge(problem),
+    "gradient boosting": lambda problem, tuning: gradient_boosting(problem, tuning.seed),
+}
+"""Name -> function of the problem and the tuning."""
+
+__all__ = ["BASELINES", "Tuning", "gradient_boosting", "plain_ridge", "tuned_sindy_c"]
