@@ -171,7 +171,8 @@ class Search:
         return vectors
 
     def _promising(self, parent: Scored, names: list[str]) -> list[str]:
-        """Effects by how much of the parent's whitened residual their sensitivities can take up."""
+        """Effects by how much of the parent's whitened residual they can take up: with their sensitivities where they
+        ended alone, and with what they do to the parent where their fit would start."""
         fit = parent.fit
         gains = {}
         base, _ = self.problem.whiten(np.column_stack([fit.residual_v, fit.jacobian]), fit.noise)
@@ -180,7 +181,8 @@ class Search:
             if alone is None:
                 continue
             mine = [j for j, k in enumerate(alone.fit.knobs) if k.owner == name]
-            extra, _ = self.problem.whiten(alone.fit.jacobian[:, mine], fit.noise)
+            does = np.column_stack([alone.fit.jacobian[:, mine], *self._responses(parent, name)])
+            extra, _ = self.problem.whiten(does, fit.noise)
             columns = np.column_stack([base[:, 1:], extra])
             scale = np.linalg.norm(columns, axis=0) + 1e-300
             solution = np.linalg.lstsq(columns / scale, base[:, 0], rcond=1e-8)[0]
@@ -188,6 +190,19 @@ class Search:
                 np.sum(base[:, 0] ** 2) - np.sum((base[:, 0] - columns / scale @ solution) ** 2)
             )
         return sorted(gains, key=lambda n: -gains[n])
+
+    def _responses(self, parent: Scored, name: str) -> list[Array]:
+        """(n,) V each: what the effect does to the parent's voltage at each start that can be simulated."""
+        hypothesis = (*parent.hypothesis, name)
+        knobs = self.problem.knobs(hypothesis)
+        bounds = np.array([k.working_bounds for k in knobs])
+        modelled = self.problem.measured - parent.fit.residual_v
+        responses = []
+        for start in self._warm(parent, name):
+            predicted = self.problem.predict(knobs, np.clip(start, bounds[:, 0], bounds[:, 1]))
+            if predicted is not None:
+                responses.append(np.concatenate(predicted) - modelled)
+        return responses
 
     def without(self, child: Scored, name: str) -> Scored | None:
         """`child` less one effect, refitted from where the others were."""
