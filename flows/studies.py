@@ -169,3 +169,8 @@ class _Builder:
 
     def __getstate__(self) -> dict[str, Any]:
         return {"_shared": None, "_recipe": self._recipe}
+
+
+def _best(scored: dict[int, Scored | Failed]) -> str:
+    values = [one.candidate.fitness for one in scored.values() if isinstance(one, Scored)]
+    return f"best fitness {max(values):.3f}" if values else "none feasible yet"
