@@ -96,7 +96,6 @@ def calibrate(
     x = _best(fitter, noise, np.random.default_rng(seed))
     residual = fitter.residual(x)
     jacobian = None if residual is None else fitter.jacobian(x, residual)
-    before = fitter.residual(np.zeros_like(x))
     if residual is None or jacobian is None:
         raise FitError(
             f"{cell.name}: the fit left what can be simulated; start from a cell of the same chemistry."
@@ -112,10 +111,7 @@ def calibrate(
                 knob.to_value(float(x[index])), low, high, knob.unit
             )
     rms = [float(np.sqrt(np.mean(residual[rows] ** 2))) for rows in problem.slices]
-    old = [
-        float("nan") if before is None else float(np.sqrt(np.mean(before[rows] ** 2)))
-        for rows in problem.slices
-    ]
+    old = [_declared_error_v(cell, problem, record) for record in records]
     return Calibration(
         cell=_settled(start, problem, values),
         declared=cell,
@@ -217,6 +213,12 @@ def _best(fitter: Fitter, noise: list[ColouredNoise], rng: np.random.Generator) 
             "no start of the calibration can be simulated; start from a cell of the same chemistry."
         )
     return fitter.descend(best[1], noise, STEPS)
+
+
+def _declared_error_v(cell: Cell, problem: Problem, record: Record) -> float:
+    """RMSE of the cell as the file declares it, V."""
+    run = replace(problem, cell=cell).run(record.thin, record.soc0, (), record.thin_hold)
+    return float(np.sqrt(np.mean((record.thin.voltage_v - run.voltage_v) ** 2)))
 
 
 def _redundancy(residual: Array) -> float:
