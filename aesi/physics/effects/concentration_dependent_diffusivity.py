@@ -22,18 +22,21 @@ from aesi.physics.relations import Constant, Product, Table, scaled
 
 POINTS = 129
 BEYOND_LIMITS = 0.1
-RANGE = "two orders of magnitude over the range of stoichiometry"
+RANGE = "measured curves span some two orders of magnitude; the slope may go to e**10, so that no steep one is cut off"
+SLOPE, CURVATURE = 10.0, 4.0
 
 
-def _parameter(default: float, side: str, what: str) -> Parameter:
-    return Parameter(default, "dimensionless", (-4.0, 4.0), RANGE, neutral=0.0, description=f"{what}, {side}")
+def _parameter(default: float, reach: float, side: str, what: str) -> Parameter:
+    return Parameter(
+        default, "dimensionless", (-reach, reach), RANGE, neutral=0.0, description=f"{what}, {side}"
+    )
 
 
 PARAMETERS = {
-    "negative_slope": _parameter(-2.0, "negative", "b1"),
-    "negative_curvature": _parameter(0.0, "negative", "b2"),
-    "positive_slope": _parameter(-2.0, "positive", "b1"),
-    "positive_curvature": _parameter(0.0, "positive", "b2"),
+    "negative_slope": _parameter(-2.0, SLOPE, "negative", "b1"),
+    "negative_curvature": _parameter(0.0, CURVATURE, "negative", "b2"),
+    "positive_slope": _parameter(-2.0, SLOPE, "positive", "b1"),
+    "positive_curvature": _parameter(0.0, CURVATURE, "positive", "b2"),
 }
 
 

@@ -19,12 +19,12 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 SIZES = 5
-RANGE = "laser diffraction of battery powders, none to 60 %"
+RANGE = "laser diffraction of battery powders gives none to 60 %; the rest, to 80 %, is room for a fit"
 PARAMETERS = {
     f"{side}_sd": Parameter(
         0.3,
         "dimensionless",
-        (0.0, 0.6),
+        (0.0, 0.8),
         RANGE,
         neutral=0.0,
         description=f"relative spread of the radius, {side}",

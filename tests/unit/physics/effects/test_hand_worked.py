@@ -1,5 +1,6 @@
 """Each effect in a case that can be worked out by hand."""
 
+import itertools
 from pathlib import Path
 
 import numpy as np
@@ -246,3 +247,18 @@ def test_no_contrast_between_regions_is_one_region():
     assert shift("reaction_nonuniformity", strength=0.0) == pytest.approx(0.0)
     slight, full = (np.abs(shift("reaction_nonuniformity", strength=s)).max() for s in (0.05, 1.0))
     assert slight < 0.3 * full
+
+
+@pytest.mark.parametrize(
+    ("name", "reach"), [("concentration_dependent_diffusivity", 10.0), ("particle_size_distribution", 0.8)]
+)
+def test_the_corners_of_a_wide_range_can_be_simulated(name, reach):
+    # Both electrodes at a corner of their ranges, under pulses of 2C that empty the slowest particles' surfaces.
+    effect = CATALOGUE[name]
+    sides = [n for n in effect.parameters if not n.endswith("curvature")]
+    assert all(effect.parameters[n].bounds[1] == reach for n in sides)
+    for corner in itertools.product(*(effect.parameters[n].bounds for n in sides)):
+        active = effect.activate(**dict(zip(sides, corner, strict=True)))
+        result = simulate(CELL, TIME, 2.0 * CURRENT, SOC0, [active], on_depletion="clip")
+        assert np.isfinite(result.voltage_v).all()
+        assert result.voltage_v.min() > 0.0
