@@ -42,6 +42,7 @@ class _Judged:
     one_step: Array
     intervals: Intervals | None
     bands: Intervals | None
+    compared: dict[str, Intervals]
 
 
 def evaluate(fitted: Sequence[Fitted], split: Split) -> Evaluation:
@@ -80,6 +81,7 @@ def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
         one_step=prediction,
         intervals=None if one.intervals is None else one.intervals.intervals(residual, series.current_a),
         bands=None if one.bands is None else one.bands.intervals(series, free),
+        compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()},
     )
 
 
@@ -106,6 +108,10 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
         row["intervals"] = _interval_figures(
             test, [r.intervals for r in test], residuals, one.intervals.alpha
         )
+        row["intervals_by_method"] = {
+            name: _interval_figures(test, [r.compared[name] for r in test], residuals, each.alpha)
+            for name, each in one.compared.items()
+        }
     if one.bands is not None:
         residuals = [r.series.error_v - r.free.error_v for r in test]
         row["free_run_intervals"] = _interval_figures(

@@ -6,12 +6,12 @@ Nothing here looks at `Split.test`.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from aesi.conformal import Calibrated, FreeRunBands
+from aesi.conformal import METHODS, Calibrated, FreeRunBands, Method
 from aesi.conformal.free_run import WHOLE_DRIVE
 from aesi.errors import FitError
 from aesi.numerics.typing import Array
@@ -36,6 +36,7 @@ class Fitted:
 
     terms : active terms (0 where counting them makes no sense).  seconds : what its own fit took.
     intervals, bands : one step ahead, and in free run; None where they could not be calibrated (`notes`).
+    compared : the same intervals by other methods, by name (of the ensembles alone).
     """
 
     model: ErrorModel
@@ -43,6 +44,7 @@ class Fitted:
     seconds: float
     intervals: Calibrated | None = None
     bands: FreeRunBands | None = None
+    compared: Mapping[str, Calibrated] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
@@ -117,20 +119,23 @@ def _conformalised(
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []
+    compared: dict[str, Calibrated] = {}
     try:
-        intervals = _intervals(pairs, config)
+        intervals = _intervals(pairs, config, method(config))
+        if one.model.name in SEARCHED:
+            compared = {name: _intervals(pairs, config, METHODS[name]) for name in config.conformal.compare}
     except FitError as error:
         notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
     try:
         bands = _bands(pairs, problem.dt_s, config)
     except FitError as error:
         notes.append(f"{one.model.name} has no bands in free run: {error}")
-    return replace(one, intervals=intervals, bands=bands, notes=tuple(notes))
+    return replace(one, intervals=intervals, bands=bands, compared=compared, notes=tuple(notes))
 
 
-def _intervals(pairs: Sequence[_Unseen], config: ExperimentConfig) -> Calibrated:
+def _intervals(pairs: Sequence[_Unseen], config: ExperimentConfig, chosen: Method) -> Calibrated:
     conformal = config.conformal
-    return method(config).fit(
+    return chosen.fit(
         [(series.error_v - model.one_step(series))[1:] for model, series in pairs],
         conformal.alpha,
         conformal.window,
