@@ -28,6 +28,9 @@ SUFFICIENT_SHARE = 0.6
 TEMPERATURE = 4.0
 """Evidence is divided by this before it becomes a confidence: the noise model is itself a model."""
 
+CONFIDENT = 0.5
+"""Below this confidence in an effect, or in the group it stands for, it is not called found."""
+
 TOLERATED_EFFECTS = ("reaction_nonuniformity", "numerical_error")
 """What the order reduction leaves out: a finding of its own, never a reason to doubt another one."""
 
@@ -78,10 +81,11 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
         )
         return Verdict("none", (), (), confidence, left, allowed, reason)
     groups = look_alikes(search, chosen)
+    confidence = _confidence(search, steps, groups, allowed)
+    if confidence < CONFIDENT:
+        return _undecided(search, chosen, before, left, allowed, confidence)
     reason = f"{1e3 * before:.2f} mV beyond the noise before, {1e3 * left:.2f} mV after"
-    return Verdict(
-        "found", chosen.hypothesis, groups, _confidence(search, steps, groups, allowed), left, allowed, reason
-    )
+    return Verdict("found", chosen.hypothesis, groups, confidence, left, allowed, reason)
 
 
 def beyond(scored: Scored, noise_v: float) -> float:
@@ -90,16 +94,33 @@ def beyond(scored: Scored, noise_v: float) -> float:
 
 
 def _unknown(search: Search, steps: Sequence[Scored], before: float, left: float, allowed: float) -> Verdict:
-    chosen = steps[-1]
-    taken = 1.0 - (left / before) ** 2
-    named = chosen.hypothesis if taken >= SUFFICIENT_SHARE else ()
-    groups = look_alikes(search, chosen) if named else ()
+    named = _partial(steps[-1], before, left)
+    groups = look_alikes(search, steps[-1]) if named else ()
     reason = (
         f"{1e3 * left:.2f} mV of structured residual are left that no effect of the catalogue explains "
         f"({1e3 * allowed:.2f} mV would be within what a model may miss)"
     )
     confidence = _sigmoid(4.0 * float(np.log(left / allowed)))
     return Verdict("unknown", named, groups, confidence, left, allowed, reason)
+
+
+def _undecided(
+    search: Search, chosen: Scored, before: float, left: float, allowed: float, confidence: float
+) -> Verdict:
+    """Something is there and can be explained, but another explanation is at least as good."""
+    named = _partial(chosen, before, left)
+    groups = look_alikes(search, chosen) if named else ()
+    reason = (
+        f"{1e3 * before:.2f} mV beyond the noise are explained best by {' + '.join(chosen.hypothesis)}, but with "
+        f"{100 * confidence:.0f} % confidence over what else explains them, and {100 * CONFIDENT:.0f} % are asked for"
+    )
+    return Verdict("unknown", named, groups, 1.0 - confidence, left, allowed, reason)
+
+
+def _partial(chosen: Scored, before: float, left: float) -> tuple[str, ...]:
+    """The effects that may be named beside `unknown`."""
+    taken = 1.0 - (left / before) ** 2 if before > 0.0 else 0.0
+    return chosen.hypothesis if taken >= SUFFICIENT_SHARE else ()
 
 
 def look_alikes(search: Search, chosen: Scored) -> tuple[tuple[str, ...], ...]:

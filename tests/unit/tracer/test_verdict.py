@@ -1,0 +1,73 @@
+"""The rules of the verdict, on searches whose outcomes are set by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.tracer.fit import fit_hypothesis
+from aesi.tracer.problem import Problem
+from aesi.tracer.records import prepare_all
+from aesi.tracer.search import Admission, Archive, Scored, Search
+from aesi.tracer.verdict import CONFIDENT, judge
+
+NOISE_V = 1e-3
+ADMITTED = Admission(True, "", 100.0, 1e-2, 1e-3, 10.0)
+
+
+@pytest.fixture
+def ranked(cell, few, make):
+    """ranked({hypothesis: (nats over the base, rms in V)}, base rms): a search with these outcomes."""
+    problem = Problem(cell, prepare_all(cell, [make(n=900)], 0.9, 0.0), few)
+    empty = fit_hypothesis(problem, ())
+    unit = empty.residual_v / np.sqrt(np.mean(empty.residual_v**2))
+
+    def build(outcomes, base_rms_v=10e-3):
+        search = Search(problem, np.random.default_rng(0), Archive(None, ""))
+        for hypothesis, (nats, rms_v) in {(): (0.0, base_rms_v), **outcomes}.items():
+            evidence = empty.log_evidence + nats
+            fit = replace(empty, hypothesis=hypothesis, residual_v=rms_v * unit, log_evidence=evidence)
+            left = float(np.sqrt(max(rms_v**2 - NOISE_V**2, 0.0)))
+            search.scored[frozenset(hypothesis)] = Scored(fit, rms_v, left)
+            for name in hypothesis:
+                rest = frozenset(hypothesis) - {name}
+                search.admissions[rest, frozenset(hypothesis)] = ADMITTED
+        return search
+
+    return build
+
+
+def verdict_of(search, *hypothesis):
+    steps = [search.scored[frozenset()], search.scored[frozenset(hypothesis)]]
+    return judge(search, steps, NOISE_V, 0.0)
+
+
+def test_an_effect_far_ahead_of_its_rivals_is_found(ranked):
+    verdict = verdict_of(
+        ranked({("series_resistance",): (500.0, 1.05e-3), ("ocv_hysteresis",): (300.0, 5e-3)}),
+        "series_resistance",
+    )
+    assert verdict.word == "found"
+    assert verdict.effects == ("series_resistance",)
+    assert verdict.confidence > 0.95
+
+
+def test_an_effect_behind_another_explanation_is_not_called_found(ranked):
+    pair = ("ocv_hysteresis", "current_sensor_gain")
+    verdict = verdict_of(
+        ranked({("series_resistance",): (300.0, 1.05e-3), pair: (340.0, 1.02e-3)}), "series_resistance"
+    )
+    assert verdict.word == "unknown"
+    assert verdict.confidence > 1.0 - CONFIDENT
+    assert "50 % are asked for" in verdict.reason
+    assert "series_resistance" in verdict.reason
+
+
+def test_a_rival_that_is_a_look_alike_costs_no_confidence(ranked):
+    verdict = verdict_of(
+        ranked({("series_resistance",): (300.0, 1.05e-3), ("ocv_hysteresis",): (304.0, 1.06e-3)}),
+        "series_resistance",
+    )
+    assert verdict.word == "found"
+    assert verdict.groups == (("series_resistance", "ocv_hysteresis"),)
+    assert verdict.confidence > CONFIDENT
