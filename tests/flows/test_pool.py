@@ -108,10 +108,9 @@ def test_the_processes_of_a_killed_parent_end(tmp_path):
 
     import psutil
 
-    parent = subprocess.Popen([sys.executable, "-c", ORPHANS], stdout=subprocess.PIPE, text=True)
-    children = [psutil.Process(int(pid)) for pid in parent.stdout.readline().split()]
-    parent.kill()
-    parent.wait()
+    with subprocess.Popen([sys.executable, "-c", ORPHANS], stdout=subprocess.PIPE, text=True) as parent:
+        children = [psutil.Process(int(pid)) for pid in parent.stdout.readline().split()]
+        parent.kill()
     gone, alive = psutil.wait_procs(children, timeout=10)
     assert not alive
     assert len(gone) == 2
