@@ -169,7 +169,8 @@ def _told(
     search: Search, steps: Sequence[Scored], verdict: Verdict, tested: Sequence[Record], seconds: float
 ) -> Discovery:
     problem = search.problem
-    chosen = steps[-1] if verdict.effects else steps[0]
+    chosen = search.fit(verdict.effects) or steps[0]
+    shown = (*steps, chosen) if verdict.effects else steps
     own = _recalibrated(problem, steps[0].fit)
     fits: States = {"before": None, "recalibrated": own, "after": chosen.fit}
     values = chosen.fit.values
@@ -178,7 +179,7 @@ def _told(
     return Discovery(
         cell=problem.cell,
         verdict=verdict,
-        candidates=ranking(search, steps, verdict, lambda fit: test_rmse_v(problem, fit, tested)),
+        candidates=ranking(search, shown, verdict, lambda fit: test_rmse_v(problem, fit, tested)),
         files=outcomes(problem, fits, tested, search.rng),
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in problem.records]))),
         explained_before=_explained(problem, None),

@@ -24,6 +24,8 @@ LOOK_ALIKE_SHARE = 0.2
 GROUP_SIZE = 3
 SUFFICIENT_SHARE = 0.6
 """With an unexplained rest, only effects that took up this share of the structured variance are named."""
+CLEAR_NATS = 10.0
+"""Beside `unknown`, an effect is named only this far ahead of every hypothesis without it and its look-alikes."""
 
 TEMPERATURE = 4.0
 """Evidence is divided by this before it becomes a confidence: the noise model is itself a model."""
@@ -73,7 +75,7 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     before, left = beyond(base, noise_v), beyond(chosen, noise_v)
     allowed = tolerance_v(noise_v, polarisation_v, before if len(chosen.hypothesis) else 0.0)
     if left > allowed:
-        return _unknown(search, steps, before, left, allowed)
+        return _unknown(search, steps, before, left, allowed, noise_v)
     if not chosen.hypothesis:
         confidence = _sigmoid((EVIDENCE_NATS - _best_rival(search, base)) / TEMPERATURE)
         reason = (
@@ -83,7 +85,7 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     groups = look_alikes(search, chosen)
     confidence = _confidence(search, steps, groups, allowed)
     if confidence < CONFIDENT:
-        return _undecided(search, chosen, before, left, allowed, confidence)
+        return _undecided(search, chosen, before, left, allowed, noise_v, confidence)
     reason = f"{1e3 * before:.2f} mV beyond the noise before, {1e3 * left:.2f} mV after"
     return Verdict("found", chosen.hypothesis, groups, confidence, left, allowed, reason)
 
@@ -93,9 +95,10 @@ def beyond(scored: Scored, noise_v: float) -> float:
     return float(np.sqrt(max(scored.fit.rmse_v**2 - noise_v**2, 0.0)))
 
 
-def _unknown(search: Search, steps: Sequence[Scored], before: float, left: float, allowed: float) -> Verdict:
-    named = _partial(steps[-1], before, left)
-    groups = look_alikes(search, steps[-1]) if named else ()
+def _unknown(
+    search: Search, steps: Sequence[Scored], before: float, left: float, allowed: float, noise_v: float
+) -> Verdict:
+    named, groups = _partial(search, steps[-1], before, noise_v)
     reason = (
         f"{1e3 * left:.2f} mV of structured residual are left that no effect of the catalogue explains "
         f"({1e3 * allowed:.2f} mV would be within what a model may miss)"
@@ -105,11 +108,16 @@ def _unknown(search: Search, steps: Sequence[Scored], before: float, left: float
 
 
 def _undecided(
-    search: Search, chosen: Scored, before: float, left: float, allowed: float, confidence: float
+    search: Search,
+    chosen: Scored,
+    before: float,
+    left: float,
+    allowed: float,
+    noise_v: float,
+    confidence: float,
 ) -> Verdict:
     """Something is there and can be explained, but another explanation is at least as good."""
-    named = _partial(chosen, before, left)
-    groups = look_alikes(search, chosen) if named else ()
+    named, groups = _partial(search, chosen, before, noise_v)
     reason = (
         f"{1e3 * before:.2f} mV beyond the noise are explained best by {' + '.join(chosen.hypothesis)}, but with "
         f"{100 * confidence:.0f} % confidence over what else explains them, and {100 * CONFIDENT:.0f} % are asked for"
@@ -117,10 +125,33 @@ def _undecided(
     return Verdict("unknown", named, groups, 1.0 - confidence, left, allowed, reason)
 
 
-def _partial(chosen: Scored, before: float, left: float) -> tuple[str, ...]:
-    """The effects that may be named beside `unknown`."""
-    taken = 1.0 - (left / before) ** 2 if before > 0.0 else 0.0
-    return chosen.hypothesis if taken >= SUFFICIENT_SHARE else ()
+def _partial(
+    search: Search, chosen: Scored, before: float, noise_v: float
+) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...]]:
+    """The effects that may be named beside `unknown`, with their look-alikes: clear ones that took up most of it."""
+    twins = {g[0]: set(g) for g in look_alikes(search, chosen)}
+    clear = tuple(n for n in chosen.hypothesis if _clear(search, chosen, twins.get(n, {n})))
+    named = search.fit(clear) if clear else None
+    if named is None or beyond(named, noise_v) ** 2 > (1.0 - SUFFICIENT_SHARE) * before**2:
+        return (), ()
+    return clear, look_alikes(search, named)
+
+
+def _clear(search: Search, chosen: Scored, group: set[str]) -> bool:
+    """Is every hypothesis without any of the group far behind, on evidence and on unseen data?
+
+    A rival on a bound counts: it, too, says that something else may be at work.
+    """
+    if any(bound.split(".")[0] in group for bound in chosen.fit.at_bounds):
+        return False
+    for other in search.scored.values():
+        if other is None or group & set(other.hypothesis):
+            continue
+        dearer = EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0)
+        ahead = chosen.evidence - other.evidence + dearer
+        if ahead < CLEAR_NATS or other.held_out_rmse_v <= chosen.held_out_rmse_v:
+            return False
+    return True
 
 
 def look_alikes(search: Search, chosen: Scored) -> tuple[tuple[str, ...], ...]:

@@ -71,3 +71,54 @@ def test_a_rival_that_is_a_look_alike_costs_no_confidence(ranked):
     assert verdict.word == "found"
     assert verdict.groups == (("series_resistance", "ocv_hysteresis"),)
     assert verdict.confidence > CONFIDENT
+
+
+PARTIAL = {("series_resistance",): (300.0, 4e-3)}
+
+
+def test_beside_unknown_a_clear_effect_is_named(ranked):
+    verdict = verdict_of(ranked(PARTIAL | {("ocv_hysteresis",): (100.0, 8e-3)}), "series_resistance")
+    assert verdict.word == "unknown"
+    assert verdict.effects == ("series_resistance",)
+    assert verdict.groups == ()
+
+
+def test_beside_unknown_an_effect_is_named_with_its_look_alike(ranked):
+    verdict = verdict_of(ranked(PARTIAL | {("ocv_hysteresis",): (296.0, 4.1e-3)}), "series_resistance")
+    assert verdict.effects == ("series_resistance",)
+    assert verdict.groups == (("series_resistance", "ocv_hysteresis"),)
+
+
+@pytest.mark.parametrize(
+    ("rival", "outcome"),
+    [
+        (("ocv_hysteresis",), (295.0, 8.5e-3)),
+        (("ocv_hysteresis", "current_sensor_gain"), (200.0, 3.9e-3)),
+        (("ocv_hysteresis", "current_sensor_gain"), (305.0, 4.2e-3)),
+    ],
+    ids=["close in evidence", "a pair better on unseen data", "a pair ahead in evidence"],
+)
+def test_beside_unknown_an_effect_with_a_rival_is_not_named(ranked, rival, outcome):
+    verdict = verdict_of(ranked(PARTIAL | {rival: outcome}), "series_resistance")
+    assert verdict.word == "unknown"
+    assert verdict.effects == verdict.groups == ()
+
+
+def test_beside_unknown_an_effect_on_its_bound_is_not_named(ranked):
+    search = ranked(PARTIAL)
+    key = frozenset(("series_resistance",))
+    free = verdict_of(search, *key)
+    knobs = tuple(search.problem.knobs(("series_resistance",)))
+    x = np.array([0.0 if k.sd is not None else k.working_bounds[1] for k in knobs])
+    search.scored[key] = replace(search.scored[key], fit=replace(search.scored[key].fit, knobs=knobs, x=x))
+    assert free.effects == ("series_resistance",)
+    assert verdict_of(search, *key).effects == ()
+
+
+def test_beside_unknown_only_the_clear_one_of_two_is_named(ranked):
+    alone, both = ("series_resistance",), ("series_resistance", "ocv_hysteresis")
+    other = ("series_resistance", "current_sensor_gain")
+    outcomes = {alone: (300.0, 5e-3), both: (400.0, 3.0e-3), other: (395.0, 4.5e-3)}
+    assert verdict_of(ranked(outcomes), *both).effects == alone
+    del outcomes[other]
+    assert verdict_of(ranked(outcomes), *both).effects == both
