@@ -81,7 +81,7 @@ def discovery_finding(view: DiscoveryView) -> str:
     if verdict == "none":
         return f"Nothing is missing from the declared model of {view.cell} that these data could show{sure}."
     if verdict == "unknown":
-        rest = "that no effect of the catalogue explains"
+        rest = "that no effect of the catalogue explains beyond doubt"
         if not effects:
             return f"The declared model of {view.cell} misses something real {rest}{sure}."
         return f"{_named(view, effects)}; and something real is left {rest}{sure}."
