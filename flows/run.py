@@ -110,8 +110,9 @@ def run_order(order: Order, run: Any, console: Console) -> Path:
 def _stages(
     config: ExperimentConfig, order: Order, tracker: Tracker, run: Any, console: Console, started: float
 ) -> Path:
+    from aesi.pipeline.conformalise import conformalise
     from aesi.pipeline.evaluate import evaluate
-    from aesi.pipeline.fit import build_problem, conformalise, final_models
+    from aesi.pipeline.fit import build_problem, final_models
     from aesi.pipeline.load import load
     from aesi.pipeline.outputs import Result, write_outputs
     from flows.cache import Cache

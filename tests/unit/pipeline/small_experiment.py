@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from aesi.pipeline.config import ExperimentConfig, parse_experiment
-from aesi.pipeline.fit import build_problem, conformalise, final_models
+from aesi.pipeline.conformalise import conformalise
+from aesi.pipeline.fit import build_problem, final_models
 from aesi.pipeline.load import Loaded, load
 from aesi.sparse import Candidate, Genome, evaluate
 
