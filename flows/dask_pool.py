@@ -85,6 +85,10 @@ class DaskPool:
         if self._cluster is not None:
             self._cluster.close(timeout=10)
 
+    def processor_s(self) -> dict[str, float]:
+        """Processor seconds that each worker has used since it started."""
+        return dict(self._client.run(time.process_time))
+
     def _overdue(self) -> list[tuple[Any, Any]]:
         """Candidates past their time: their worker is restarted, since a thread cannot be stopped."""
         now = time.monotonic()

@@ -8,11 +8,9 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.config import TrackingConfig
 from aesi.pipeline.discover import ARCHIVE, MV, Case, catalogue, declared, run_case, write_discovery
 from aesi.records import digest
 from flows import environment
@@ -24,16 +22,6 @@ if TYPE_CHECKING:
     from flows.tracking import Tracker
 
 EXPERIMENT = "discover"
-
-
-@dataclass(frozen=True)
-class Tracked:
-    """What the tracker needs to know of a case: one experiment for all discoveries, a run for each."""
-
-    name: str
-    seed: int
-    digest: str
-    tracking: TrackingConfig = field(default_factory=TrackingConfig)
 
 
 def discover(
@@ -148,11 +136,11 @@ class Follow:
 
 def _tracker(case: Case, experiment: str, console: Console) -> Tracker | None:
     from flows.mlflow_store import Store, StoreAway
-    from flows.tracking import Tracker
+    from flows.tracking import Subject, Tracker
 
     key = digest(*(m.time_s for m in case.measurements), *(m.voltage_v for m in case.measurements))
     try:
-        return Tracker(Store(), Tracked(experiment, case.seed, key), console.say)  # type: ignore[arg-type]
+        return Tracker(Store(), Subject(experiment, case.seed, key), console.say)
     except StoreAway as error:
         console.say(f"not tracked: {error}")
         return None

@@ -10,14 +10,14 @@ import math
 import platform
 import subprocess
 import threading
-import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.config import TrackingConfig
 from flows import environment
 from flows.mlflow_store import KIND, Store, now_ms
 from flows.outbox import Outbox
@@ -26,6 +26,32 @@ PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 SAMPLE_S = 10.0
 FLUSH_S = 60.0
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect", "quantile-forest")
+
+
+class Trackable(Protocol):
+    """What a tracker has to know of a job; an experiment is one."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def seed(self) -> int: ...
+
+    @property
+    def digest(self) -> str: ...
+
+    @property
+    def tracking(self) -> TrackingConfig: ...
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A `Trackable` that is no experiment file."""
+
+    name: str
+    seed: int
+    digest: str
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
 
 
 class Tracker:
@@ -37,7 +63,7 @@ class Tracker:
     def __init__(
         self,
         store: Store,
-        config: ExperimentConfig,
+        config: Trackable,
         say: Callable[[str], None],
         run_id: str | None = None,
     ) -> None:
@@ -132,11 +158,15 @@ class Tracker:
             }
         )
 
+    def flush(self, wait_s: float = FLUSH_S) -> int:
+        """Wait until the store has all; returns how many items it has not taken."""
+        return self._outbox.flush(wait_s)
+
     def end(self, status: str, wait_s: float = FLUSH_S) -> int:
         """Close the parent run; returns how many items the store has not taken yet."""
         self._stop.set()
         self._outbox.put({"kind": "end", "run_id": self.run_id, "status": status, "at_ms": now_ms()})
-        left = self._outbox.flush(wait_s)
+        left = self.flush(wait_s)
         self._outbox.close()
         return left
 
@@ -264,8 +294,3 @@ def _numbers(values: Mapping[str, float]) -> dict[str, float]:
     return {
         name: float(value) for name, value in values.items() if value is not None and math.isfinite(value)
     }
-
-
-def elapsed(started: float) -> float:
-    """Seconds since a time.monotonic()."""
-    return time.monotonic() - started

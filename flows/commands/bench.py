@@ -18,7 +18,7 @@ def bench(
     ] = None,
 ) -> None:
     """Time and check the project against its peers, in one run on this machine."""
-    from aesi.bench import BENCHMARKS, run
+    from flows.benchmarks import BENCHMARKS, run
 
     if name is not None and name not in BENCHMARKS:
         raise InputError(f"there is no benchmark {name!r}; there are: {', '.join(BENCHMARKS)}.")

@@ -108,7 +108,7 @@ def test_lists_of_files_may_follow_one_option():
 
 
 def test_bench_prints_json_lines(call, monkeypatch):
-    monkeypatch.setattr("aesi.bench.run", lambda name, **options: iter([{"ours_s": 1.0, **options}]))
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **options: iter([{"ours_s": 1.0, **options}]))
     code, out, _ = call("bench", "espm", "--json", "--set", "n=3")
     assert code == 0
     assert json.loads(out) == {"bench": "espm", "ours_s": 1.0, "n": 3}
