@@ -173,8 +173,6 @@ class Store:
     def _send_model(self, item: Item, again: bool) -> None:
         from flows.mlflow_model import log_hybrid
 
-        if again and self._registered(item):
-            return
         log_hybrid(self.uri, item["run_id"], Path(item["path"]), item["registered_as"])
 
     def _send_end(self, item: Item, again: bool) -> None:
@@ -183,11 +181,6 @@ class Store:
     def _sent_before(self, item: Item) -> str | None:
         found = self.children(item["experiment_id"], item["parent"]).get(item["label"])
         return None if found is None else str(found.info.run_id)
-
-    def _registered(self, item: Item) -> bool:
-        if not item["registered_as"]:
-            return False
-        return bool(self.client.search_model_versions(f"run_id = '{item['run_id']}'"))
 
 
 def now_ms() -> int:
