@@ -9,7 +9,8 @@ from prefect import flow
 
 from flows import environment
 from flows.console import Console
-from flows.run import Order, run_order
+from flows.experiment import run_order
+from flows.order import Order
 from flows.stages import as_tasks
 
 

@@ -227,12 +227,15 @@ def _reach(uri: str) -> None:
 
 def _unusable(uri: str, error: Exception) -> StoreAway:
     reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-    advice = (
-        "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's own "
-        "SQLite file"
-        if uri.startswith("http")
-        else "check the address, or move the file away to start a new one"
-    )
+    if uri.startswith("http"):
+        advice = (
+            "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's own "
+            "SQLite file"
+        )
+    elif "is full" in reason:
+        advice = "free some space, then start again"
+    else:
+        advice = "check the address, or move the file away to start a new one"
     return StoreAway(f"the tracking store {_without_password(uri)} cannot be used ({reason}); {advice}.")
 
 

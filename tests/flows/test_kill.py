@@ -86,6 +86,7 @@ def test_killed_in_the_calibration_of_the_intervals(killed, aesi, arguments, tra
     assert_as_uninterrupted(tracked, finished)
 
 
+@pytest.mark.slow
 def test_killed_in_the_delivery_of_a_candidate(killed, aesi, arguments, tracked, finished):
     # The first JSON artifact is the experiment; the fourth belongs to a candidate that is then there in part.
     killed("mlflow", "MlflowClient.log_dict", 4, arguments())

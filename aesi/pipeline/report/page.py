@@ -47,8 +47,12 @@ def write_page(path: str | Path, template: str, figures: Mapping[str, Figure], *
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
     draft = target.with_name(target.name + ".part")
-    draft.write_text(html, encoding="utf-8")
-    draft.replace(target)
+    try:
+        draft.write_text(html, encoding="utf-8")
+        draft.replace(target)
+    except OSError:
+        draft.unlink(missing_ok=True)
+        raise
     return target
 
 
