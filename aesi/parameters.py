@@ -19,7 +19,9 @@ class Parameter:
     """One scalar parameter.
 
     `default` is the value at which an effect is typically seen; `neutral` is the value at which it vanishes
-    (None where it has none). `log` asks for a search on a logarithmic scale.
+    (None where it has none). `log` asks for a search on a logarithmic scale. `expected` is the standard deviation of
+    its distance from neutral where small sizes are likelier than large ones, None where all within bounds are alike.
+    `linear` says that the voltage is all but linear in it, so that a fit need not take its slope anew at every step.
     """
 
     default: float
@@ -29,6 +31,8 @@ class Parameter:
     log: bool = False
     neutral: float | None = None
     description: str = ""
+    expected: float | None = None
+    linear: bool = False
 
     def __post_init__(self) -> None:
         low, high = self.bounds

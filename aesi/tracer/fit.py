@@ -53,6 +53,11 @@ class Fit:
         return values_by_owner(self.knobs, self.x)
 
     @property
+    def placed(self) -> dict[tuple[str, str], float]:
+        """(owner, name) -> value."""
+        return {k.key: k.to_value(float(x)) for k, x in zip(self.knobs, self.x, strict=True)}
+
+    @property
     def at_bounds(self) -> tuple[str, ...]:
         """Free knobs that ended on a bound, as effect.parameter."""
         return tuple(
@@ -78,7 +83,7 @@ class Fitter:
         self.measured = problem.measured
         bounds = np.array([k.working_bounds for k in self.knobs])
         self.low, self.high = bounds[:, 0], bounds[:, 1]
-        self.prior = np.array([1.0 if k.sd is not None else 0.0 for k in self.knobs])
+        self.prior = np.array([k.prior_root for k in self.knobs])
         self.steps = np.array([TOLERATED_STEP if k.sd is not None else FREE_STEP for k in self.knobs])
         self.simulations = 0
 
@@ -88,10 +93,16 @@ class Fitter:
         predicted = self.problem.predict(self.knobs, x)
         return None if predicted is None else self.measured - np.concatenate(predicted)
 
-    def jacobian(self, x: Array, residual: Array) -> Array | None:
-        """(n, n_knobs) V per working unit, by one-sided differences that stay inside the box."""
+    def jacobian(self, x: Array, residual: Array, kept: dict[int, Array] | None = None) -> Array | None:
+        """(n, n_knobs) V per working unit, by one-sided differences that stay inside the box.
+
+        kept : columns of linear knobs from an earlier point of the same descent; filled where it lacks them.
+        """
         columns = np.zeros((len(residual), len(x)))
         for j, step in enumerate(self.steps):
+            if kept is not None and j in kept:
+                columns[:, j] = kept[j]
+                continue
             for h in (step, -step) if x[j] + step <= self.high[j] else (-step, step):
                 moved = x.copy()
                 moved[j] = x[j] + h
@@ -101,10 +112,13 @@ class Fitter:
                     break
             else:
                 return None
+            if kept is not None and self.knobs[j].linear:
+                kept[j] = columns[:, j]
         return columns
 
     def descend(self, x0: Array, noise: Sequence[ColouredNoise], steps: int) -> Array:
         """Penalised generalised least squares under a fixed noise model."""
+        kept: dict[int, Array] = {}
 
         def whole(x: Array) -> Array | None:
             e = self.residual(x)
@@ -118,7 +132,7 @@ class Fitter:
 
         def linearise(x: Array) -> tuple[Array, Array] | None:
             e = self.residual(x)
-            jacobian = None if e is None else self.jacobian(x, e)
+            jacobian = None if e is None else self.jacobian(x, e, kept)
             if e is None or jacobian is None:
                 return None
             table, _ = self.problem.whiten(np.column_stack([e, -jacobian]), noise)
@@ -184,12 +198,14 @@ def summarise(fitter: Fitter, x: Array, e: Array, jacobian: Array, noise: list[C
     whitened, sensitivities = table[:, 0], table[:, 1:]
     n = len(e)
     likelihood = -0.5 * (float(whitened @ whitened) + log_det + n * float(np.log(2 * np.pi)))
-    precision = sensitivities.T @ sensitivities + np.diag(fitter.prior)
+    precision = sensitivities.T @ sensitivities + np.diag(fitter.prior**2)
     free = fitter.prior == 0
     width = fitter.high - fitter.low
     precision[free, free] += 12.0 / width[free] ** 2  # a flat range is no wider than its own deviation
     _, log_precision = np.linalg.slogdet(precision)
-    log_prior = -0.5 * float(np.sum((fitter.prior * x) ** 2) + np.count_nonzero(~free) * np.log(2 * np.pi))
+    normal = fitter.prior[~free]
+    log_prior = -0.5 * float(np.sum((normal * x[~free]) ** 2) + len(normal) * np.log(2 * np.pi))
+    log_prior += float(np.sum(np.log(normal)))
     log_prior -= float(np.sum(np.log(width[free])))
     evidence = likelihood + log_prior + 0.5 * len(x) * float(np.log(2 * np.pi)) - 0.5 * float(log_precision)
     return Fit(

@@ -1,8 +1,8 @@
 """The free scalars of a hypothesis: what may move, how far, and how far it is expected to move anyway.
 
-A knob is free (flat within the bounds that its effect declares) or tolerated (normal around the declared
-value:
-what a careful parametrisation leaves open and what every hypothesis, the empty one included, may use).
+A knob is free (within the bounds that its effect declares: flat, or normal where the effect says what size is to be
+expected) or tolerated (normal around the declared value: what a careful parametrisation leaves open and what every
+hypothesis, the empty one included, may use).
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ class Knob:
     `sd` is the tolerance: relative (on the logarithm) where `log`, else in `unit`; None for a free knob.
     `start` is where it is when nothing is wrong, or the typical value where an effect has no such point.
     `amplitude` is False for parameters that only shape an effect (a rate, a time constant).
+    `expected` is the standard deviation of a free knob's distance from `start`, in `unit`; None where it is flat.
+    `linear` says that its slope may be kept through a descent.
     """
 
     owner: str
@@ -45,6 +47,8 @@ class Knob:
     typical: float
     amplitude: bool = True
     sd: float | None = None
+    expected: float | None = None
+    linear: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -57,6 +61,13 @@ class Knob:
         if self.sd is not None:
             return self.sd
         return float(np.log(self.high / self.low)) if self.log else self.high - self.low
+
+    @property
+    def prior_root(self) -> float:
+        """Root of the prior's precision in the working coordinate; nought where it is flat."""
+        if self.sd is not None:
+            return 1.0
+        return 0.0 if self.expected is None else self.scale / self.expected
 
     def to_working(self, value: float) -> float:
         """The coordinate in which fits move: a distance from `start` in units of `scale`."""
@@ -99,7 +110,10 @@ def _free(effect: str, name: str, p: Parameter) -> Knob:
     inside = neutral is not None and low <= neutral <= high
     log = p.log and (neutral is None or neutral > 0)
     start = float(neutral) if inside and neutral is not None else p.default
-    return Knob(effect, name, p.unit, low, high, log, start, p.default, amplitude=neutral is not None)
+    return Knob(
+        effect, name, p.unit, low, high, log, start, p.default,
+        amplitude=neutral is not None, expected=p.expected, linear=p.linear,
+    )  # fmt: skip
 
 
 def tolerated_knob(effect: str, name: str, p: Parameter, sd: float) -> Knob:
@@ -110,7 +124,7 @@ def tolerated_knob(effect: str, name: str, p: Parameter, sd: float) -> Knob:
     reach = TOLERATED_SDS * sd
     low, high = (start * np.exp(-reach), start * np.exp(reach)) if log else (start - reach, start + reach)
     low, high = max(low, p.bounds[0]), min(high, p.bounds[1])
-    return Knob(effect, name, p.unit, float(low), float(high), log, start, start, sd=sd)
+    return Knob(effect, name, p.unit, float(low), float(high), log, start, start, sd=sd, linear=p.linear)
 
 
 def soc_knob(record: str, soc0: float, sd: float) -> Knob:
@@ -125,6 +139,13 @@ def values_by_owner(knobs: Sequence[Knob], x: Array) -> dict[str, dict[str, floa
     for knob, coordinate in zip(knobs, x, strict=True):
         out.setdefault(knob.owner, {})[knob.name] = knob.to_value(float(coordinate))
     return out
+
+
+def placed_in(knobs: Sequence[Knob], known: Mapping[tuple[str, str], float], elsewhere: Array) -> Array:
+    """(n_knobs,) working coordinates of the known values (by owner and name), and of `elsewhere` for the others."""
+    return np.array(
+        [k.to_working(known[k.key]) if k.key in known else x for k, x in zip(knobs, elsewhere, strict=True)]
+    )
 
 
 def starts(knobs: Sequence[Knob]) -> list[Array]:

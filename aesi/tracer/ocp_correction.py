@@ -28,7 +28,12 @@ BEYOND = 0.06
 
 PARAMETERS = {
     f"knot_{k:02d}_v": Parameter(
-        0.0, "V", bounds=(-0.2, 0.2), neutral=0.0, source="half-cell to half-cell scatter, tens of millivolts"
+        0.0,
+        "V",
+        bounds=(-0.2, 0.2),
+        neutral=0.0,
+        linear=True,
+        source="half-cell to half-cell scatter, tens of millivolts",
     )
     for k in range(KNOTS)
 }

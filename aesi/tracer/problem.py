@@ -27,6 +27,11 @@ TOLERANCES: Mapping[str, Mapping[str, float] | float] = {
 the
 parameter's unit. Every hypothesis may use it, so that none is found for it."""
 
+LOOSENED: Mapping[str, Mapping[str, float]] = {
+    "concentration_dependent_diffusivity": {"solid_diffusivity": 0.7}
+}
+"""Tolerances that an effect widens: who does not know how a diffusivity runs does not know its level either."""
+
 Hypothesis = tuple[str, ...]
 """Ids of the effects that are in, in the order in which they were added."""
 
@@ -53,7 +58,8 @@ class Problem:
     def knobs(self, hypothesis: Hypothesis) -> list[Knob]:
         """Tolerated knobs first (states of charge, then tolerances), then the free ones of each effect."""
         knobs = [soc_knob(str(i), r.soc0, r.soc0_sd) for i, r in enumerate(self.records)]
-        for effect, tolerance in self.tolerances.items():
+        wider = {tolerated: sd for name in hypothesis for tolerated, sd in LOOSENED.get(name, {}).items()}
+        for effect, tolerance in ({**self.tolerances, **wider}).items():
             if effect in self.effects and effect not in hypothesis:
                 for name, p in self.parameters(effect).items():
                     sd = tolerance if isinstance(tolerance, float) else tolerance.get(name)

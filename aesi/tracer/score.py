@@ -37,10 +37,14 @@ def held_out_residual(problem: Problem, fit: Fit) -> Array:
 
 
 def _prior(fit: Fit) -> Array:
-    """Precision of each knob before any data: its tolerance, or that of its flat range."""
+    """Precision of each knob before any data: of its tolerance or expected size, or that of its flat range."""
     width = np.array([np.ptp(k.working_bounds) for k in fit.knobs])
-    tolerated = np.array([k.sd is not None for k in fit.knobs])
-    return np.where(tolerated, 1.0, 12.0 / width**2)
+    root = _pull(fit)
+    return np.where(root > 0, root**2, 12.0 / width**2)
+
+
+def _pull(fit: Fit) -> Array:
+    return np.array([k.prior_root for k in fit.knobs])
 
 
 def _movable(fit: Fit) -> IntArray:
@@ -111,8 +115,7 @@ def _linear_refit(problem: Problem, parent: Fit, free: IntArray, fake: Array, pr
     precision = s.T @ s + np.diag(prior)
     ridge = 1e-9 * np.diag(np.diag(precision) + 1e-300)
     pull = np.zeros(len(precision))
-    tolerated = np.array([parent.knobs[j].sd is not None for j in free])
-    pull[: len(free)] = tolerated * parent.x[free]
+    pull[: len(free)] = _pull(parent)[free] ** 2 * parent.x[free]
     return np.asarray(
         np.linalg.lstsq(precision + ridge, s.T @ whitened[:, 0] - pull, rcond=None)[0], dtype=float
     )

@@ -13,7 +13,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import digest
 from aesi.tracer.fit import Fit, as_dict, fit_hypothesis, from_dict
-from aesi.tracer.knobs import starts
+from aesi.tracer.knobs import placed_in, starts
 from aesi.tracer.problem import Hypothesis, Problem
 from aesi.tracer.score import held_out_rmse_v, placebo_gain, structured_v
 
@@ -159,16 +159,12 @@ class Search:
         """Where parent and the effect alone ended, joined: a start beside the standard ones."""
         alone = self.scored.get(frozenset((name,)))
         knobs = self.problem.knobs((*parent.hypothesis, name))
-        known = dict(zip((k.key for k in parent.fit.knobs), parent.fit.x, strict=True))
-        single = (
-            {} if alone is None else dict(zip((k.key for k in alone.fit.knobs), alone.fit.x, strict=True))
-        )
+        known = parent.fit.placed
+        single = {} if alone is None else alone.fit.placed
         vectors = []
         if parent.hypothesis and single:
-            vectors.append(np.array([known.get(k.key, single.get(k.key, 0.0)) for k in knobs]))
-        for start in starts(knobs):
-            vectors += [np.array([known.get(k.key, s) for k, s in zip(knobs, start, strict=True)])]
-        return vectors
+            vectors.append(placed_in(knobs, single | known, np.zeros(len(knobs))))
+        return [*vectors, *(placed_in(knobs, known, start) for start in starts(knobs))]
 
     def _promising(self, parent: Scored, names: list[str]) -> list[str]:
         """Effects by how much of the parent's whitened residual they can take up: with their sensitivities where they
@@ -207,8 +203,8 @@ class Search:
     def without(self, child: Scored, name: str) -> Scored | None:
         """`child` less one effect, refitted from where the others were."""
         rest = tuple(n for n in child.hypothesis if n != name)
-        known = dict(zip((k.key for k in child.fit.knobs), child.fit.x, strict=True))
-        return self.fit(rest, [np.array([known.get(k.key, 0.0) for k in self.problem.knobs(rest)])])
+        knobs = self.problem.knobs(rest)
+        return self.fit(rest, [placed_in(knobs, child.fit.placed, np.zeros(len(knobs)))])
 
     def admit(self, parent: Scored, child: Scored) -> Admission:
         """May the effect that `child` adds to `parent` be named?"""

@@ -1,64 +1,88 @@
-"""The declared open-circuit potentials are off by smooth functions of stoichiometry.
+"""The declared open-circuit potentials are off by a smooth function of state of charge.
 
-    U_i(x) = U_i,declared(x) + sum_k a_ik T_k(2 s - 1),  k = 1, 2, 3
-    s = (x - x_min) / (x_max - x_min), T_k Chebyshev polynomials, i negative or positive
+    U_p(z) = U_p,declared(z) + w d(z),   U_n(z) = U_n,declared(z) - (1 - w) d(z)
+    d(z) = sum_k a_k sqrt(2) cos(k pi z),  k = 0 (without the sqrt(2)) to 8
 
-V = U_p - U_n, so a correction of the negative electrode lowers the voltage.
+z is the state of charge that an electrode's stoichiometry stands for at rest, so that the rest voltage of the cell
+changes by d(z) whatever w is; under load each electrode answers with the z of its own surfaces.
 
-Leaves out features sharper than a third of the stoichiometry range, and a shift constant in x
-(voltage_sensor_offset). Holds within the declared stoichiometry limits; polynomials go on beyond them.
+Leaves out features sharper than an eighth of the range. Holds within the declared stoichiometry limits; beyond them d
+stays what it is there.
 
-Source: Chebyshev series; sizes from half-cell to half-cell scatter, Chen et al., J. Electrochem. Soc. 167
-(2020) 080534, doi:10.1149/1945-7111/ab9050.
+Source: smooth functions as cosine series of a Gaussian process, Solin & Sarkka, Stat. Comput. 30 (2020) 419,
+doi:10.1007/s11222-019-09886-w; sizes from half-cell to half-cell scatter, Chen et al., J. Electrochem. Soc. 167 (2020)
+080534, doi:10.1149/1945-7111/ab9050.
 """
 
 from dataclasses import replace
 
-from numpy.polynomial import Chebyshev, Polynomial
+import numpy as np
 
+from aesi.numerics.typing import Array
 from aesi.parameters import Parameter
 from aesi.physics.cell import Electrode
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
-from aesi.physics.relations import PowerSeries, Sum
+from aesi.physics.relations import Sum, Table
+
+ORDER = 8
+EXPECTED_V = 0.01
+"""Root mean square of d over the range that is expected, V."""
+LENGTH = 0.12
+"""Share of the range over which d changes; it sets how fast the expected size of a_k falls with k."""
+BOUND_V = 0.06
+POINTS = 129
 
 
-def _coefficient(k: int, electrode: str, default: float) -> Parameter:
-    return Parameter(
-        default,
-        "V",
-        bounds=(-0.05, 0.05),
-        neutral=0.0,
-        source="scatter of half-cell measurements, at most 50 mV",
-        description=f"coefficient of T_{k} over the {electrode} electrode's range",
-    )
+def _expected_v() -> Array:
+    """(ORDER + 1,) standard deviation of each coefficient: the spectrum of a squared-exponential covariance."""
+    power = np.exp(-0.5 * (np.pi * np.arange(ORDER + 1) * LENGTH) ** 2)
+    return EXPECTED_V * np.sqrt(power / power.sum())
 
 
 PARAMETERS = {
-    "positive_1_v": _coefficient(1, "positive", 0.005),
-    "positive_2_v": _coefficient(2, "positive", 0.0),
-    "positive_3_v": _coefficient(3, "positive", 0.0),
-    "negative_1_v": _coefficient(1, "negative", 0.0),
-    "negative_2_v": _coefficient(2, "negative", 0.0),
-    "negative_3_v": _coefficient(3, "negative", 0.0),
+    f"a{k}_v": Parameter(
+        0.005 if k == 1 else 0.0,
+        "V",
+        bounds=(-BOUND_V, BOUND_V),
+        neutral=0.0,
+        expected=float(expected),
+        linear=True,
+        source="scatter of half-cell measurements, tens of millivolts",
+        description=f"coefficient of cos({k} pi z)" if k else "constant part",
+    )
+    for k, expected in enumerate(_expected_v())
+} | {
+    "positive_share": Parameter(
+        0.5,
+        "dimensionless",
+        bounds=(0.0, 1.0),
+        source="all of it in one electrode or in the other",
+        description="share of the correction that belongs to the positive electrode, w",
+    )
 }
 
 
-def reshape(model: EspmModel, **volts: float) -> EspmModel:
-    """The model with corrected open-circuit potentials; volts : the six coefficients (V)."""
+def reshape(model: EspmModel, *, positive_share: float, **volts: float) -> EspmModel:
+    """The model with corrected open-circuit potentials; volts : the coefficients a0_v, a1_v, ... (V)."""
+    z = np.linspace(0.0, 1.0, POINTS)
+    waves = np.sqrt(2.0) * np.cos(np.pi * np.outer(np.arange(ORDER + 1), z))
+    waves[0] = 1.0
+    change = np.array([volts[f"a{k}_v"] for k in range(ORDER + 1)]) @ waves
     cell = model.cell
+    p = cell.positive
     return model.with_cell(
-        negative=_corrected(cell.negative, *(volts[f"negative_{k}_v"] for k in (1, 2, 3))),
-        positive=_corrected(cell.positive, *(volts[f"positive_{k}_v"] for k in (1, 2, 3))),
+        negative=_corrected(cell.negative, (positive_share - 1.0) * change),
+        positive=_corrected(p, positive_share * change[::-1]),  # lithium goes where the charge comes from
     )
 
 
-def _corrected(electrode: Electrode, *coefficients: float) -> Electrode:
-    if not any(coefficients):
+def _corrected(electrode: Electrode, change_v: Array) -> Electrode:
+    if not change_v.any():
         return electrode
-    series = Chebyshev([0.0, *coefficients], domain=[electrode.theta_min, electrode.theta_max])
-    powers = series.convert(kind=Polynomial, domain=[-1, 1], window=[-1, 1])
-    return replace(electrode, ocp=Sum(electrode.ocp, PowerSeries(tuple(map(float, powers.coef)))))
+    x = np.linspace(electrode.theta_min, electrode.theta_max, POINTS)
+    table = Table(tuple(x.tolist()), tuple(change_v.tolist()))
+    return replace(electrode, ocp=Sum(electrode.ocp, table))
 
 
 EFFECT = Effect("ocp_shape", "parameter", __doc__, PARAMETERS, on_model=reshape)

@@ -62,13 +62,18 @@ def test_hysteresis_forgets_its_start_by_a_factor_e_in_a_capacity_over_the_rate(
     assert added == pytest.approx(0.02 * (2.0 * np.exp(-20.0 * passed) - 1.0))
 
 
-def test_an_open_circuit_potential_off_by_a_chebyshev_term_shows_at_rest():
+def test_an_open_circuit_potential_off_by_a_wave_shows_at_rest_in_whichever_electrode_it_is():
     rest = np.zeros(len(TIME))
-    s_positive = 1.0 - SOC0  # a full cell has an empty positive electrode
-    added = shift("ocp_shape", rest, positive_1_v=0.0, positive_2_v=0.01)
-    assert added == pytest.approx(0.01 * (2.0 * (2.0 * s_positive - 1.0) ** 2 - 1.0), abs=1e-7)
-    added = shift("ocp_shape", rest, positive_1_v=0.0, negative_1_v=0.01)
-    assert added == pytest.approx(-0.01 * (2.0 * SOC0 - 1.0), abs=1e-7)
+    wave = 0.01 * np.sqrt(2.0) * np.cos(2 * np.pi * SOC0)
+    for share in (0.0, 0.3, 1.0):
+        added = shift("ocp_shape", rest, a1_v=0.0, a2_v=0.01, positive_share=share)
+        assert added == pytest.approx(wave, abs=2e-5)
+
+
+def test_an_open_circuit_potential_of_the_other_electrode_shows_under_load():
+    positive = shift("ocp_shape", CURRENT, a1_v=0.0, a4_v=0.01, positive_share=1.0)
+    negative = shift("ocp_shape", CURRENT, a1_v=0.0, a4_v=0.01, positive_share=0.0)
+    assert np.abs(positive - negative).max() > 1e-4
 
 
 def test_a_current_that_reads_high_is_the_voltage_of_a_smaller_one():
