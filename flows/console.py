@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
+
+_LOG = logging.getLogger("aesi")
+"""What is said goes here too, since Prefect shows this logger's lines with the flow run they belong to."""
+_LOG.setLevel(logging.INFO)
+_LOG.propagate = False  # stderr has it already
 
 
 class Console:
@@ -19,6 +25,7 @@ class Console:
         """One line that stays."""
         self._close()
         print(message, file=sys.stderr, flush=True)
+        _LOG.info(message)
 
     def progress(self, what: str, done: int, total: int, started_s: float, note: str = "") -> None:
         """Where a long piece of work stands; `started_s` is time.monotonic() at its start."""
@@ -28,14 +35,9 @@ class Console:
             return
         self._last_s = now
         line = f"  {what}: {done}/{total}{_left(done, total, now - started_s)}{f', {note}' if note else ''}"
-        if not self._moving:
-            print(line, file=sys.stderr, flush=True)
-            return
-        sys.stderr.write(f"\r\x1b[2K{line[:110]}")
-        self._open_line = True
+        self._show(line)
         if finished:
             self._close()
-        sys.stderr.flush()
 
     def count(self, what: str, done: int, started_s: float, note: str = "") -> None:
         """Progress of work whose end is not known beforehand."""
@@ -44,12 +46,16 @@ class Console:
             return
         self._last_s = now
         line = f"  {what}: {done} in {duration(now - started_s)}{f', {note}' if note else ''}"
-        if self._moving:
-            sys.stderr.write(f"\r\x1b[2K{line[:110]}")
-            self._open_line = True
-            sys.stderr.flush()
-        else:
-            print(line, file=sys.stderr, flush=True)
+        self._show(line)
+
+    def _show(self, line: str) -> None:
+        """A line in the place of the last one, or below it where nothing can be overwritten."""
+        if not self._moving:
+            self.say(line)
+            return
+        sys.stderr.write(f"\r\x1b[2K{line[:110]}")
+        sys.stderr.flush()
+        self._open_line = True
 
     def _close(self) -> None:
         if self._open_line:

@@ -27,7 +27,8 @@ def experiment(
     environment.prepare()
     console = Console()
     order = Order(path, tuple(overrides or ()), runner, address, resume, use_cache)
-    return run_order(order, as_tasks(console.say), console)
+    limit_s = order.config().runner.stage_timeout_s
+    return run_order(order, as_tasks(console.say, limit_s), console)
 
 
 @flow(name="discovery", flow_run_name="{path}", validate_parameters=False, persist_result=False)

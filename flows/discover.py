@@ -64,7 +64,7 @@ def _as_flow(case: Case, out: Path, experiment: str) -> dict[str, Any]:
     environment.make_prefect_home()
     from prefect import flow
 
-    from flows.stages import as_tasks
+    from flows.stages import as_tasks, server_in_reach
 
     console = Console()
 
@@ -73,7 +73,8 @@ def _as_flow(case: Case, out: Path, experiment: str) -> dict[str, Any]:
         """Trace a residual to the physics that the declared model lacks."""
         return trace(case, out, as_tasks(console.say), console, experiment)
 
-    return discovery()
+    with server_in_reach():
+        return discovery()
 
 
 def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) -> dict[str, Any]:

@@ -6,7 +6,7 @@ import shlex
 from dataclasses import dataclass
 from typing import Literal
 
-from aesi.pipeline.config import ExperimentConfig, RunnerConfig, read_experiment
+from aesi.pipeline.config import ExperimentConfig, read_experiment
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Order:
         if self.runner is None and self.address is None:
             return config
         kind = self.runner or ("dask" if self.address else config.runner.kind)
-        runner = RunnerConfig(kind=kind, address=self.address, storage=config.runner.storage)
+        runner = config.runner.model_copy(update={"kind": kind, "address": self.address})
         return config.model_copy(update={"runner": runner})
 
     @property

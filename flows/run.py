@@ -10,6 +10,7 @@ from flows import environment
 from flows.console import Console
 from flows.experiment import run_order
 from flows.order import Order
+from flows.stages import plainly, server_in_reach
 
 NO_SERVER = "connect to ephemeral Prefect API server"
 
@@ -26,7 +27,7 @@ def start(
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
     environment.prepare()
     order = Order(str(path), tuple(overrides), runner, address, resume, use_cache)
-    order.config()  # bad input is refused before anything is started
+    config = order.config()  # bad input is refused before anything is started
     if use_prefect:
         try:
             return _under_prefect(order)
@@ -34,22 +35,21 @@ def start(
             if NO_SERVER not in str(error):
                 raise
             Console().say("Prefect's temporary server did not start in time; the stages run without it.")
-    from flows.stages import plainly
-
     console = Console()
-    return run_order(order, plainly(console.say), console)
+    return run_order(order, plainly(console.say, config.runner.stage_timeout_s), console)
 
 
 def _under_prefect(order: Order) -> Path:
     environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
     from flows.deployed import experiment
 
-    folder: Path = experiment(
-        order.path,
-        list(order.overrides),
-        runner=order.runner,
-        address=order.address,
-        resume=order.resume,
-        use_cache=order.use_cache,
-    )
+    with server_in_reach():
+        folder: Path = experiment(
+            order.path,
+            list(order.overrides),
+            runner=order.runner,
+            address=order.address,
+            resume=order.resume,
+            use_cache=order.use_cache,
+        )
     return Path(folder)

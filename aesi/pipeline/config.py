@@ -215,11 +215,13 @@ class RunnerConfig(Section):
     """Who evaluates candidates: worker processes here, or Dask workers (`address` of a scheduler, or local).
 
     storage : a database URL where several `aesi worker` processes share the candidates of one study.
+    stage_timeout_s : wall time after which a stage of the run (the search, the report) has failed; None for no limit.
     """
 
     kind: Literal["local", "dask"] = "local"
     address: str | None = None
     storage: str | None = None
+    stage_timeout_s: Positive | None = None
 
 
 class DiscoverConfig(Section):

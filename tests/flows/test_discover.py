@@ -64,3 +64,22 @@ def test_a_cell_file_that_is_none_is_refused_before_anything_starts(workspace, c
         discover(replace(case, cell=path), tmp_path / "out", use_prefect=False)
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_under_prefect_the_finding_is_the_same(tracked, case):
+    from prefect.client.orchestration import get_client
+    from prefect.testing.utilities import prefect_test_harness
+
+    from flows.discover import discover
+
+    plain = discover(case, tracked / "plain", use_prefect=False)
+    with prefect_test_harness(server_startup_timeout=180):
+        found = discover(case, tracked / "out", use_prefect=True)
+        with get_client(sync_client=True) as client:
+            (run,) = client.read_flow_runs()
+            tasks = {task.name.rsplit("-", 1)[0]: task.state.type for task in client.read_task_runs()}
+    assert run.state.is_completed()
+    assert set(tasks) == {"hypotheses", "report"}
+    assert found["effects"] == plain["effects"] == ["series_resistance"]
+    assert found["after"] == plain["after"]
