@@ -1,13 +1,17 @@
 """Bands for predictions without measured voltage, by how long ago the last measurement was.
 
-Errors of such predictions depend on each other for minutes, so samples are not what is counted: the records
-are cut into blocks, and the band is the conformal quantile over blocks (`grouped_conformal_quantile`). For a
-sample of a new block that is exchangeable with the calibration blocks, it covers with at least 1 - alpha.
-Blocks of one drive are exchangeable only as far as the drive is stationary: the guarantee is approximate
-there, and void outside the currents and states of charge that were calibrated.
+Errors of such predictions depend on each other for minutes, so samples are not what is counted: pieces are.
+The half-width is a scale s, which current and state of charge predict (`local_scale`), times a factor. The
+factor is the 1 - alpha quantile of |error| / s over all pieces, each scored with the scale of the others: a
+new piece, whose errors entered neither, is treated as they were.
 
-The band is symmetric about the prediction. With current and state of charge it is scaled by the size of
-error they predict (`local_scale`), the scale of a block being fitted without that block's fold.
+Only rows inside the range that their model was trained on are counted. A model fitted without the first piece
+of a drive extrapolates there; the final model, asked inside its range, does not, and outside of it says so.
+
+What this promises: 1 - alpha on average over pieces that are exchangeable with those of the calibration. With
+few pieces the share covered on one drive scatters by many points about that average; the coverage of each
+left-out piece (`HorizonBand.by_piece`) shows by how many. The exact finite-sample bound would take at least
+1 / alpha - 1 pieces and the widest of them. Outside the trained range there is no promise.
 """
 
 from __future__ import annotations
@@ -22,34 +26,35 @@ from aesi.conformal.band import State
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import LocalScale, covariates
 from aesi.errors import FitError, InputError
-from aesi.numerics.quantiles import grouped_conformal_quantile
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray
 from aesi.records import ErrorSeries, FreeRun
 
-SCHEMA = "aesi.free_run_bands/1"
+SCHEMA = "aesi.free_run_bands/2"
 WHOLE_DRIVE = math.inf
 """The horizon of a prediction from the start of a record to its end."""
-BLOCK_S = 60.0
-MIN_BLOCKS = 20
-"""Blocks of the whole drive are ten times BLOCK_S, or shorter where that would leave fewer than this."""
-N_FOLDS = 5
+N_PIECES = 8
+"""Records longer than this share of all are cut, so that a scale can be scored on what it has not seen."""
+MIN_PIECES = 3
+MIN_ROWS = 30
+"""Rows from which a piece counts."""
 
 
 @dataclass(frozen=True, eq=False)
 class HorizonBand:
-    """One horizon. half_v : V, the half-width without covariates.  factor, scale : with them, half-width =
-    factor * scale; None where calibrated without.  n_blocks : blocks that were counted."""
+    """One horizon: half-width = factor * scale.
+
+    by_piece : share of each calibration piece that the factor covers with the scale of the other pieces.
+    extrapolated : whether rows outside the trained range had to be counted, for want of others.
+    """
 
     horizon_s: float
-    half_v: float
-    n_blocks: int
-    factor: float | None = None
-    scale: LocalScale | None = None
+    factor: float
+    scale: LocalScale
+    by_piece: tuple[float, ...]
+    extrapolated: bool = False
 
-    def half_width(self, columns: Array | None, n: int) -> Array:
-        """(n,) V; columns : (n, p) of `local_scale.covariates`, or None."""
-        if columns is None or self.scale is None or self.factor is None:
-            return np.full(n, self.half_v)
+    def half_width(self, columns: Array) -> Array:
+        """(n,) V; columns : (n, p) of `local_scale.covariates`."""
         return np.asarray(self.factor * self.scale(columns))
 
 
@@ -65,63 +70,50 @@ class FreeRunBands:
         cls,
         errors_by_horizon: Mapping[float, Sequence[Array]],
         dt_s: float,
+        current_a: Sequence[Array],
+        soc: Sequence[Array],
         alpha: float = 0.1,
-        current_a: Sequence[Array] | None = None,
-        soc: Sequence[Array] | None = None,
-        block_s: float | None = None,
+        inside: Sequence[BoolArray] | None = None,
     ) -> FreeRunBands:
-        """Calibrate on honest prediction errors: of records, or folds, that the model was not fitted to.
+        """Calibrate on honest prediction errors: of records, or pieces, that the model was not fitted to.
 
         errors_by_horizon : horizon in s (WHOLE_DRIVE: from the start of the record) -> one (n_i,) array a
         continuous record, V, measured minus predicted at that sample from a measurement `horizon` earlier;
         NaN where there is no such prediction.  dt_s : s.
-        current_a, soc : one (n_i,) array a record, A and 1, for locally scaled bands.
-        block_s : s, length of the blocks; default twice the horizon but at least a minute; for the whole
-        drive ten minutes, or as much as leaves MIN_BLOCKS blocks.
+        current_a, soc : one (n_i,) array a record, A and 1.
+        inside : one (n_i,) array a record, where the model that was asked had been trained on such inputs;
+        None for everywhere.
 
-        Raises InputError for arrays that do not match, FitError for too few blocks or errors all zero.
+        Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
-        columns = None
-        if current_a is not None and soc is not None:
-            columns = [covariates(i, s, dt_s) for i, s in zip(current_a, soc, strict=True)]
+        columns = [covariates(i, s, dt_s) for i, s in zip(current_a, soc, strict=True)]
+        usable = inside or [np.ones(len(c), dtype=bool) for c in columns]
         bands = [
-            _calibrate(horizon, errors_by_horizon[horizon], columns, dt_s, alpha, block_s)
+            _calibrate(horizon, errors_by_horizon[horizon], columns, usable, alpha)
             for horizon in sorted(errors_by_horizon)
         ]
         return cls(alpha, tuple(bands))
 
-    def at(
-        self,
-        horizon_s: float,
-        n: int,
-        dt_s: float,
-        current_a: Array | None = None,
-        soc: Array | None = None,
-    ) -> tuple[Array, Array]:
+    def at(self, horizon_s: float, dt_s: float, current_a: Array, soc: Array) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time."""
-        return _symmetric(
-            self._half_widths(np.full(n, horizon_s, dtype=np.float64), _columns(current_a, soc, dt_s))
-        )
+        return self._around(np.full(len(soc), horizon_s), dt_s, current_a, soc)
 
-    def along(
-        self, n: int, dt_s: float, current_a: Array | None = None, soc: Array | None = None
-    ) -> tuple[Array, Array]:
+    def along(self, dt_s: float, current_a: Array, soc: Array) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
 
         Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
         whole drive.
         """
-        return _symmetric(
-            self._half_widths(dt_s * np.arange(n, dtype=np.float64), _columns(current_a, soc, dt_s))
-        )
+        return self._around(dt_s * np.arange(len(soc), dtype=np.float64), dt_s, current_a, soc)
 
-    def intervals(self, series: ErrorSeries, free: FreeRun) -> Intervals:
-        """The band along a free run of a record; `warm` is False outside the trained range, where the band is
-        not calibrated."""
-        low, high = self.along(len(series), series.dt_s, series.current_a, series.soc)
+    def intervals(self, series: ErrorSeries, free: FreeRun, horizon_s: float | None = None) -> Intervals:
+        """The band along a free run of a record, or of predictions `horizon_s` ahead; `warm` is False outside
+        the trained range, where the band is not calibrated."""
+        where = (series.dt_s, series.current_a, series.soc)
+        low, high = self.along(*where) if horizon_s is None else self.at(horizon_s, *where)
         return Intervals(low, high, ~free.outside)
 
     def to_dict(self) -> State:
@@ -132,10 +124,10 @@ class FreeRunBands:
             "horizons": [
                 {
                     "horizon_s": band.horizon_s if math.isfinite(band.horizon_s) else None,
-                    "half_v": band.half_v,
-                    "n_blocks": band.n_blocks,
                     "factor": band.factor,
-                    "scale": None if band.scale is None else band.scale.to_state(),
+                    "scale": band.scale.to_state(),
+                    "by_piece": list(band.by_piece),
+                    "extrapolated": band.extrapolated,
                 }
                 for band in self.horizons
             ],
@@ -149,88 +141,91 @@ class FreeRunBands:
         bands = [
             HorizonBand(
                 WHOLE_DRIVE if item["horizon_s"] is None else float(item["horizon_s"]),
-                float(item["half_v"]),
-                int(item["n_blocks"]),
-                None if item["factor"] is None else float(item["factor"]),
-                None if item["scale"] is None else LocalScale.from_state(item["scale"]),
+                float(item["factor"]),
+                LocalScale.from_state(item["scale"]),
+                tuple(float(share) for share in item["by_piece"]),
+                bool(item["extrapolated"]),
             )
             for item in state["horizons"]
         ]
         return cls(float(state["alpha"]), tuple(bands))
 
-    def _half_widths(self, elapsed_s: Array, columns: Array | None) -> Array:
-        n = len(elapsed_s)
-        halves = np.array([band.half_width(columns, n) for band in self.horizons])
-        finite = [band.horizon_s for band in self.horizons if math.isfinite(band.horizon_s)]
-        if not finite:
-            return np.asarray(halves[0])
-        # Position of each sample on the list of horizons: in log time between two of them; past the last
-        # finite one, ten times its length takes it to the whole drive.
-        knots = np.log([*finite, *([10 * finite[-1]] if len(finite) < len(halves) else [])])
-        place = np.interp(np.log(np.maximum(elapsed_s, finite[0])), knots, np.arange(len(knots)))
-        below = np.minimum(place.astype(int), len(knots) - 1)
-        above = np.minimum(below + 1, len(knots) - 1)
-        share, row = place - below, np.arange(n)
-        return np.asarray((1 - share) * halves[below, row] + share * halves[above, row])
+    def _around(self, elapsed_s: Array, dt_s: float, current_a: Array, soc: Array) -> tuple[Array, Array]:
+        columns = covariates(current_a, soc, dt_s)
+        halves = np.array([band.half_width(columns) for band in self.horizons])
+        half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s)
+        return -half, half
+
+
+def _between(halves: Array, horizons: Sequence[float], elapsed_s: Array) -> Array:
+    """(n,) of (n_horizons, n), interpolated at each sample's own time since the measurement."""
+    finite = [horizon for horizon in horizons if math.isfinite(horizon)]
+    if not finite:
+        return np.asarray(halves[0])
+    # Position of each sample on the list of horizons: in log time between two of them; past the last finite
+    # one, ten times its length takes it to the whole drive.
+    knots = np.log([*finite, *([10 * finite[-1]] if len(finite) < len(halves) else [])])
+    place = np.interp(np.log(np.maximum(elapsed_s, finite[0])), knots, np.arange(len(knots)))
+    below = np.minimum(place.astype(int), len(knots) - 1)
+    above = np.minimum(below + 1, len(knots) - 1)
+    share, row = place - below, np.arange(len(elapsed_s))
+    return np.asarray((1 - share) * halves[below, row] + share * halves[above, row])
+
+
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """sizes : (n,) V, |error|.  columns : (n, p)."""
+
+    sizes: Array
+    columns: Array
 
 
 def _calibrate(
     horizon: float,
     errors: Sequence[Array],
-    columns: Sequence[Array] | None,
-    dt_s: float,
+    columns: Sequence[Array],
+    inside: Sequence[BoolArray],
     alpha: float,
-    block_s: float | None,
 ) -> HorizonBand:
-    if columns is not None and [len(e) for e in errors] != [len(c) for c in columns]:
+    if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
-            f"errors at {horizon:g} s and covariates differ in length; give one row a sample of both."
+            f"errors at {horizon:g} s and covariates differ in length; give one row a sample of each."
         )
-    length = max(1, round((block_s or _block_s(horizon, errors, dt_s)) / dt_s))
-    blocks = [rows for i, e in enumerate(errors) for rows in _blocks(i, e, length)]
-    sizes = [np.abs(errors[i][rows]) for i, rows in blocks]
-    half = grouped_conformal_quantile(sizes, alpha)
-    if not half > 0:
+    pieces = _pieces(errors, columns, inside)
+    extrapolated = len(pieces) < MIN_PIECES
+    if extrapolated:
+        pieces = _pieces(errors, columns, [np.ones(len(e), dtype=bool) for e in errors])
+    if len(pieces) < MIN_PIECES:
+        raise FitError(
+            f"{len(pieces)} pieces of {MIN_ROWS} or more predictions {horizon:g} s ahead cannot calibrate a band: "
+            f"at least {MIN_PIECES} are needed; give longer records."
+        )
+    if not any(piece.sizes.any() for piece in pieces):
         raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
-    if columns is None:
-        return HorizonBand(horizon, half, len(blocks))
-    tables = [columns[i][rows] for i, rows in blocks]
-    scores = _scaled_scores(sizes, tables)
-    scale = LocalScale.fit(np.concatenate(tables), np.concatenate(sizes))
-    return HorizonBand(horizon, half, len(blocks), grouped_conformal_quantile(scores, alpha), scale)
+    scores = [
+        piece.sizes / _scale([other for other in pieces if other is not piece], alpha)(piece.columns)
+        for piece in pieces
+    ]
+    factor = float(np.quantile(np.concatenate(scores), 1 - alpha, method="higher"))
+    by_piece = tuple(float(np.mean(score <= factor)) for score in scores)
+    return HorizonBand(horizon, factor, _scale(pieces, alpha), by_piece, extrapolated)
 
 
-def _block_s(horizon: float, errors: Sequence[Array], dt_s: float) -> float:
-    if math.isfinite(horizon):
-        return max(BLOCK_S, 2 * horizon)
-    total = dt_s * sum(int(np.isfinite(e).sum()) for e in errors)
-    return min(10 * BLOCK_S, total / MIN_BLOCKS)
+def _scale(pieces: Sequence[_Piece], alpha: float) -> LocalScale:
+    return LocalScale.fit(
+        np.concatenate([piece.columns for piece in pieces]),
+        np.concatenate([piece.sizes for piece in pieces]),
+        alpha,
+    )
 
 
-def _blocks(record: int, errors: Array, length: int) -> list[tuple[int, IntArray]]:
-    """(record, row numbers) of each block that holds a finite error; a short rest joins the last block."""
-    rows = np.flatnonzero(np.isfinite(errors)).astype(np.int64)
-    count = max(1, len(rows) // length)
-    return [(record, part) for part in np.array_split(rows, count) if part.size]
-
-
-def _scaled_scores(sizes: list[Array], tables: list[Array]) -> list[Array]:
-    """|error| over the local scale, which is fitted on the other folds; contiguous blocks share a fold."""
-    n = len(sizes)
-    fold = np.arange(n) * N_FOLDS // n
-    scores: list[Array] = []
-    for own in range(N_FOLDS):
-        others = [j for j in range(n) if fold[j] != own]
-        scale = LocalScale.fit(
-            np.concatenate([tables[j] for j in others]), np.concatenate([sizes[j] for j in others])
-        )
-        scores += [sizes[j] / scale(tables[j]) for j in range(n) if fold[j] == own]
-    return scores
-
-
-def _columns(current_a: Array | None, soc: Array | None, dt_s: float) -> Array | None:
-    return None if current_a is None or soc is None else covariates(current_a, soc, dt_s)
-
-
-def _symmetric(half: Array) -> tuple[Array, Array]:
-    return -half, half
+def _pieces(errors: Sequence[Array], columns: Sequence[Array], inside: Sequence[BoolArray]) -> list[_Piece]:
+    """The usable rows of each record, long records cut; what is too short to count is left out."""
+    usable = [np.flatnonzero(np.isfinite(e) & i) for e, i in zip(errors, inside, strict=True)]
+    longest = max(MIN_ROWS, -(-sum(rows.size for rows in usable) // N_PIECES))
+    return [
+        _Piece(np.abs(e[part]), c[part])
+        for e, c, rows in zip(errors, columns, usable, strict=True)
+        for part in np.array_split(rows, max(1, round(rows.size / longest)))
+        if part.size >= MIN_ROWS
+    ]

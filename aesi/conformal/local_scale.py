@@ -4,8 +4,8 @@
 
 The error of a cell model grows with the current and towards the steep end of its discharge. Few terms on
 purpose: a free function of the state of charge follows the calibration drive and fails on the next one.
-Fitted to |error| by non-negative least squares, so that s never turns negative where it extrapolates; a floor
-keeps it positive.
+s is the 1 - alpha quantile of |error|, by linear quantile regression; a term whose weight would be negative is
+left out, so that s does not turn negative where it extrapolates, and a floor keeps it positive.
 """
 
 from __future__ import annotations
@@ -14,16 +14,18 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.optimize import nnls
 from scipy.signal import lfilter
 
 from aesi.conformal.band import State
+from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array
 
 LOW_SOC = 0.25
 MEMORY_S = 60.0
 RELATIVE_FLOOR = 0.1
 """s stays above this share of the mean |error|: a scale near zero would promise a perfect model."""
+MOST_ROWS = 6000
+"""Rows the regression looks at, evenly spread: neighbouring errors of a free run say nearly the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,9 +36,10 @@ class LocalScale:
     floor: float
 
     @classmethod
-    def fit(cls, covariates: Array, sizes: Array) -> Self:
-        """covariates : (n, p) of `covariates`.  sizes : (n,) V, |error|."""
-        weights, _ = nnls(covariates, sizes)
+    def fit(cls, covariates: Array, sizes: Array, alpha: float) -> Self:
+        """covariates : (n, p) of `covariates`.  sizes : (n,) V, |error|.  alpha : share of sizes above s."""
+        step = -(-len(sizes) // MOST_ROWS)
+        weights = _nonnegative_quantile(covariates[::step], sizes[::step], 1 - alpha)
         return cls(weights, max(RELATIVE_FLOOR * float(np.mean(sizes)), float(np.finfo(float).tiny)))
 
     def __call__(self, covariates: Array) -> Array:
@@ -61,3 +64,18 @@ def covariates(current_a: Array, soc: Array, dt_s: float) -> Array:
     )
     low = np.maximum(LOW_SOC - soc, 0.0)
     return np.column_stack([np.ones(len(soc)), low, np.abs(current_a), np.abs(mean)])
+
+
+def _nonnegative_quantile(columns: Array, sizes: Array, level: float) -> Array:
+    """(p,) weights >= 0: the regression without the columns whose weight came out negative, worst first."""
+    spread = columns.std(axis=0)
+    spread[0] = 1.0  # the constant
+    kept = np.flatnonzero(spread > 0)
+    weights = np.zeros(columns.shape[1])
+    while kept.size:
+        found = fit_quantiles(columns[:, kept], sizes, np.array([level]))[:, 0]
+        if (found >= 0).all():
+            weights[kept] = found
+            return weights
+        kept = np.delete(kept, np.argmin(found * np.maximum(spread[kept], 1e-300)))
+    return weights

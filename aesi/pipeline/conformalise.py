@@ -13,7 +13,7 @@ import numpy as np
 from aesi.conformal import METHODS, Calibrated, FreeRunBands, Method
 from aesi.conformal.free_run import WHOLE_DRIVE
 from aesi.errors import FitError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.pipeline.candidate import method
 from aesi.pipeline.config import ExperimentConfig
 from aesi.pipeline.fit import Fitted
@@ -59,7 +59,12 @@ def _conformalised(
     except FitError as error:
         notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
     try:
-        bands = _bands(pairs, problem.dt_s, config)
+        bands = _bands(pairs, problem, config)
+        if any(band.extrapolated for band in bands.horizons):
+            notes.append(
+                f"The bands of {one.model.name} in free run are calibrated on too few pieces inside the trained "
+                "range, so rows outside of it were counted too; they are wide."
+            )
     except FitError as error:
         notes.append(f"{one.model.name} has no bands in free run: {error}")
     return replace(one, intervals=intervals, bands=bands, compared=compared, notes=tuple(notes))
@@ -76,7 +81,7 @@ def _intervals(pairs: Sequence[_Unseen], config: ExperimentConfig, chosen: Metho
     )
 
 
-def _bands(pairs: Sequence[_Unseen], dt_s: float, config: ExperimentConfig) -> FreeRunBands:
+def _bands(pairs: Sequence[_Unseen], problem: Problem, config: ExperimentConfig) -> FreeRunBands:
     conformal = config.conformal
     by_horizon = {
         horizon: [_ahead(model, series, horizon) for model, series in pairs]
@@ -85,10 +90,11 @@ def _bands(pairs: Sequence[_Unseen], dt_s: float, config: ExperimentConfig) -> F
     by_horizon[WHOLE_DRIVE] = [_freely(model, series) for model, series in pairs]
     return FreeRunBands.fit(
         by_horizon,
-        dt_s,
+        problem.dt_s,
+        [series.current_a for _, series in pairs],
+        [series.soc for _, series in pairs],
         conformal.alpha,
-        current_a=[series.current_a for _, series in pairs],
-        soc=[series.soc for _, series in pairs],
+        [_inside(model, series, problem.split.train) for model, series in pairs],
     )
 
 
@@ -107,3 +113,24 @@ def _freely(model: ErrorModel, series: ErrorSeries) -> Array:
     if run.diverged_at is not None:
         left[run.diverged_at :] = np.nan
     return left
+
+
+def _inside(model: ErrorModel, series: ErrorSeries, train: Sequence[ErrorSeries]) -> BoolArray:
+    """(n,) True where the model had been trained on such inputs.
+
+    The models behind left-out pieces share the scaling of the whole training set and cannot tell by themselves:
+    for a piece of a training record, the range is that of the training rows outside it.
+    """
+    if isinstance(model, Bare | Persistence):  # trained on nothing
+        return np.ones(len(series), dtype=bool)
+    others = [record.inputs[~_is_part(record, series)] for record in train]
+    low = np.min([rows.min(axis=0) for rows in others if len(rows)], axis=0)
+    high = np.max([rows.max(axis=0) for rows in others if len(rows)], axis=0)
+    return np.asarray(((series.inputs >= low) & (series.inputs <= high)).all(axis=1))
+
+
+def _is_part(record: ErrorSeries, piece: ErrorSeries) -> BoolArray:
+    """(n,) True for the rows of `record` that `piece` was cut from; a piece keeps its record's name."""
+    if record.name != piece.name:
+        return np.zeros(len(record), dtype=bool)
+    return np.asarray((record.time_s >= piece.time_s[0]) & (record.time_s <= piece.time_s[-1]))

@@ -201,7 +201,7 @@ class HybridModel:
             error, outside = run.error_v, run.outside
         low = high = np.full(n, np.nan)
         if self.bands is not None:
-            low, high = self.bands.along(n, self.dt_s, series.current_a, series.soc)
+            low, high = self.bands.along(self.dt_s, series.current_a, series.soc)
         alpha = None if self.bands is None else self.bands.alpha
         return _prediction(series, error, low, high, outside, alpha)
 
