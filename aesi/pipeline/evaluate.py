@@ -8,11 +8,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from typing import Any, cast
 
 import numpy as np
 
-from aesi.conformal import Intervals
+from aesi.conformal import FreeRunBands, Intervals
+from aesi.conformal.free_run import HorizonBand
 from aesi.conformal.scores import score
 from aesi.numerics.metrics import mser, rmse
 from aesi.numerics.typing import Array
@@ -101,7 +103,8 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
     free["diverged"] = sum(r.free.diverged_at is not None for r in test)
     free["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
     step["persistence_rmse_mv"] = _persistence_mv(test, 1)
-    row |= {"free_run": free, "one_step": step, "k_step": _k_step(one, test)}
+    ahead = _ahead(one, test)
+    row |= {"free_run": free, "one_step": step, "k_step": _k_step(ahead, test)}
     row["k_step_persistence"] = {_seconds(h): _persistence_mv(test, _steps(test, h)) for h in HORIZONS_S}
     if one.intervals is not None:
         residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
@@ -114,20 +117,50 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
         }
     if one.bands is not None:
         residuals = [r.series.error_v - r.free.error_v for r in test]
-        row["free_run_intervals"] = _interval_figures(
-            test, [r.bands for r in test], residuals, one.bands.alpha
-        )
+        whole = _interval_figures(test, [r.bands for r in test], residuals, one.bands.alpha)
+        row["free_run_intervals"] = whole | _left_out(one.bands.horizons[-1])
+        row["bands_by_horizon"] = {
+            _seconds(band.horizon_s): _horizon_figures(one.bands, band, test, ahead[band.horizon_s])
+            for band in one.bands.horizons
+            if band.horizon_s in ahead
+        }
     return row
 
 
-def _k_step(one: Fitted, test: Sequence[_Judged]) -> dict[str, float]:
+def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
+    """Horizon in s -> (n,) V a test record: what a prediction from a measurement that long before left of the
+    error; NaN where there is none so early."""
+    finite = () if one.bands is None else (b.horizon_s for b in one.bands.horizons if isfinite(b.horizon_s))
+    left: dict[float, list[Array]] = {}
+    for horizon in sorted({*HORIZONS_S, *finite}):
+        steps = _steps(test, horizon)
+        left[horizon] = [r.series.error_v - one.model.k_step(r.series, steps) for r in test]
+        for each in left[horizon]:
+            each[:steps] = np.nan
+    return left
+
+
+def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> dict[str, float]:
     figures = {}
     for horizon in HORIZONS_S:
-        steps = _steps(test, horizon)
-        truth = _joined(r.series.error_v[steps:] for r in test)
-        prediction = _joined(one.model.k_step(r.series, steps)[steps:] for r in test)
-        figures[_seconds(horizon)] = MILLIVOLT_PER_VOLT * rmse(truth, prediction)
+        left = _joined(each[_steps(test, horizon) :] for each in ahead[horizon])
+        figures[_seconds(horizon)] = MILLIVOLT_PER_VOLT * rmse(left, np.zeros(len(left)))
     return figures
+
+
+def _horizon_figures(
+    bands: FreeRunBands, band: HorizonBand, test: Sequence[_Judged], left: Sequence[Array]
+) -> dict[str, float]:
+    intervals = [bands.intervals(r.series, r.free, band.horizon_s) for r in test]
+    return _interval_figures(test, intervals, left, bands.alpha) | _left_out(band)
+
+
+def _left_out(band: HorizonBand) -> dict[str, float]:
+    """How the calibration pieces fared, each with the scale of the others: what to expect of one drive."""
+    return {
+        "pieces": len(band.by_piece),
+        "worst_piece_coverage_pct": 100.0 * min(band.by_piece),
+    }
 
 
 def _persistence_mv(test: Sequence[_Judged], steps: int) -> float:

@@ -7,7 +7,8 @@ absent; beyond the published schema a row may carry
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
     k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
     intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct (one step ahead)
-    free_run_intervals   the same keys, in free run
+    free_run_intervals   the same keys, in free run; with pieces and worst_piece_coverage_pct of the calibration
+    bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
     spread     {"seeds": n, "test_mser_pct": [low, high]}
     seconds    wall time of fit and evaluation
 
@@ -85,13 +86,27 @@ def method_table(models: Sequence[Row]) -> Table:
 
 
 def free_run_band_table(models: Sequence[Row]) -> Table:
-    """Prediction bands of a free run."""
+    """Prediction bands without measured voltage, by how long ago the last measurement was."""
+    rows = [
+        {"name": f"{row['name']}, {horizon}", "bands": figures}
+        for row in _having(models, "free_run_intervals")
+        for horizon, figures in (
+            *((f"{key} s", row["bands_by_horizon"][key]) for key in _horizons(row)),
+            ("whole drive", row["free_run_intervals"]),
+        )
+    ]
     caption = (
-        "Prediction bands on the test set. Regime: free run, no measured voltage after the first sample. "
-        "Worst bin: the lowest coverage in any (current, SOC) bin."
+        "Prediction bands on the test set. Regime: the measured voltage is given once, the stated time before "
+        "the sample that is predicted, and not again; whole drive: a free run from the first sample. Worst bin: the "
+        "lowest coverage in any (current, SOC) bin. Pieces: how many calibrated the band, and the lowest coverage "
+        "among them when each is left out; one drive may scatter as far."
     )
-    rows = _having(models, "free_run_intervals")
-    return _table("free-run-bands", caption, _interval_columns("free_run_intervals"), rows)
+    columns = [
+        *_interval_columns("bands"),
+        ("pieces", lambda row: _number(row, "bands.pieces", 0)),
+        ("worst piece, %", lambda row: _number(row, "bands.worst_piece_coverage_pct", 1)),
+    ]
+    return _table("free-run-bands", caption, columns, rows)
 
 
 def one_step_table(models: Sequence[Row]) -> Table:
@@ -217,6 +232,10 @@ def _test_mser(row: Row) -> str:
 
 def _k_step_cell(horizon: str) -> Callable[[Row], str]:
     return lambda row: _formatted(row["k_step"].get(horizon), 2)
+
+
+def _horizons(row: Row) -> list[str]:
+    return sorted(row.get("bands_by_horizon", ()), key=float)
 
 
 def _seeds(models: Sequence[Row]) -> int:

@@ -7,6 +7,7 @@ from small_experiment import NOISE_V, experiment, fitted, write_record
 from aesi.errors import DataError
 from aesi.pipeline.evaluate import evaluate
 from aesi.pipeline.load import load
+from aesi.pipeline.tables import free_run_band_table
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,27 @@ def test_bands_of_a_free_run_cover(evaluation):
     bands = row(evaluation, "AESI I")["free_run_intervals"]
     assert bands["coverage_pct"] > 80.0
     assert bands["average_width_v"] < 0.05
+
+
+def test_bands_are_judged_at_every_horizon(evaluation):
+    found = row(evaluation, "AESI I")
+    assert list(found["bands_by_horizon"]) == ["1", "10", "60"]
+    for figures in (*found["bands_by_horizon"].values(), found["free_run_intervals"]):
+        assert figures["coverage_pct"] > 75.0
+        assert figures["winkler_v"] >= figures["average_width_v"] > 0
+        assert figures["pieces"] >= 3
+        assert 0 < figures["worst_piece_coverage_pct"] <= 100
+
+
+def test_the_table_of_bands_has_a_row_for_each_horizon(evaluation):
+    table = free_run_band_table([row(evaluation, "AESI I")])
+    assert [cells[0] for cells in table.rows] == [
+        "AESI I, 1 s",
+        "AESI I, 10 s",
+        "AESI I, 60 s",
+        "AESI I, whole drive",
+    ]
+    assert {"coverage, %", "worst bin, %", "average width, mV", "Winkler, mV", "pieces"} <= set(table.header)
 
 
 def test_every_record_has_a_trace_of_every_model(evaluation):
