@@ -144,6 +144,7 @@ class SearchConfig(Section):
     """The evolutionary search, in the paper's symbols.
 
     block : rows of a bootstrap block.  horizon : rows of a free run inside the losses, None for a block.
+    fold : rows of the pieces that validate in turn where no records are set aside for it, None for an eighth.
     regime : what the losses measure.  weights : gamma of the losses (out-of-bag, validation, sparsity) in the
     scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints.
     warm_start : begin with a few plain candidates (strong ridge on the whole library).
@@ -155,6 +156,7 @@ class SearchConfig(Section):
     resamples: Annotated[int, Field(ge=2)] = 100
     block: Count | None = None
     horizon: Count | None = None
+    fold: Annotated[int, Field(ge=10)] | None = None
     regime: Literal["free_run", "one_step"] = "free_run"
     top_share: Annotated[float, Field(gt=0, le=1)] = 0.1
     lambda1: tuple[Positive, Positive] = (1e-13, 1e3)

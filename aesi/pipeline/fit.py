@@ -50,6 +50,9 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
         resamples=search.resamples,
         block=search.block,
         best=search.top_share,
+        horizon=search.horizon,
+        fold=search.fold,
+        regime=search.regime,
         seed=config.seed,
     )
     return Problem.build(loaded.split, options)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,19 +11,11 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.records import Failed
 from aesi.sparse.ensemble import Ensemble, best_members, combine
 from aesi.sparse.genome import Genome
-from aesi.sparse.judge import (
-    FoldRuns,
-    drive_of,
-    fold_runs,
-    free_predictions,
-    on_validation,
-    one_step_predictions,
-)
+from aesi.sparse.judge import FoldRuns, fold_runs, on_validation
 from aesi.sparse.model import SparseModel
+from aesi.sparse.out_of_bag import out_of_bag
 from aesi.sparse.problem import Problem
 from aesi.sparse.stridge import STRidge
-
-_ROWS_AT_ONCE = 1024
 
 
 @dataclass(frozen=True)
@@ -43,15 +35,12 @@ class FitnessWeights:
 class HonestResiduals:
     """Errors that a model left which had not seen them, for calibration.
 
-    one_step_v, free_run_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record,
-    by a model fitted on all rows but the piece around them.  starts : the samples from which each free run
-    started (its prediction of sample starts[i] + 1 is the first); infinite where it diverged.
+    one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
+    by models fitted on all rows but the piece around each.
     """
 
     record: str
     one_step_v: Array
-    free_run_v: Array
-    starts: tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +48,9 @@ class Candidate:
     """What became of a genome.
 
     loss_oob, loss_valid : mean squared error over that of the bare physics model on the same samples, in the
-    problem's regime (1 is no better than none). loss_valid is the mean over both ensembles, on the
-    validation records; where there are none, on the left-out pieces, by fits of all and of the stable terms.
+    problem's regime (1 is no better than none). loss_oob is the mean over the members, see out_of_bag.py.
+    loss_valid is the mean over both ensembles, on the validation records; where there are none, on the left-out
+    pieces, by fits of all and of the stable terms.
     loss_sparse : number of active terms of AESI I.
     fitness : 1 - (g1 loss_oob + g2 loss_valid + g3 loss_sparse / library size).
     pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run (on training
@@ -107,7 +97,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     if not alive.any():
         return Failed(f"every coefficient is below lambda2 = {genome.lambda2:g} in every resample")
     losses = np.full(len(fits), np.inf)
-    losses[alive] = _out_of_bag(problem, active, fits[alive], np.flatnonzero(alive))
+    losses[alive] = out_of_bag(problem, active, fits[alive], np.flatnonzero(alive))
     best = best_members(losses, problem.options.best)
     if not len(best):
         return Failed("every resample diverges in free run")
@@ -124,7 +114,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     ]
     runs, memory = fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
     bagging, stability = (
-        sparse_model(problem, active, coefficients, ensemble, memory, name)
+        sparse_model(problem, active, coefficients, memory, name, ensemble)
         for name, coefficients in (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
     )
     valid = on_validation(problem, runs, (bagging, stability))
@@ -156,54 +146,28 @@ def fitness(losses: tuple[float, float, float], library_size: int, weights: Fitn
     return 1.0 - (weights.oob * oob + weights.valid * valid + weights.sparse * sparse / library_size)
 
 
-def _out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
-    """(models,) mean squared error of each on the rows it has not seen, relative to the bare model."""
-    squared = np.zeros(len(fits))
-    state = np.zeros(len(fits))
-    every = len(resamples) == problem.unseen.shape[1]
-    for a in range(0, len(problem.target), _ROWS_AT_ONCE):
-        rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
-        drive, functions = drive_of(problem, active, fits, rows)
-        if problem.options.regime == "free_run":
-            prediction = free_predictions(problem, drive, functions, rows, problem.restart[rows], state)
-        else:
-            prediction = one_step_predictions(problem, drive, functions, rows)
-        unseen = problem.unseen[rows] if every else problem.unseen[rows][:, resamples]
-        left = np.subtract(problem.target[rows, None], prediction)
-        squared += np.where(unseen, np.square(left, out=left), 0.0).sum(axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        ratio = squared / problem.unseen_bare[resamples]
-    return np.where(np.isfinite(ratio), ratio, np.inf)
-
-
 def _honest(problem: Problem, runs: FoldRuns) -> tuple[HonestResiduals, ...]:
-    volts = problem.scaling.error_volts_per_unit
-    one_step = volts * (problem.target - runs.one_step[:, 0])
-    free = volts * (problem.target - runs.free_run[:, 0])
+    one_step = problem.scaling.error_volts_per_unit * (problem.target - runs.one_step[:, 0])
     return tuple(
-        HonestResiduals(
-            record.name,
-            one_step[a:b],
-            free[a:b],
-            tuple(start - a for start, _ in problem.folds if a <= start < b),
-        )
+        HonestResiduals(record.name, one_step[a:b])
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)
     )
 
 
 def sparse_model(
-    problem: Problem, active: IntArray, coefficients: Array, ensemble: Ensemble, memory: float, name: str
+    problem: Problem,
+    active: IntArray,
+    coefficients: Array,
+    memory: float,
+    name: str,
+    ensemble: Ensemble | None = None,
 ) -> SparseModel:
-    """The model of the coefficients that are not zero."""
+    """The model of the coefficients (m,) of the active terms that are not zero, with their spread if known."""
     kept = np.flatnonzero(coefficients)
-    return SparseModel(
-        name,
-        problem.library.take(active[kept]),
-        coefficients[kept],
-        problem.scaling,
-        problem.dt_s,
-        memory,
-        ensemble.inclusion[kept],
-        ensemble.low[kept],
-        ensemble.high[kept],
+    model = SparseModel(
+        name, problem.library.take(active[kept]), coefficients[kept], problem.scaling, problem.dt_s, memory
     )
+    if ensemble is None:
+        return model
+    spread = ensemble.inclusion[kept], ensemble.low[kept], ensemble.high[kept]
+    return replace(model, inclusion=spread[0], low=spread[1], high=spread[2])

@@ -1,4 +1,8 @@
-"""The models behind honest residuals: each fitted on all training rows but one piece, and that piece."""
+"""The models behind free-run residuals: each fitted on all training rows but one long piece, and that piece.
+
+The search may judge candidates on shorter pieces (`Options.fold`); a free run shows what it drifts by only over
+a long one.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aesi.numerics.typing import Array
+from aesi.numerics.blocks import Span, pieces
+from aesi.numerics.typing import Array, IntArray
 from aesi.records import ErrorSeries
-from aesi.sparse.evaluate import Candidate
+from aesi.sparse.evaluate import Candidate, sparse_model
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem
+from aesi.sparse.problem import Problem, default_fold
 from aesi.sparse.stridge import STRidge
 
 
@@ -21,23 +26,25 @@ def fold_models(problem: Problem, candidate: Candidate) -> Iterator[tuple[Sparse
     """
     genome = candidate.genome
     active = np.flatnonzero(genome.active(problem.library))
-    columns = np.append(active, len(problem.library))
-    solver = STRidge(genome.lambda1, genome.lambda2)
-    for (a, b), factor in zip(problem.folds, problem.fold_factors, strict=True):
-        coefficients = solver.fit_factor(factor[:, columns])
+    cut = tuple(pieces(problem.spans, default_fold(len(problem.target))))
+    fits = _fits(problem, active, cut, STRidge(genome.lambda1, genome.lambda2))
+    for (a, b), coefficients in zip(cut, fits, strict=True):
         if coefficients.any():
-            yield _model(problem, active[coefficients != 0], coefficients, candidate), _piece(problem, a, b)
+            model = sparse_model(problem, active, coefficients, candidate.bagging.memory, "left-out piece")
+            yield model, _piece(problem, a, b)
 
 
-def _model(problem: Problem, kept: Array, coefficients: Array, candidate: Candidate) -> SparseModel:
-    return SparseModel(
-        "left-out piece",
-        problem.library.take(kept),
-        coefficients[coefficients != 0],
-        problem.scaling,
-        problem.dt_s,
-        candidate.bagging.memory,
-    )
+def _fits(problem: Problem, active: IntArray, cut: tuple[Span, ...], solver: STRidge) -> Iterator[Array]:
+    """(m,) the fit without each of the pieces."""
+    if cut == problem.folds:
+        columns = np.append(active, len(problem.library))
+        yield from (solver.fit_factor(factor[:, columns]) for factor in problem.fold_factors)
+        return
+    theta = problem.theta(active).T
+    for a, b in cut:
+        weights = problem.row_weights.copy()
+        weights[a:b] = 0.0
+        yield solver.fit(theta, problem.target, weights)
 
 
 def _piece(problem: Problem, a: int, b: int) -> ErrorSeries:

@@ -138,8 +138,8 @@ class Problem:
         error_functions = np.stack(
             [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
         )
-        block = options.block or min(500, max(10, n // 10))
-        cut = tuple(pieces(spans, options.fold or max(10, n // 8)))
+        block = options.block or default_block(n)
+        cut = tuple(pieces(spans, options.fold or default_fold(n)))
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         augmented = np.empty((n, len(library) + 1), order="F")
         for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
@@ -179,15 +179,32 @@ class Problem:
         """The scaled error at which the physics model is exact."""
         return float(self.scaling.error_to_scaled(np.array(0.0)))
 
+    @property
+    def block(self) -> int:
+        """Rows of a bootstrap block."""
+        return self.options.block or default_block(len(self.target))
+
     @cached_property
     def unseen(self) -> BoolArray:
         """(n, resamples) the out-of-bag rows of each resample."""
         return np.ascontiguousarray(self.counts.T == 0)
 
     @cached_property
-    def unseen_bare(self) -> Array:
-        """(resamples,) summed squares of the scaled error of the bare model over the out-of-bag rows."""
-        return np.asarray(np.square(self.target - self.zero) @ self.unseen)
+    def piece_of_row(self) -> IntArray:
+        """(n,) the piece, of about a block, on which out-of-bag errors are compared."""
+        lengths = [b - a for a, b in pieces(self.spans, self.block)]
+        return np.repeat(np.arange(len(lengths)), lengths)
+
+    @cached_property
+    def unseen_sizes(self) -> Array:
+        """(pieces,) rows of each piece."""
+        return np.bincount(self.piece_of_row).astype(float)
+
+    @cached_property
+    def unseen_rows(self) -> Array:
+        """(pieces, resamples) how many rows of each piece are out of bag."""
+        first = np.flatnonzero(np.diff(self.piece_of_row, prepend=-1))
+        return np.add.reduceat(self.unseen, first, axis=0, dtype=float)
 
     def weights(self, resample: int) -> Array:
         """(n,) what each row counts in a resample."""
@@ -198,6 +215,16 @@ class Problem:
         return np.asarray(
             self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
         )
+
+
+def default_block(n: int) -> int:
+    """Rows of a block where none is asked for: the paper's 500, or a tenth of fewer than 5,000 rows."""
+    return min(500, max(10, n // 10))
+
+
+def default_fold(n: int) -> int:
+    """Rows of a left-out piece where none is asked for: an eighth."""
+    return max(10, n // 8)
 
 
 LEAST_SHARE = 0.1

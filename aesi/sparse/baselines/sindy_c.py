@@ -16,10 +16,10 @@ from functools import partial
 
 import numpy as np
 
-from aesi.errors import FitError
 from aesi.numerics.typing import Array
 from aesi.records import Failed
 from aesi.sparse.baselines.single import Single, evaluate_single
+from aesi.sparse.evolution import fittest
 from aesi.sparse.genome import Genome
 from aesi.sparse.genome_space import GenomeSpace
 from aesi.sparse.model import SparseModel
@@ -38,34 +38,12 @@ def tuned_sindy_c(
     """The fittest of `candidates` models. Raises FitError where none survives."""
     space = space or GenomeSpace.of(problem.library)
     rng = np.random.default_rng([seed, 1])
-    alive: list[Single] = []
-    starts = list(space.plain_starts())
-    reason = ""
-    for begun in range(0, candidates, population):
-        for _ in range(min(population, candidates - begun)):
-            genome = starts.pop(0) if starts else _proposal(space, alive, population, rng)
-            outcome = evaluate_sindy_c(problem, genome)
-            if isinstance(outcome, Failed):
-                reason = outcome.reason
-            else:
-                alive.append(outcome)
-        alive.sort(key=lambda single: -single.fitness)
-    if not alive:
-        raise FitError(f"none of {candidates} SINDy-C candidates survives (the last one: {reason}).")
-    return alive[0].model
+    return fittest(space, partial(evaluate_sindy_c, problem), candidates, population, rng).model
 
 
 def evaluate_sindy_c(problem: Problem, genome: Genome) -> Single | Failed:
     """One candidate of the baseline."""
     return evaluate_single(problem, genome, partial(_stlsq, genome.lambda1, genome.lambda2), NAME)
-
-
-def _proposal(space: GenomeSpace, alive: list[Single], population: int, rng: np.random.Generator) -> Genome:
-    parents = alive[: population // 2]
-    if len(parents) < 2:
-        return space.random(rng)
-    one, other = rng.choice(len(parents), size=2, replace=False)
-    return space.child(parents[one].genome, parents[other].genome, rng)
 
 
 def _stlsq(lambda1: float, lambda2: float, factor: Array) -> Array:

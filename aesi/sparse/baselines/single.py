@@ -9,7 +9,6 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.records import Failed
-from aesi.sparse.ensemble import Ensemble
 from aesi.sparse.evaluate import FitnessWeights, fitness, sparse_model
 from aesi.sparse.genome import Genome
 from aesi.sparse.judge import Judged, fold_runs, on_validation
@@ -44,9 +43,7 @@ def evaluate_single(
         return Failed("no term is left")
     fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
     runs, memory = fold_runs(problem, active, fits, fits, coefficients)
-    own = (coefficients != 0).astype(float)
-    ensemble = Ensemble(coefficients[None], coefficients, own, coefficients, coefficients, coefficients)
-    model = sparse_model(problem, active, coefficients, ensemble, memory, name)
+    model = sparse_model(problem, active, coefficients, memory, name)
     folds, valid = runs.judge(problem, 0), on_validation(problem, runs, (model,))
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")

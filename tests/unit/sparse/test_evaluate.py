@@ -74,10 +74,21 @@ def test_residuals_are_honest_and_complete(problem, split):
     candidate = evaluate(problem, whole(problem, 1e-2, 1e-2, feedback=False))
     assert [honest.record for honest in candidate.residuals] == ["record", "second"]
     for honest, record in zip(candidate.residuals, split.train, strict=True):
-        assert len(honest.one_step_v) == len(honest.free_run_v) == len(record) - 1
-        assert honest.starts[0] == 0
+        assert len(honest.one_step_v) == len(record) - 1
         # What is left is the noise of 0.5 mV.
         assert np.std(honest.one_step_v) == pytest.approx(5e-4, rel=0.2)
+
+
+def test_long_pieces_are_left_out_for_free_runs_whatever_the_search_judges_on(split):
+    from aesi.sparse.fold_models import fold_models
+
+    options = Options(p_c=1, d=2, mixed=False, resamples=5, block=60)
+    long, short = (Problem.build(split, replace(options, fold=fold)) for fold in (None, 40))
+    assert len(short.folds) > 3 * len(long.folds)
+    both = [list(fold_models(p, evaluate(p, whole(p, p_c=1, feedback=False)))) for p in (long, short)]
+    assert [len(piece) for _, piece in both[0]] == [len(piece) for _, piece in both[1]]
+    for (one, _), (other, _) in zip(*both, strict=True):
+        np.testing.assert_allclose(one.coefficients, other.coefficients, rtol=1e-8)
 
 
 def test_validation_records_replace_the_folds(split):

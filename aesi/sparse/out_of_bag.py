@@ -1,0 +1,72 @@
+"""What the members of an ensemble leave on rows they did not draw, made comparable.
+
+Every resample leaves out other rows, so a member whose rows happen to be easy would win. The rows are cut into
+pieces of a block; where s[p, b] is the squared error of member b on the u[p, b] rows of piece p that it did not
+draw, each row counting as in the fits, the difficulty that all members share is taken out piece by piece:
+
+    L_b = [ sum_p (s[p, b] - m_p u[p, b]) / sum_p u[p, b] + sum_p m_p n_p / sum_p n_p ] / bare
+    m_p = median over b of s[p, b] / u[p, b]                                                            (1)
+
+n_p is the number of rows of the piece and `bare` the mean squared error of the physics model: (1) is what the
+member would have left, relative to the physics, had it drawn none of the rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.numerics.typing import Array, IntArray
+from aesi.sparse.judge import drive_of, free_predictions, one_step_predictions
+from aesi.sparse.problem import Problem
+
+_ROWS_AT_ONCE = 1024
+
+
+def out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
+    """(models,) equation (1) of the fits (models, m) of these resamples; infinite where one diverges."""
+    unseen_rows = problem.unseen_rows[:, resamples]
+    squares = _squares(problem, active, fits, resamples)
+    bare = float(problem.row_weights @ (problem.target - problem.zero) ** 2) / len(problem.target)
+    return comparable(squares, unseen_rows, problem.unseen_sizes) / bare
+
+
+def comparable(squares: Array, rows: Array, sizes: Array) -> Array:
+    """(models,) mean squared error of each model, less what the pieces it was judged on add.
+
+    squares : (pieces, models) summed over the `rows` (pieces, models) on which a model is judged; `sizes`
+    (pieces,) are all rows of a piece. Pieces on which no model with finite errors is judged are left out.
+    """
+    judged = (rows > 0) & np.isfinite(squares)
+    mean = np.full(squares.shape, np.nan)
+    np.divide(squares, rows, out=mean, where=judged)
+    some = judged.any(axis=1)
+    if not some.any():
+        return np.full(squares.shape[1], np.inf)
+    shared = np.nanmedian(mean[some], axis=1)
+    own = (squares[some] - shared[:, None] * rows[some]).sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        losses = own / rows[some].sum(axis=0) + float(shared @ sizes[some]) / float(sizes[some].sum())
+    return np.where(np.isfinite(squares).all(axis=0) & np.isfinite(losses), losses, np.inf)
+
+
+def _squares(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
+    """(pieces, models) squared error on the rows that each model has not seen, weighted as in the fits."""
+    squares = np.zeros((len(problem.unseen_sizes), len(fits)))
+    state = np.zeros(len(fits))
+    every = len(resamples) == problem.unseen.shape[1]
+    for a in range(0, len(problem.target), _ROWS_AT_ONCE):
+        rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
+        drive, functions = drive_of(problem, active, fits, rows)
+        if problem.options.regime == "free_run":
+            prediction = free_predictions(problem, drive, functions, rows, problem.restart[rows], state)
+        else:
+            prediction = one_step_predictions(problem, drive, functions, rows)
+        unseen = problem.unseen[rows] if every else problem.unseen[rows][:, resamples]
+        left = np.subtract(problem.target[rows, None], prediction)
+        np.square(left, out=left)
+        left *= problem.row_weights[rows, None]
+        left[~unseen] = 0.0
+        piece = problem.piece_of_row[rows]
+        first = np.flatnonzero(np.diff(piece, prepend=-1))
+        squares[piece[first]] += np.add.reduceat(left, first, axis=0)
+    return squares

@@ -1,0 +1,46 @@
+import numpy as np
+
+from aesi.sparse import Genome, STRidge
+from aesi.sparse.out_of_bag import comparable, out_of_bag
+
+
+def test_who_is_judged_on_an_easy_piece_alone_does_not_win():
+    # Two equal members leave 1 a row on the easy piece and 9 on the hard one; each is judged on one of them.
+    squares = np.array([[10.0, 0.0, 10.0], [0.0, 90.0, 90.0]])
+    rows = np.array([[10.0, 0.0, 10.0], [0.0, 10.0, 10.0]])
+    np.testing.assert_allclose(comparable(squares, rows, np.array([10.0, 10.0])), 5.0)
+
+
+def test_the_better_member_on_the_same_rows_wins_by_what_it_is_better():
+    squares = np.array([[10.0, 20.0, 30.0]])
+    rows = np.full((1, 3), 10.0)
+    np.testing.assert_allclose(comparable(squares, rows, np.array([40.0])), [1.0, 2.0, 3.0])
+
+
+def test_a_member_that_diverges_is_infinitely_bad_and_spoils_no_other():
+    squares = np.array([[10.0, 20.0, np.inf]])
+    rows = np.full((1, 3), 10.0)
+    np.testing.assert_allclose(comparable(squares, rows, np.array([10.0])), [1.0, 2.0, np.inf])
+
+
+def test_a_piece_that_every_resample_holds_is_left_out():
+    squares = np.array([[10.0, 20.0], [0.0, 0.0]])
+    rows = np.array([[10.0, 10.0], [0.0, 0.0]])
+    np.testing.assert_allclose(comparable(squares, rows, np.array([10.0, 5.0])), [1.0, 2.0])
+
+
+def test_losses_count_rows_as_the_fits_do(problem):
+    # On a model without feedback the loss can be written down: weighted errors on the rows not drawn.
+    genome = Genome.whole(problem.library, 1e-3, 1e-3, 0.5, 1, 1, feedback=False)
+    active = np.flatnonzero(genome.active(problem.library))
+    columns = np.append(active, len(problem.library))
+    fits = np.stack([STRidge(1e-3, 1e-3).fit_factor(factor[:, columns]) for factor in problem.factors])
+    losses = out_of_bag(problem, active, fits, np.arange(len(fits)))
+    left = problem.row_weights[:, None] * (problem.target[:, None] - problem.theta(active).T @ fits.T) ** 2
+    squares, rows = (
+        np.stack([part[problem.piece_of_row == p].sum(axis=0) for p in range(len(problem.unseen_sizes))])
+        for part in (np.where(problem.unseen, left, 0.0), problem.unseen.astype(float))
+    )
+    bare = np.mean(problem.row_weights * (problem.target - problem.zero) ** 2)
+    assert np.ptp(problem.row_weights) > 0.1
+    np.testing.assert_allclose(losses, comparable(squares, rows, problem.unseen_sizes) / bare, rtol=1e-9)
