@@ -16,6 +16,10 @@ from aesi.records import ErrorSeries, Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
 from aesi.sparse.genome_space import GenomeSpace
 
+CALIBRATION_RESIDUALS = 26_000
+"""What a candidate's intervals are calibrated on. Thinned to pieces that each lose their first window, this leaves
+the 20,000 rows from which SPCI needs one fit instead of six: 0.5 instead of 1.8 s a candidate at 88,200 rows."""
+
 
 @dataclass(frozen=True, eq=False)
 class Scored:
@@ -48,6 +52,7 @@ def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> Scored 
             np.random.default_rng(config.seed),
             current_a=[current for _, current in calibration],
             valid_current_a=[current for _, current in judged],
+            max_residuals=CALIBRATION_RESIDUALS,
         )
     except AesiError as error:
         return Scored(outcome, note=str(error))
