@@ -4,6 +4,7 @@ BENCHMARKS = {
     "espm": "aesi.bench.espm",
     "ensemble": "aesi.bench.ensemble",
     "spci": "aesi.bench.spci",
+    "bands": "aesi.bench.bands",
     "blind": "aesi.bench.blind",
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""

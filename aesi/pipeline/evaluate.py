@@ -18,6 +18,7 @@ from aesi.conformal.free_run import HorizonBand
 from aesi.conformal.scores import score
 from aesi.numerics.metrics import mser, rmse
 from aesi.numerics.typing import Array
+from aesi.pipeline.bands import error_ahead
 from aesi.pipeline.fit import Fitted
 from aesi.pipeline.load import ROLES, Role
 from aesi.pipeline.report.views import Prediction, Trace
@@ -131,13 +132,8 @@ def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
     """Horizon in s -> (n,) V a test record: what a prediction from a measurement that long before left of the
     error; NaN where there is none so early."""
     finite = () if one.bands is None else (b.horizon_s for b in one.bands.horizons if isfinite(b.horizon_s))
-    left: dict[float, list[Array]] = {}
-    for horizon in sorted({*HORIZONS_S, *finite}):
-        steps = _steps(test, horizon)
-        left[horizon] = [r.series.error_v - one.model.k_step(r.series, steps) for r in test]
-        for each in left[horizon]:
-            each[:steps] = np.nan
-    return left
+    horizons = sorted({*HORIZONS_S, *finite})
+    return {h: [error_ahead(one.model, r.series, h) for r in test] for h in horizons}
 
 
 def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> dict[str, float]:

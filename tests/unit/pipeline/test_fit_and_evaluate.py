@@ -97,7 +97,7 @@ def test_the_table_of_bands_has_a_row_for_each_horizon(evaluation):
         "AESI I, 60 s",
         "AESI I, whole drive",
     ]
-    assert {"coverage, %", "worst bin, %", "average width, mV", "Winkler, mV", "pieces"} <= set(table.header)
+    assert {"coverage, %", "average width, mV", "Winkler, mV", "pieces"} <= set(table.header)
 
 
 def test_every_record_has_a_trace_of_every_model(evaluation):

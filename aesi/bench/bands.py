@@ -1,0 +1,142 @@
+"""Are free-run bands as wide as they have to be? Virtual cells by the dozen, one design beside another.
+
+Every cell is fitted with the same genome, and calibrated as an experiment calibrates: by models that did not
+see the piece, and by the validation record where there is one. One line a layout, horizon and design, with
+means over the cells. A single drive has few independent errors, so its coverage scatters: `coverage_sd_pct`
+says by how much. `score_ratio` is against the best constant width in hindsight, which knows the test.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from math import isfinite
+from time import process_time
+from typing import Any, get_args
+
+import numpy as np
+
+from aesi.bench.virtual_drives import Layout, virtual_splits
+from aesi.conformal import WHOLE_DRIVE
+from aesi.conformal.scores import interval_score, worst_bin_coverage
+from aesi.numerics.typing import Array
+from aesi.physics import Cell
+from aesi.pipeline.bands import HonestErrors, Unseen
+from aesi.records import Failed, Split
+from aesi.sparse import Genome, Options, Problem, evaluate
+from aesi.sparse.fold_models import fold_models
+
+ALPHA = 0.1
+HORIZONS_S = (1.0, 10.0, 60.0)
+MV = 1e3
+OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
+RIDGE, THRESHOLD = 10.0, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class _Errors:
+    """Of one cell: what to calibrate on, and what came of the test records."""
+
+    calibration: HonestErrors
+    test: HonestErrors
+
+
+HalfWidths = dict[float, list[Array]]
+"""Horizon in s -> (n,) V a test record."""
+
+
+def one_width(errors: _Errors) -> HalfWidths:
+    """The same width everywhere: the quantile of all left-out errors."""
+    return {
+        h: [np.full(len(e), np.nanquantile(np.abs(np.concatenate(left)), 1 - ALPHA)) for e in errors.test.soc]
+        for h, left in errors.calibration.by_horizon.items()
+    }
+
+
+def every_row(errors: _Errors) -> HalfWidths:
+    """The bands of the package, rows counted where the model extrapolates too."""
+    everywhere = [np.ones_like(inside) for inside in errors.calibration.inside]
+    return bands(replace(errors, calibration=replace(errors.calibration, inside=everywhere)))
+
+
+def bands(errors: _Errors) -> HalfWidths:
+    """The bands of the package."""
+    found, test = errors.calibration.bands(ALPHA), errors.test
+    return {
+        h: [found.at(h, test.dt_s, i, s)[1] for i, s in zip(test.current_a, test.soc, strict=True)]
+        for h in errors.calibration.by_horizon
+    }
+
+
+DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
+    "one width": one_width,
+    "scaled, every row": every_row,
+    "scaled, inside the trained range": bands,
+}
+
+
+def run(
+    cell: str = "experiments/cells/nmc_30ah.bpx.json", cells: int = 40, seed: int = 0, **_: Any
+) -> Iterator[dict[str, Any]]:
+    """cell : BPX file of the declared cell.  cells : virtual cells a layout."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        for layout in get_args(Layout):
+            splits = virtual_splits(Cell.from_bpx(cell), layout, cells, seed)
+            errors = [e for e in map(_errors, splits) if e is not None]
+            for name, design in DESIGNS.items():
+                started = process_time()
+                widths = [design(each) for each in errors]
+                fit_s = (process_time() - started) / len(errors)
+                for horizon in (*HORIZONS_S, WHOLE_DRIVE):
+                    figures = np.array(
+                        [_judged(e.test, w, horizon) for e, w in zip(errors, widths, strict=True)]
+                    )
+                    yield _line(layout, name, horizon, figures) | {"fit_s": round(fit_s, 4)}
+
+
+def _errors(split: Split) -> _Errors | None:
+    """None where the genome fails on this cell."""
+    problem = Problem.build(split, OPTIONS)
+    chosen = evaluate(problem, Genome.whole(problem.library, RIDGE, THRESHOLD, 0.5, 1, 1))
+    if isinstance(chosen, Failed):
+        return None
+    pairs: list[Unseen] = [(chosen.bagging, record) for record in problem.split.valid]
+    pairs += fold_models(problem, chosen)
+    tested: list[Unseen] = [(chosen.bagging, record) for record in problem.split.test]
+    train = problem.split.train
+    return _Errors(HonestErrors.of(pairs, train, HORIZONS_S), HonestErrors.of(tested, train, HORIZONS_S))
+
+
+def _judged(test: HonestErrors, widths: HalfWidths, horizon: float) -> tuple[float, ...]:
+    """Coverage, mean width, interval score, worst bin, and the score over that of the best constant width."""
+    left, half = np.concatenate(test.by_horizon[horizon]), np.concatenate(widths[horizon])
+    seen = np.isfinite(left)
+    covered = np.where(seen, np.abs(left) <= half, np.nan)
+    best = np.full(len(left), np.quantile(np.abs(left[seen]), 1 - ALPHA))
+    score = interval_score(-half, half, left, ALPHA)
+    worst = worst_bin_coverage(covered, np.concatenate(test.current_a), np.concatenate(test.soc))
+    return (
+        float(np.nanmean(covered)),
+        float(2 * half[seen].mean()),
+        score,
+        worst,
+        score / interval_score(-best, best, left, ALPHA),
+    )
+
+
+def _line(layout: str, design: str, horizon: float, figures: Array) -> dict[str, Any]:
+    coverage, width, score, worst, ratio = figures.T
+    return {
+        "layout": layout,
+        "method": design,
+        "horizon_s": horizon if isfinite(horizon) else None,
+        "cells": len(figures),
+        "coverage_pct": round(100 * float(coverage.mean()), 2),
+        "coverage_sd_pct": round(100 * float(coverage.std()), 2),
+        "width_mv": round(MV * float(width.mean()), 3),
+        "interval_score_mv": round(MV * float(score.mean()), 3),
+        "worst_bin_coverage_pct": round(100 * float(np.nanmean(worst)), 2),
+        "score_ratio": round(float(np.exp(np.log(ratio).mean())), 4),
+    }

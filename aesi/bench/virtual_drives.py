@@ -1,0 +1,129 @@
+"""Virtual cells by the dozen, quickly: one drive, and cells that differ at random from what is declared.
+
+The measurement is the project's own simulation of the declared cell with effects added, and noise on the
+voltage: a second a cell, where the laboratory's porous-electrode model takes minutes. The error series are
+smooth functions of the states with hysteresis and heat, as on real cells; they are for ranking designs of the
+error model and its bands, not for judging the physics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.polynomial.chebyshev import chebval
+
+from aesi.data.profile import Bench, Profile, paper_profiles
+from aesi.errors import SimulationError
+from aesi.numerics.typing import Array
+from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.config import RepeatsConfig
+from aesi.pipeline.load import cut_repeats, error_series
+from aesi.records import ErrorSeries, Measurement, Split
+from aesi.sparse import with_inputs
+
+Layout = Literal["repeats", "schedules"]
+"""repeats : WLTC five times over the whole state of charge, training on 1, 3 and 5, test on 2 and 4.
+schedules : the paper's training, validation and test schedules."""
+
+INPUTS = ("I", "I_next", "I_60s", "c_sp", "c_sn", "c_e0", "c_eL")
+DT_S = 1.0
+NOISE_V = 5e-4
+OPEN_CIRCUIT_V = 3e-3
+OPEN_CIRCUIT_TERMS = 7
+N_REPEATS = 5
+SOC_START, SOC_END = 0.97, 0.06
+TEST_REPEATS = (2, 4)
+TRAIN_REPEATS = (1, 3, 5)
+MOST_TRIES = 20
+
+Values = dict[str, float]
+
+
+def virtual_splits(cell: Cell, layout: Layout, count: int, seed: int = 0) -> Iterator[Split]:
+    """`count` virtual cells under one drive, each with another set of undeclared differences."""
+    profiles = _repeats(cell) if layout == "repeats" else paper_profiles(cell.capacity_ah, DT_S)
+    rng = np.random.default_rng(seed)
+    for _ in range(count):
+        yield _split(cell, profiles, rng)
+
+
+def random_effects(cell: Cell, rng: np.random.Generator) -> tuple[ActiveEffect, ...]:
+    """Each difference with even odds, its size at random about what cells of one type scatter by."""
+    chosen = [name for name in DIFFERENCES if rng.random() < 0.5] or ["series_resistance"]
+    return tuple(CATALOGUE[name].activate(**DIFFERENCES[name](rng, cell.capacity_ah)) for name in chosen)
+
+
+DIFFERENCES: dict[str, Callable[[np.random.Generator, float], Values]] = {
+    "ocv_hysteresis": lambda rng, q: {"magnitude_v": rng.uniform(2e-3, 15e-3), "rate": rng.uniform(10, 60)},
+    "series_resistance": lambda rng, q: {"resistance_ohm": rng.uniform(0.002, 0.015) / q},
+    "solid_diffusivity": lambda rng, q: _factors(rng, 0.5),
+    "charge_transfer_kinetics": lambda rng, q: _factors(rng, 0.5),
+    "electrolyte_transport": lambda rng, q: {
+        "conductivity_factor": float(np.exp(0.3 * rng.standard_normal())),
+        "diffusivity_factor": float(np.exp(0.3 * rng.standard_normal())),
+    },
+    "lithium_inventory_loss": lambda rng, q: {"loss": rng.uniform(-0.01, 0.02)},
+    "active_material_loss_negative": lambda rng, q: {"loss": rng.uniform(-0.02, 0.04)},
+    "concentration_dependent_diffusivity": lambda rng, q: {
+        "negative_slope": 1.5 * rng.standard_normal(),
+        "positive_slope": 1.5 * rng.standard_normal(),
+    },
+    "self_heating": lambda rng, q: {"heat_transfer_w_k": rng.uniform(0.1, 0.5)},
+}
+"""Effect -> (rng, capacity in Ah) -> values."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """How a cell differs: effects, and Chebyshev coefficients of its open-circuit voltage over the charge."""
+
+    effects: tuple[ActiveEffect, ...]
+    open_circuit_v: Array
+
+
+def _factors(rng: np.random.Generator, spread: float) -> Values:
+    negative, positive = np.exp(spread * rng.standard_normal(2))
+    return {"negative_factor": float(negative), "positive_factor": float(positive)}
+
+
+def _repeats(cell: Cell) -> dict[str, tuple[Profile, ...]]:
+    """WLTC so many times as hard that five of them use up the charge between SOC_START and SOC_END."""
+    once = Bench(cell.capacity_ah, DT_S).drive("wltc_3b")
+    share = float(np.sum(once)) * DT_S / 3600 / cell.capacity_ah
+    bench = Bench(cell.capacity_ah, DT_S, scale=(SOC_START - SOC_END) / N_REPEATS / share)
+    return {
+        "record": (
+            bench.profile("drive", [bench.rest(60.0), *[bench.drive("wltc_3b")] * N_REPEATS], SOC_START),
+        )
+    }
+
+
+def _split(cell: Cell, profiles: dict[str, tuple[Profile, ...]], rng: np.random.Generator) -> Split:
+    for _ in range(MOST_TRIES):
+        made = _Made(random_effects(cell, rng), OPEN_CIRCUIT_V * rng.standard_normal(OPEN_CIRCUIT_TERMS))
+        try:
+            series = {role: tuple(_series(cell, made, p, rng) for p in ps) for role, ps in profiles.items()}
+        except SimulationError:  # the cell with these effects cannot give that charge
+            continue
+        if "record" not in series:
+            return Split(series["train"], series["valid"], series["test"])
+        period = (len(series["record"][0]) - 60) * DT_S / N_REPEATS
+        rest = round(60 / DT_S)
+        drive = series["record"][0].take(slice(rest, None))
+        return cut_repeats(drive, RepeatsConfig(period_s=period, train=TRAIN_REPEATS, test=TEST_REPEATS))
+    raise SimulationError(
+        f"none of {MOST_TRIES} random cells can be driven like that; lower the differences."
+    )
+
+
+def _series(cell: Cell, made: _Made, profile: Profile, rng: np.random.Generator) -> ErrorSeries:
+    truth = simulate(cell, profile.time_s, profile.current_a, profile.soc0, made.effects)
+    declared = simulate(cell, profile.time_s, profile.current_a, profile.soc0)
+    noise = NOISE_V * rng.standard_normal(len(profile))
+    voltage: Array = truth.voltage_v + chebval(2 * truth.series["soc"] - 1, made.open_circuit_v) + noise
+    measured = Measurement(profile.time_s, profile.current_a, voltage, name=profile.name)
+    return with_inputs(error_series(measured, declared, DT_S), INPUTS)
