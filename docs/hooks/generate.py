@@ -10,6 +10,9 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
+if str(ROOT) not in sys.path:  # mkdocs imports a hook by its path
+    sys.path.insert(0, str(ROOT))
+
 KINDS = {
     "physics": "Physics the model lacks",
     "parameter": "Parameters that may be declared wrongly",
@@ -74,18 +77,45 @@ def _parameter(name: str, parameter: Any) -> str:
 
 
 def benchmarks() -> str:
-    """docs/benchmarks.json as tables: the lines that `aesi bench --json` printed, and the machine."""
-    path = ROOT / "docs" / "benchmarks.json"
-    if not path.exists():
+    """docs/benchmarks.json: the newest lines that `aesi bench --json` printed, and how watched figures moved."""
+    from flows.benchmarks.history import latest, read_history
+
+    entries = read_history(ROOT / "docs" / "benchmarks.json")
+    if not entries:
         return "No benchmark has been recorded in this checkout; `aesi bench` runs them."
-    record = json.loads(path.read_text(encoding="utf-8"))
-    lines = [f"Measured on {record['machine']}, {record['date']}, with `{record['command']}`.\n"]
-    by_name: dict[str, list[dict[str, Any]]] = {}
-    for line in record["lines"]:
-        by_name.setdefault(line["bench"], []).append(line)
-    for name, rows in by_name.items():
-        lines += [f"## {name}\n", _table(rows)]
-    return "\n".join(lines)
+    by_name: dict[str, list[tuple[Any, dict[str, Any]]]] = {}
+    for entry, line in latest(entries).values():
+        by_name.setdefault(line["bench"], []).append((entry, line))
+    parts: list[str] = []
+    for name, found in by_name.items():
+        parts += [
+            f"## {name}\n",
+            *(f"{text}\n" for text in dict.fromkeys(_origin(entry) for entry, _ in found)),
+        ]
+        parts.append(_table([line for _, line in found]))
+    return "\n".join([*parts, _over_time(entries)])
+
+
+def _origin(entry: Any) -> str:
+    load = "" if entry.load is None else f", load {entry.load:.1f} at the start"
+    return f"Measured on {entry.machine}, {entry.date}, commit `{entry.commit[:7]}`{load}."
+
+
+def _over_time(entries: list[Any]) -> str:
+    """Every recorded value of the figures that should not get worse."""
+    from flows.benchmarks.history import case_of, figures
+
+    moved: dict[tuple[Any, ...], list[str]] = {}
+    for entry in entries:
+        for line in entry.lines:
+            for figure, value in figures(line).items():
+                moved.setdefault((*case_of(line), figure), []).append(f"{_cell(float(value))} ({entry.date})")
+    rows = [
+        f"| {bench} | {', '.join(_cell(each) for each in case)} | {figure} | {' → '.join(values)} |"
+        for (bench, *case, figure), values in moved.items()
+    ]
+    head = ["## Over time\n", "| benchmark | case | figure | recorded |", "|---|---|---|---|"]
+    return "\n".join([*head, *rows, ""])
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
@@ -154,6 +184,3 @@ GENERATORS: dict[str, Callable[[], str]] = {
     "contributing": contributing,
     "changelog": changelog,
 }
-
-if str(ROOT) not in sys.path:  # mkdocs imports a hook by its path
-    sys.path.insert(0, str(ROOT))

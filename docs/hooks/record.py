@@ -1,7 +1,9 @@
-"""Run benchmarks and record them for the documentation: `python docs/hooks/record.py [NAME ...]`.
+"""Run benchmarks and add them to the history in docs/benchmarks.json.
 
-Writes docs/benchmarks.json: the machine, the date, the command and the lines it printed. Benchmarks that are not
-named keep the lines they had.
+    python docs/hooks/record.py [NAME ...]                 run the named ones, or all
+    python docs/hooks/record.py --lines FILE [FILE ...]    take what `aesi bench --json` has printed to files
+
+Says what got worse since it was last recorded, and then exits with 1; the entry is added all the same.
 """
 
 from __future__ import annotations
@@ -15,22 +17,29 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-TARGET = Path(__file__).resolve().parents[1] / "benchmarks.json"
+from flows.benchmarks.history import Entry, read_history, regressions, worth_keeping, write_history
+
+ROOT = Path(__file__).resolve().parents[2]
+TARGET = ROOT / "docs" / "benchmarks.json"
 
 
-def main(names: list[str]) -> None:
-    """Run the named benchmarks, or all of them."""
-    lines = [line for name in names or [""] for line in run(name)]
-    fresh = {line["bench"] for line in lines}
-    kept = [line for line in _before() if line["bench"] not in fresh]
-    record = {
-        "machine": machine(),
-        "date": datetime.now(UTC).date().isoformat(),
-        "command": "aesi bench --json",
-        "lines": kept + lines,
-    }
-    TARGET.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    print(f"{TARGET}: {len(lines)} lines recorded, {len(kept)} kept")
+def main(arguments: list[str]) -> int:
+    """Add an entry; the number of regressions."""
+    load: float | None = None
+    if arguments[:1] == ["--lines"]:
+        lines = [line for path in arguments[1:] for line in parsed(Path(path).read_text(encoding="utf-8"))]
+    else:
+        load = round(os.getloadavg()[0], 2)
+        lines = [line for name in arguments or [""] for line in run(name)]
+    kept = worth_keeping(lines)
+    entries = read_history(TARGET)
+    worse = regressions(entries, kept)
+    entry = Entry(datetime.now(UTC).date().isoformat(), commit(), machine(), load, kept)
+    write_history(TARGET, [*entries, entry])
+    print(f"{TARGET}: {len(kept)} lines added")
+    for text in worse:
+        print(f"worse: {text}")
+    return len(worse)
 
 
 def run(name: str) -> list[dict[str, Any]]:
@@ -38,7 +47,18 @@ def run(name: str) -> list[dict[str, Any]]:
     aesi = Path(sys.executable).with_name("aesi")
     command = [str(aesi), "bench", *([name] if name else []), "--json"]
     done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
-    return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+    return parsed(done.stdout)
+
+
+def parsed(text: str) -> list[dict[str, Any]]:
+    """The JSON lines of a text."""
+    return [json.loads(line) for line in text.splitlines() if line.startswith("{")]
+
+
+def commit() -> str:
+    """The commit that is checked out."""
+    command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
 
 def machine() -> str:
@@ -56,12 +76,5 @@ def _processor() -> str:
     return platform.processor() or platform.machine()
 
 
-def _before() -> list[dict[str, Any]]:
-    if not TARGET.exists():
-        return []
-    lines: list[dict[str, Any]] = json.loads(TARGET.read_text(encoding="utf-8"))["lines"]
-    return lines
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    raise SystemExit(1 if main(sys.argv[1:]) else 0)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from aesi.errors import InputError
+from aesi.errors import AesiError, InputError
 
 
 def bench(
@@ -16,16 +17,33 @@ def bench(
     options: Annotated[
         list[str] | None, typer.Option("--set", help="key=value, an option of the benchmark.")
     ] = None,
+    compare: Annotated[
+        Path | None,
+        typer.Option(help="A history of results (docs/benchmarks.json): say what got worse, exit code 1."),
+    ] = None,
 ) -> None:
     """Time and check the project against its peers, in one run on this machine."""
     from flows.benchmarks import BENCHMARKS, run
+    from flows.benchmarks.history import read_history, regressions
 
     if name is not None and name not in BENCHMARKS:
         raise InputError(f"there is no benchmark {name!r}; there are: {', '.join(BENCHMARKS)}.")
     keywords = dict(_pair(option) for option in options or [])
+    history = read_history(compare) if compare else []
+    if compare and not history:
+        raise InputError(f"{compare} holds no recorded benchmarks to compare with.")
+    lines = []
     for each in [name] if name else list(BENCHMARKS):
         for line in run(each, **keywords):
-            typer.echo(json.dumps({"bench": each, **line}) if as_json else _plain(each, line))
+            lines.append({"bench": each, **line})
+            typer.echo(json.dumps(lines[-1]) if as_json else _plain(each, line))
+    worse = regressions(history, lines)
+    if worse:
+        raise Regressed(f"worse than recorded: {'; '.join(worse)}.")
+
+
+class Regressed(AesiError):
+    """A benchmark is worse than it was."""
 
 
 def _pair(option: str) -> tuple[str, object]:

@@ -53,17 +53,27 @@ def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
     (tmp_path / "docs").mkdir()
     monkeypatch.setattr(generate, "ROOT", tmp_path)
     assert "No benchmark has been recorded" in generate.benchmarks()
-    record = {
-        "machine": "a machine",
-        "date": "2026-01-01",
-        "command": "aesi bench x --json",
-        "lines": [{"bench": "x", "ours_s": 0.123456, "peer": "p", "peer_s": None}],
+    line = {
+        "bench": "scale",
+        "runner": "dask",
+        "rows": 9,
+        "terms": 3,
+        "workers": 2,
+        "one_s": 0.123456,
+        "peer_s": None,
     }
-    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps(record))
+    entry = {"machine": "a machine", "commit": "0123456789", "load": 0.5}
+    entries = [
+        {**entry, "date": "2026-01-01", "lines": [{**line, "ratio_by_processor": 1.9}]},
+        {**entry, "date": "2026-02-01", "lines": [{**line, "ratio_by_processor": 1.8}]},
+    ]
+    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": entries}))
     page = generate.benchmarks()
-    assert "a machine" in page
-    assert "| ours_s | 0.1235 |" in page
+    assert "Measured on a machine, 2026-02-01, commit `0123456`, load 0.5 at the start." in page
+    assert "2026-01-01, commit" not in page  # the newest of each case alone
+    assert "| one_s | 0.1235 |" in page
     assert "| peer_s | – |" in page
+    assert "| scale | dask, 9, 3, 2 | ratio_by_processor | 1.9 (2026-01-01) → 1.8 (2026-02-01) |" in page
 
 
 def test_formulas_become_mathml_and_code_is_left_alone():

@@ -1,8 +1,20 @@
 """The benchmarks of the platform, small: they measure what they say, and leave nothing behind."""
 
+import json
+
 import pytest
 
+from aesi.errors import InputError
 from flows import benchmarks
+from flows.benchmarks.history import (
+    WATCHED,
+    Entry,
+    latest,
+    read_history,
+    regressions,
+    worth_keeping,
+    write_history,
+)
 
 
 def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
@@ -29,3 +41,70 @@ def test_two_dask_workers_share_the_work_evenly(workspace):
 def test_tracking_adds_less_than_a_tenth_to_a_candidate_of_the_papers_size():
     (line,) = benchmarks.run("tracking", candidates=6)
     assert line["overhead_pct"] < 10, line
+
+
+SPEED = {"bench": "espm", "case": "drive", "ratio": 200.0, "rmse_mv": 0.05, "ours_s": 0.1}
+
+
+def entry(date="2026-01-01", **changes):
+    return Entry(date, "abcdef0123", "a machine", 0.2, ({**SPEED, **changes},))
+
+
+def test_a_history_is_read_as_it_was_written(tmp_path):
+    path = tmp_path / "h.json"
+    assert read_history(path) == []
+    write_history(path, [entry(), entry("2026-02-01", ratio=150.0)])
+    assert read_history(path) == [entry(), entry("2026-02-01", ratio=150.0)]
+    path.write_text("{}")
+    with pytest.raises(InputError, match="no history of benchmarks"):
+        read_history(path)
+
+
+@pytest.mark.parametrize(
+    ("now", "worse"),
+    [
+        ({}, 0),
+        ({"ratio": 130.0}, 0),  # within the scatter of timings
+        ({"ratio": 110.0}, 1),
+        ({"ratio": 900.0, "rmse_mv": 0.01, "ours_s": 9.9}, 0),
+        ({"rmse_mv": 0.06}, 1),
+        ({"ratio": 1.0, "rmse_mv": 1.0}, 2),
+        ({"ratio": 1.0, "case": "another"}, 0),
+        ({"ratio": None}, 0),
+    ],
+)
+def test_what_is_worse_than_when_it_was_last_recorded_is_named(now, worse):
+    found = regressions([entry("2025-01-01", ratio=1.0), entry()], [{**SPEED, **now}])
+    assert len(found) == worse
+    assert all("espm (drive): " in text and "2026-01-01, abcdef0" in text for text in found)
+
+
+def test_the_newest_of_each_case_counts():
+    entries = [entry(), entry(case="pulse"), entry("2026-03-01")]
+    assert {key: each.date for key, (each, _) in latest(entries).items()} == {
+        ("espm", "drive"): "2026-03-01",
+        ("espm", "pulse"): "2026-01-01",
+    }
+
+
+def test_a_line_that_sums_up_stands_for_the_others():
+    rows = [{"bench": "blind", "case": "a"}, {"bench": "blind", "summary": True}]
+    assert worth_keeping(rows) == (rows[1],)
+    assert worth_keeping(rows[:1]) == (rows[0],)
+
+
+def test_what_is_watched_exists():
+    assert set(WATCHED) <= set(benchmarks.BENCHMARKS)
+
+
+def test_the_command_compares_and_ends_with_1(call, monkeypatch, tmp_path):
+    path = tmp_path / "h.json"
+    write_history(path, [entry()])
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([{**SPEED, "ratio": 3.0}]))
+    code, out, err = call("bench", "espm", "--json", "--compare", path)
+    assert code == 1
+    assert json.loads(out)["ratio"] == 3.0
+    assert err == ("aesi: worse than recorded: espm (drive): ratio was 200 and is 3 (2026-01-01, abcdef0).\n")
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([SPEED]))
+    assert call("bench", "espm", "--compare", path)[0] == 0
+    assert call("bench", "espm", "--compare", tmp_path / "none.json")[0] == 2

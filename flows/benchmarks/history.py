@@ -1,0 +1,138 @@
+"""Results of the benchmarks over time, and what got worse.
+
+A history is a JSON file: entries with date, commit, machine and load, each with the lines that one
+`aesi bench NAME --json` printed. Two lines are about the same thing where their benchmark and the fields of its
+`Watch.case` agree; of those, the watched figures are compared, ratios and accuracies rather than seconds, since
+seconds belong to a machine and its load.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from aesi.errors import InputError
+
+Line = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What is compared of a benchmark.
+
+    case : fields that tell its lines apart.  higher, lower : figures that should not fall, or rise, by more than
+    the given share of what they were.
+    """
+
+    case: tuple[str, ...] = ()
+    higher: Mapping[str, float] = field(default_factory=dict)
+    lower: Mapping[str, float] = field(default_factory=dict)
+
+
+TIMING = 0.4
+"""Ratios of times from one run of a shared machine scatter by a quarter and more."""
+RESULT = 0.1
+RATE = 0.03
+
+WATCHED = {
+    "espm": Watch(("case",), higher={"ratio": TIMING}, lower={"rmse_mv": RESULT}),
+    "ensemble": Watch(("terms", "lambda1", "rows", "candidates", "resamples"), higher={"ratio": TIMING}),
+    "spci": Watch(
+        ("method", "n_calibration", "n_test"), higher={"ratio": TIMING}, lower={"score_ratio": RESULT}
+    ),
+    "blind": Watch(
+        ("summary", "cases"),
+        higher={"effect_right_pct": RATE, "none_right_pct": RATE, "unknown_right_pct": RATE},
+    ),
+    "tracking": Watch(("rows", "terms", "resamples", "artifact_kb"), lower={"overhead_pct": TIMING}),
+    "scale": Watch(("runner", "rows", "terms", "workers"), higher={"ratio_by_processor": RESULT}),
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One recorded run. load : the machine's one-minute load when it began; None where nobody noted it."""
+
+    date: str
+    commit: str
+    machine: str
+    load: float | None
+    lines: tuple[Line, ...]
+
+
+def read_history(path: Path) -> list[Entry]:
+    """The entries of a history, oldest first; none where there is no file."""
+    if not path.exists():
+        return []
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))["entries"]
+        return [Entry(**{**entry, "lines": tuple(entry["lines"])}) for entry in entries]
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{path} is no history of benchmarks ({error}).") from None
+
+
+def write_history(path: Path, entries: Sequence[Entry]) -> None:
+    """Write all entries."""
+    text = json.dumps({"entries": [asdict(entry) for entry in entries]}, indent=1)
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def worth_keeping(lines: Iterable[Line]) -> tuple[Line, ...]:
+    """The lines, or where one of them sums up the others (`summary`), that one."""
+    found = tuple(lines)
+    return tuple(line for line in found if line.get("summary")) or found
+
+
+def latest(entries: Sequence[Entry]) -> dict[tuple[Any, ...], tuple[Entry, Line]]:
+    """The newest line of every case, with its entry."""
+    return {case_of(line): (entry, line) for entry in entries for line in entry.lines}
+
+
+def case_of(line: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What a line is about: its benchmark and the fields that tell its lines apart."""
+    watch = WATCHED.get(line["bench"], Watch())
+    return (line["bench"], *(_plain(line.get(name)) for name in watch.case))
+
+
+def figures(line: Mapping[str, Any]) -> dict[str, float]:
+    """The watched figures of a line."""
+    watch = WATCHED.get(line["bench"], Watch())
+    names = (*watch.higher, *watch.lower)
+    return {name: line[name] for name in names if isinstance(line.get(name), int | float)}
+
+
+def regressions(entries: Sequence[Entry], lines: Iterable[Line]) -> list[str]:
+    """One sentence for each watched figure that is worse than when it was last recorded."""
+    known = latest(entries)
+    found = []
+    for line in lines:
+        if case_of(line) in known:
+            entry, before = known[case_of(line)]
+            since = f"{entry.date}, {entry.commit[:7] or 'no commit'}"
+            found += [f"{_name(line)}: {text} ({since})" for text in _worse(before, line)]
+    return found
+
+
+def _worse(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    watch = WATCHED[now["bench"]]
+    old, new = figures(before), figures(now)
+    found = []
+    for name in [each for each in old if each in new]:
+        share = watch.higher.get(name, watch.lower.get(name, 0.0))
+        fell = name in watch.higher and new[name] < old[name] * (1 - share)
+        rose = name in watch.lower and new[name] > old[name] * (1 + share)
+        if fell or rose:
+            found.append(f"{name} was {old[name]:.4g} and is {new[name]:.4g}")
+    return found
+
+
+def _name(line: Mapping[str, Any]) -> str:
+    bench, *case = case_of(line)
+    return f"{bench} ({', '.join(str(each) for each in case)})" if case else str(bench)
+
+
+def _plain(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value
