@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.bench import run
+from aesi.bench.bands import run
 
 pytestmark = pytest.mark.slow
 
@@ -14,7 +14,7 @@ PACKAGE, CONSTANT = "scaled, inside the trained range", "one width"
 @pytest.fixture(scope="module")
 def lines(request):
     cell = request.config.rootpath / "experiments" / "cells" / "nmc_30ah.bpx.json"
-    return list(run("bands", cell=str(cell), cells=CELLS, seed=5))
+    return list(run(cell=str(cell), cells=CELLS, seed=5))
 
 
 def pick(lines, method):
