@@ -3,9 +3,9 @@
 BENCHMARKS = {
     "espm": "aesi.bench.espm",
     "ensemble": "aesi.bench.ensemble",
+    "design": "aesi.bench.design",
     "spci": "aesi.bench.spci",
     "bands": "aesi.bench.bands",
     "blind": "aesi.bench.blind",
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""
-
