@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from aesi.data import read_measurement
     from aesi.physics import Cell, simulate
+    from aesi.pipeline.cross_check import cross_check
     from aesi.pipeline.hybrid import HybridModel
 
 __version__ = "0.1.0"
@@ -29,9 +30,10 @@ _HOME = {
     "simulate": "aesi.physics",
     "read_measurement": "aesi.data",
     "HybridModel": "aesi.pipeline.hybrid",
+    "cross_check": "aesi.pipeline.cross_check",
 }
 
-__all__ = ["Cell", "HybridModel", "read_measurement", "simulate"]
+__all__ = ["Cell", "HybridModel", "cross_check", "read_measurement", "simulate"]
 
 
 def __getattr__(name: str) -> Any:

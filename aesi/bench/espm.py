@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from aesi.errors import InputError, SimulationError
+from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, simulate
+from aesi.pipeline.cross_check import DEFAULT_MESH, FINE_MESH, pybamm_run
 
 DEFAULT_CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 STEP_S = 0.1
@@ -21,10 +21,6 @@ BREAK_POINT_S = 1.0
 """The current is a straight line between break points, so that the peer can be told where they are."""
 SOC0 = 0.95
 MEAN_C_RATE, SPREAD_C_RATE, LARGEST_C_RATE, CORRELATION_S = 0.25, 1.0, 3.0, 20.0
-DEFAULT_MESH = {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 20, "r_p": 20}
-FINE_MESH = {"x_n": 30, "x_s": 20, "x_p": 30, "r_n": 60, "r_p": 60}
-TOLERANCE = 1e-6
-CHARGE_TOLERANCE_AH = 1e-4
 
 
 def run(
@@ -44,18 +40,20 @@ def run(
     ours = sorted(_timed(model, time, current)[0] for _ in range(repeats))[repeats // 2]
     voltage = _timed(model, time, current)[1]
     content = json.loads(Path(cell).read_text(encoding="utf-8"))
-    peer, peer_v = _peer(content, model, breaks, current_at_breaks, time, DEFAULT_MESH)
-    _, fine_v = _peer(content, model, breaks, current_at_breaks, time, FINE_MESH)
+    peer, fine = (
+        pybamm_run(content, model, breaks, current_at_breaks, time, SOC0, mesh)
+        for mesh in (DEFAULT_MESH, FINE_MESH)
+    )
     yield {
         "bench": "espm",
         "case": f"{samples} samples at 10 Hz, drive profile to 3C, {model.name}",
         "ours_s": ours,
         "ours_first_call_s": first,
         "peer": "PyBaMM SPMe IDAKLU",
-        "peer_s": peer,
-        "ratio": peer / ours,
-        "rmse_mv": _rmse_mv(voltage, fine_v),
-        "peer_rmse_mv": _rmse_mv(peer_v, fine_v),
+        "peer_s": peer.seconds,
+        "ratio": peer.seconds / ours,
+        "rmse_mv": _rmse_mv(voltage, fine.voltage_v),
+        "peer_rmse_mv": _rmse_mv(peer.voltage_v, fine.voltage_v),
         "reference": "PyBaMM SPMe, 60 radial points",
     }
 
@@ -77,46 +75,6 @@ def _timed(cell: Cell, time: Array, current: Array) -> tuple[float, Array]:
     start = perf_counter()
     run = simulate(cell, time, current, soc0=SOC0)
     return perf_counter() - start, run.voltage_v
-
-
-def _peer(
-    content: dict[str, Any], cell: Cell, breaks: Array, current: Array, time: Array, mesh: dict[str, int]
-) -> tuple[float, Array]:
-    """Seconds of the peer's solver, and its voltage at `time`."""
-    import warnings
-
-    import pybamm
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        values = pybamm.ParameterValues.create_from_bpx_obj(copy.deepcopy(content))  # bpx fills it in
-        theta_n, theta_p = cell.stoichiometries(SOC0)
-        values.update(
-            {
-                "Current function [A]": pybamm.Interpolant(breaks, current, pybamm.t),
-                "Lower voltage cut-off [V]": 0.5,  # a cut-off would end the run without an error
-                "Upper voltage cut-off [V]": 6.0,
-                "Initial concentration in negative electrode [mol.m-3]": theta_n * cell.negative.c_max_mol_m3,
-                "Initial concentration in positive electrode [mol.m-3]": theta_p * cell.positive.c_max_mol_m3,
-            }
-        )
-        solver = pybamm.IDAKLUSolver(rtol=TOLERANCE, atol=TOLERANCE)
-        simulation = pybamm.Simulation(
-            pybamm.lithium_ion.SPMe(), parameter_values=values, var_pts=mesh, solver=solver
-        )
-        simulation.build()
-        inside = breaks[breaks <= time[-1]]
-        at = np.unique(np.append(inside, time[-1]))
-        start = perf_counter()
-        solution = simulation.solve(t_eval=at, t_interp=time)
-        seconds = perf_counter() - start
-    charge = float(solution["Discharge capacity [A.h]"](time[-1:])[0])
-    wanted = float(np.trapezoid(np.interp(time, breaks, current), time)) / 3600.0
-    if abs(solution.t[-1] - time[-1]) > STEP_S or abs(charge - wanted) > CHARGE_TOLERANCE_AH:
-        raise SimulationError(
-            f"the peer passed {charge:.5f} Ah by {solution.t[-1]:.1f} s, not {wanted:.5f} Ah."
-        )
-    return seconds, np.asarray(solution["Voltage [V]"](time), dtype=float)
 
 
 def _rmse_mv(a: Array, b: Array) -> float:

@@ -1,0 +1,141 @@
+"""The same cell in PyBaMM, so that the physics model can be held against an independent one in one call.
+
+PyBaMM reads the cell as BPX, so what is checked includes the file that `Cell.to_bpx` writes. Its solver is stopped
+wherever the current bends, since it would step over a pulse otherwise, and the charge that it passed is compared
+with the integral of the current. Effects that BPX cannot express are not part of the comparison.
+"""
+
+from __future__ import annotations
+
+import copy
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any, Literal
+
+import numpy as np
+
+from aesi.errors import SimulationError
+from aesi.numerics.typing import Array, IntArray
+from aesi.physics import Cell, simulate
+
+DEFAULT_MESH = {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 20, "r_p": 20}
+FINE_MESH = {"x_n": 30, "x_s": 20, "x_p": 30, "r_n": 60, "r_p": 60}
+"""PyBaMM's own default of 20 radial points moves the voltage of a drive by millivolts."""
+TOLERANCE = 1e-6
+CHARGE_SHARE = 1e-5
+"""Of the nominal capacity: how much the charge may differ."""
+SECONDS_PER_HOUR = 3600.0
+BEND = 1e-9
+"""Of the largest current: by how much a row may leave the line through its neighbours."""
+
+
+@dataclass(frozen=True, eq=False)
+class PybammRun:
+    """voltage_v : (n,) at the times asked for.  seconds : of the solver alone.  solution : PyBaMM's own."""
+
+    voltage_v: Array
+    seconds: float
+    solution: Any
+
+
+@dataclass(frozen=True, eq=False)
+class CrossCheck:
+    """Two models of one cell. ours_v, pybamm_v : (n,) V.  rmse_mv, max_mv : of their difference."""
+
+    time_s: Array
+    ours_v: Array
+    pybamm_v: Array
+    solution: Any
+
+    @property
+    def rmse_mv(self) -> float:
+        return 1e3 * float(np.sqrt(np.mean((self.ours_v - self.pybamm_v) ** 2)))
+
+    @property
+    def max_mv(self) -> float:
+        return 1e3 * float(np.abs(self.ours_v - self.pybamm_v).max())
+
+
+def cross_check(
+    cell: Cell, time_s: Array, current_a: Array, soc0: float, model: Literal["SPMe", "DFN"] = "SPMe"
+) -> CrossCheck:
+    """Simulate the cell with this package and with PyBaMM.
+
+    time_s : (n,) s, rising.  current_a : (n,) A, discharge positive, a straight line between rows.
+    soc0 : state of charge at the first row.
+    Raises SimulationError where PyBaMM ends early or loses charge.
+    """
+    time, current = np.asarray(time_s, dtype=float), np.asarray(current_a, dtype=float)
+    ours = simulate(cell, time, current, soc0=soc0).voltage_v
+    bends = _bends(time, current)
+    run = pybamm_run(cell.to_bpx(), cell, time[bends], current[bends], time, soc0, FINE_MESH, model)
+    return CrossCheck(time, ours, run.voltage_v, run.solution)
+
+
+def pybamm_run(
+    content: Mapping[str, Any],
+    cell: Cell,
+    breaks_s: Array,
+    current_a: Array,
+    time_s: Array,
+    soc0: float,
+    mesh: Mapping[str, int],
+    model: Literal["SPMe", "DFN"] = "SPMe",
+) -> PybammRun:
+    """PyBaMM's model of a BPX content under a current that is a straight line between break points.
+
+    breaks_s, current_a : (k,) s and A, from the first to the last of time_s (n,) s.  mesh : points by dimension.
+    """
+    import pybamm
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of its parser and its solver, about what nobody here can change
+        values = pybamm.ParameterValues.create_from_bpx_obj(copy.deepcopy(dict(content)))  # bpx fills it in
+        values.update(_overrides(pybamm, cell, breaks_s, current_a, soc0))
+        simulation = pybamm.Simulation(
+            getattr(pybamm.lithium_ion, model)(),
+            parameter_values=values,
+            var_pts=dict(mesh),
+            solver=pybamm.IDAKLUSolver(rtol=TOLERANCE, atol=TOLERANCE),
+        )
+        simulation.build()
+        at = np.unique(np.append(breaks_s[breaks_s <= time_s[-1]], time_s[-1]))
+        start = perf_counter()
+        solution = simulation.solve(t_eval=at, t_interp=time_s)
+        seconds = perf_counter() - start
+    _require_whole(solution, cell, breaks_s, current_a, time_s)
+    return PybammRun(np.asarray(solution["Voltage [V]"](time_s), dtype=float), seconds, solution)
+
+
+def _overrides(pybamm: Any, cell: Cell, breaks_s: Array, current_a: Array, soc0: float) -> dict[str, Any]:
+    theta_n, theta_p = cell.stoichiometries(soc0)
+    return {
+        "Current function [A]": pybamm.Interpolant(breaks_s, current_a, pybamm.t),
+        "Lower voltage cut-off [V]": 0.5,  # a cut-off would end the run without an error
+        "Upper voltage cut-off [V]": 6.0,
+        "Initial concentration in negative electrode [mol.m-3]": theta_n * cell.negative.c_max_mol_m3,
+        "Initial concentration in positive electrode [mol.m-3]": theta_p * cell.positive.c_max_mol_m3,
+    }
+
+
+def _require_whole(solution: Any, cell: Cell, breaks_s: Array, current_a: Array, time_s: Array) -> None:
+    """Raise SimulationError unless the run reached its end and passed the charge of its current."""
+    charge = float(solution["Discharge capacity [A.h]"](time_s[-1:])[0])
+    wanted = float(np.trapezoid(np.interp(time_s, breaks_s, current_a), time_s)) / SECONDS_PER_HOUR
+    if abs(solution.t[-1] - time_s[-1]) > 1e-6 * time_s[-1] or (
+        abs(charge - wanted) > CHARGE_SHARE * cell.nominal_capacity_ah
+    ):
+        raise SimulationError(
+            f"PyBaMM passed {charge:.5f} Ah by {solution.t[-1]:.1f} s, not {wanted:.5f} Ah by {time_s[-1]:.1f} s; "
+            "the voltages cannot be compared. Check that the current keeps the cell within its limits."
+        )
+
+
+def _bends(time: Array, current: Array) -> IntArray:
+    """Rows where the current is no straight line, with both ends."""
+    slopes = np.diff(current) / np.diff(time)
+    step = np.minimum(np.diff(time)[:-1], np.diff(time)[1:])
+    bent = np.abs(np.diff(slopes)) * step > BEND * max(float(np.abs(current).max()), 1e-12)
+    return np.flatnonzero(np.concatenate([[True], bent, [True]]))

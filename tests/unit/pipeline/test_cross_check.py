@@ -1,0 +1,41 @@
+"""The same cell here and in PyBaMM: one call, and no comparison with a run that went wrong."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aesi
+from aesi.errors import SimulationError
+from aesi.pipeline.cross_check import _bends
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return aesi.Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+
+
+def test_a_changed_cell_agrees_with_pybamm_through_pulses(cell):
+    changed = cell.with_negative(particle_radius_m=1.5 * cell.negative.particle_radius_m)
+    time_s = np.arange(0.0, 1201.0, 5.0)
+    current_a = np.where((time_s // 60) % 4 == 1, 7.5, 1.0)
+    check = aesi.cross_check(changed, time_s, current_a, soc0=0.8)
+    # PyBaMM keeps the concentration dependence of the electrolyte; the current bends within 5 s at each pulse.
+    assert check.rmse_mv < 1.0
+    assert check.max_mv < 5.0
+    plain = aesi.simulate(cell, time_s, current_a, soc0=0.8).voltage_v
+    assert 1e3 * np.abs(plain - check.pybamm_v).max() > 2 * check.max_mv  # the change reached PyBaMM
+
+
+def test_a_run_that_ends_early_is_not_compared(cell):
+    time_s = np.arange(0.0, 7201.0, 60.0)
+    with pytest.raises((SimulationError, ValueError)):
+        aesi.cross_check(cell, time_s, np.full(len(time_s), 10.0), soc0=0.3)
+
+
+def test_the_current_is_told_where_it_bends():
+    time = np.array([0.0, 1.0, 2.0, 4.0, 5.0, 6.0, 7.0])
+    current = np.array([0.0, 1.0, 2.0, 4.0, 4.0, 4.0, 1.0])
+    assert _bends(time, current).tolist() == [0, 3, 5, 6]
