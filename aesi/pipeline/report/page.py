@@ -90,7 +90,10 @@ def _script_safe(content: Any) -> str:
 def _fixed(value: Any, digits: int = 1, unit: str = "") -> str:
     if not _known(value):
         return ABSENT
-    return f"{value:,.{digits}f}" + (f"\u00a0{unit}" if unit else "")
+    text = f"{value:,.{digits}f}"
+    if float(text.replace(",", "")) == 0.0:
+        text = text.removeprefix("-")  # a rounded-away minus says nothing
+    return text + (f"\u00a0{unit}" if unit else "")
 
 
 def _significant(value: Any, digits: int = 3) -> str:

@@ -119,6 +119,12 @@ def discovery_consequence(view: DiscoveryView) -> str:
     }
     if any(value is None for value in values.values()):
         return ""
+    if not view.discovery["effects"]:
+        return (
+            f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, and with its "
+            f"own parameters refitted by {values['recalibrated']:.1f} mV; the noise floor is "
+            f"{view.discovery['noise_floor_mv']:.1f} mV."
+        )
     text = (
         f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
         f"same model with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 STATES = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding added"}
+TELLING_SHARE = 0.01
+"""A share of the residual's variance below this is not worth a bar."""
 
 
 def write_run_report(path: str | Path, view: RunView) -> Path:
@@ -69,35 +71,46 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
 def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
     """All figures of a discovery, by name."""
     figures: dict[str, Figure] = {}
+    states = _states(view)
     tested = view.of("test") or view.of("fit")
     for part in ("test", "fit"):
         if view.of(part):
-            figures[f"residual_{part}"] = records.residual_figure(view.of(part), STATES)
+            figures[f"residual_{part}"] = records.residual_figure(view.of(part), states)
     if tested:
-        figures |= _over_the_range(tested)
+        figures |= _over_the_range(tested, states)
     if view.discovery["candidates"]:
         figures["scores"] = hypotheses.ranking_figure(
             view.discovery["candidates"], view.titles, view.discovery["effects"]
         )
     if view.files:
-        figures["files"] = hypotheses.files_figure(view.files, STATES)
-    if view.dependence:
+        figures["files"] = hypotheses.files_figure(view.files, states)
+    if any(max(row["before"], row["after"]) > TELLING_SHARE for row in view.dependence):
         figures["dependence"] = hypotheses.dependence_bars(view.dependence)
     return figures
 
 
-def _over_the_range(traces: Sequence[DiscoveryTrace]) -> dict[str, Figure]:
-    """Residual against current and SOC, and maps over both, before and after."""
+def _states(view: DiscoveryView) -> dict[str, str]:
+    """The states of the model worth showing: where nothing was added, the last is that of a mere refit."""
+    return STATES if view.effects else {state: STATES[state] for state in ("before", "recalibrated")}
+
+
+def _over_the_range(traces: Sequence[DiscoveryTrace], states: Mapping[str, str]) -> dict[str, Figure]:
+    """Residual against current and SOC, and maps over both, at the first and the last of the states."""
+    first, *_, last = states
+    ends = (first, last)
     current = np.concatenate([t.current_a for t in traces])
     soc = np.concatenate([t.soc for t in traces])
     errors = {
-        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces])
-        for state in ("before", "after")
+        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces]) for state in ends
     }
     limit = maps.shared_limit(current, soc, list(errors.values()), False)
     return {
-        "against_current": maps.dependence_figure(current, errors, STATES, "current, A (discharge > 0)"),
-        "against_soc": maps.dependence_figure(100 * soc, errors, STATES, "SOC, %"),
-        "map_before": maps.map_figure(current, soc, errors["before"], "As declared", False, limit),
-        "map_after": maps.map_figure(current, soc, errors["after"], "With the finding added", False, limit),
+        "against_current": maps.dependence_figure(current, errors, states, "current, A (discharge > 0)"),
+        "against_soc": maps.dependence_figure(100 * soc, errors, states, "SOC, %"),
+        "map_before": maps.map_figure(
+            current, soc, errors[ends[0]], states[ends[0]].capitalize(), False, limit
+        ),
+        "map_after": maps.map_figure(
+            current, soc, errors[ends[1]], states[ends[1]].capitalize(), False, limit
+        ),
     }

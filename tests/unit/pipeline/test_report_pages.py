@@ -98,7 +98,7 @@ def test_hypotheses_may_lack_figures(views, tmp_path):
     view = views.discovery_view(300)
     bare = {**view.discovery, "candidates": [{"effect": "x", "kind": "physics", "score": 1.0}]}
     html = write_discovery_report(tmp_path / "r.html", replace(view, discovery=bare)).read_text("utf-8")
-    assert "<td>–</td>" in html
+    assert ">–</td>" in html
 
 
 def test_the_thinned_figure_says_so_and_keeps_every_sample(views, tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -85,8 +85,8 @@ def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure
     )
 
 
-def residual_figure(traces: Sequence[DiscoveryTrace], labels: dict[str, str]) -> Figure:
-    """Measured voltage, current, and the residual before, recalibrated and after, over time."""
+def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str]) -> Figure:
+    """Measured voltage, current, and the residual in each state of the model, over time."""
     fig = stack(3, (0.3, 0.2, 0.5))
     placed, unit = end_to_end(traces)
     for i, item in enumerate(placed):
