@@ -73,7 +73,7 @@ def _stages(
         config, loaded, problem, found.chosen, found.rows(), fitted, evaluation, tracker.run_id, seconds
     )
     summary = run("report", lambda: write_outputs(folder, result))
-    track_result(tracker, folder, summary, found.number, result.best)
+    track_result(tracker, folder, summary, found.number)
     return folder
 
 

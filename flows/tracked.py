@@ -76,10 +76,9 @@ class CandidateTracker:
         )
 
 
-def track_result(
-    tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int, chosen: str
-) -> None:
-    """The models, the tables, the report and the chosen model."""
+def track_result(tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int) -> None:
+    """The models, the tables, the report and the chosen model; `number` is the candidate's they come from."""
+    chosen = summary["chosen"]
     for row in summary["models"]:
         numbers = _numbers(row)
         tracker.nested(f"model:{row['name']}", row["name"], "model", {"model": row["name"]}, numbers)

@@ -142,7 +142,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
     return Loaded(
         cell=cell,
-        cell_name=path.stem,
+        cell_name=cell.name or path.stem,
         effects=effects,
         split=_split(config.data, series, sources.roles),
         soc0=soc0,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,13 +18,14 @@ from aesi.pipeline.fit import Fitted
 from aesi.pipeline.hybrid import HybridModel
 from aesi.pipeline.load import Loaded
 from aesi.pipeline.report import write_figures, write_run_report
-from aesi.pipeline.report.views import BootstrapView, RunView
+from aesi.pipeline.report.views import BootstrapView, RunView, Trace
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
 ENSEMBLES = ("AESI I", "AESI II")
+PHYSICS = "ESPM"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +58,13 @@ class Result:
 def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     """Write everything below `folder`; returns the content of summary.json."""
     folder.mkdir(parents=True, exist_ok=True)
-    rows = [finite(row) for row in result.evaluation.rows]
+    rows = [finite({**row, "name": published(row["name"])}) for row in result.evaluation.rows]
     summary = {
         "schema": SCHEMA,
         "experiment": result.config.name,
         "mlflow_run_id": result.run_id,
         "candidates": len(result.candidates),
-        "chosen": result.best,
+        "chosen": published(result.best),
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
         "notes": list(notes(result)),
@@ -84,6 +85,15 @@ def notes(result: Result) -> tuple[str, ...]:
     """What a reader should know: of the data, of terms left out, of intervals that could not be calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
     return (*result.loaded.notes, *result.problem.notes, *without_intervals)
+
+
+def published(name: str) -> str:
+    """A model of the error as the hybrid that it makes with the physics; the physics alone keeps its name."""
+    return name if name == PHYSICS else f"{PHYSICS} + {name}"
+
+
+def _published_trace(trace: Trace) -> Trace:
+    return replace(trace, predictions={published(name): each for name, each in trace.predictions.items()})
 
 
 def hybrid(result: Result) -> HybridModel:
@@ -110,9 +120,9 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         experiment=result.config.name,
         note=result.config.note,
         cell=result.loaded.cell_name,
-        chosen=result.best,
+        chosen=published(result.best),
         models=tuple(rows),
-        traces=result.evaluation.traces,
+        traces=tuple(_published_trace(trace) for trace in result.evaluation.traces),
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result)),
         bootstrap=BootstrapView(

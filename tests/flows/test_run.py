@@ -62,7 +62,7 @@ def test_a_run_leaves_its_outputs(finished):
     assert summary["schema"] == "aesi.summary/1"
     assert summary["mlflow_run_id"] == folder.name
     assert summary["candidates"] == 6
-    assert [row["name"] for row in summary["models"]] == ["ESPM", "AESI I", "ridge"]
+    assert [row["name"] for row in summary["models"]] == ["ESPM", "ESPM + AESI I", "ESPM + ridge"]
     assert summary["models"][0]["free_run"]["test_mser_pct"] == pytest.approx(0, abs=1e-9)
     for name in ("report.html", "tables.md", "tables.tex", "model/model.json"):
         assert (folder / name).stat().st_size > 100
