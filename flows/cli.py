@@ -26,17 +26,17 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("run")(experiment.run)
-app.command("discover")(cell.discover)
-app.command("calibrate")(cell.calibrate)
+app.command("run", short_help="A whole experiment, to its tables and report.")(experiment.run)
+app.command("discover", short_help="Find what physics a model lacks, and add it.")(cell.discover)
+app.command("calibrate", short_help="Fit the physics model's own parameters.")(cell.calibrate)
 app.command("simulate")(cell.simulate)
 app.command("predict")(cell.predict)
-app.command("tables")(experiment.tables)
-app.command("effects")(effects.effects)
+app.command("tables", short_help="The paper's tables, from tracked runs alone.")(experiment.tables)
+app.command("effects", short_help="The catalogue of effects.")(effects.effects)
 app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")
-app.command("worker")(experiment.worker)
+app.command("worker", short_help="One more process on a shared study.")(experiment.worker)
 app.command("ui")(experiment.ui)
-app.command("bench")(bench.bench)
+app.command("bench", short_help="Time the project against its peers.")(bench.bench)
 
 
 @app.callback(invoke_without_command=True)

@@ -69,8 +69,18 @@ def _stages(
     evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split))
     folder = environment.workspace() / "runs" / config.name / tracker.run_id
     seconds = time.monotonic() - started
+    rows = found.rows()
     result = Result(
-        config, loaded, problem, found.chosen, found.rows(), fitted, evaluation, tracker.run_id, seconds
+        config,
+        loaded,
+        problem,
+        found.chosen,
+        rows,
+        fitted,
+        evaluation,
+        tracker.run_id,
+        seconds,
+        failed=len(found.result.trials) - len(rows),
     )
     summary = run("report", lambda: write_outputs(folder, result))
     track_result(tracker, folder, summary, found.number)

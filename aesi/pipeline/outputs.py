@@ -34,6 +34,7 @@ class Result:
 
     candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
     chosen : the candidate the models come from.  run_id : of the tracked run.  seconds : wall time so far.
+    failed : how many candidates more were evaluated and came to nothing.
     """
 
     config: ExperimentConfig
@@ -45,6 +46,7 @@ class Result:
     evaluation: Evaluation
     run_id: str
     seconds: float
+    failed: int = 0
 
     @property
     def best(self) -> str:
@@ -63,7 +65,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "schema": SCHEMA,
         "experiment": result.config.name,
         "mlflow_run_id": result.run_id,
-        "candidates": len(result.candidates),
+        "candidates": len(result.candidates) + result.failed,
         "chosen": published(result.best),
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,

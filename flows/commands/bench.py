@@ -9,10 +9,13 @@ from typing import Annotated
 import typer
 
 from aesi.errors import AesiError, InputError
+from flows.commands import complete
 
 
 def bench(
-    name: Annotated[str | None, typer.Argument(help="One benchmark; all without it.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="One benchmark; all without it.", autocompletion=complete.benchmarks)
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON line each.")] = False,
     options: Annotated[
         list[str] | None, typer.Option("--set", help="key=value, an option of the benchmark.")

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from flows.commands import complete
+
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
 
@@ -21,7 +23,12 @@ def list_() -> None:
 
 @app.command("get")
 def get(
-    name: Annotated[str, typer.Argument(help="Name of a data set, as `aesi data list` gives it.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Name of a data set, as `aesi data list` gives it.", autocompletion=complete.data_sets
+        ),
+    ],
     out: Annotated[Path | None, typer.Option(help="Folder to put it in; the cache without it.")] = None,
 ) -> None:
     """Fetch a data set, check it against its checksums and convert it."""

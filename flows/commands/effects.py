@@ -9,13 +9,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aesi.errors import InputError
+from flows.commands import complete
 
 if TYPE_CHECKING:
     from aesi.physics.effects import Effect
 
 
 def effects(
-    name: Annotated[str | None, typer.Argument(help="One effect; without it, the list.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="One effect; without it, the list.", autocompletion=complete.effects)
+    ] = None,
     own: Annotated[
         list[Path] | None, typer.Option("--effect-file", help="A Python file of yours with an EFFECT in it.")
     ] = None,

@@ -1,6 +1,10 @@
 """The command line: exit codes, one sentence an error, and what each command leaves."""
 
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -131,3 +135,30 @@ def test_no_arguments_make_a_traceback(call, tracked, arguments):
     assert code in (0, 1, 2)
     assert "Traceback" not in err
     assert "aesi: unexpected" not in err
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (["aesi", "dis"], "discover"),
+        (["aesi", "effects", "self_h"], "self_heating"),
+        (["aesi", "bench", "tra"], "tracking"),
+        (["aesi", "data", "get", "about"], "about_energy_nmc"),
+    ],
+)
+def test_the_shell_is_offered_names(words, offered):
+    command = Path(sys.executable).with_name("aesi")
+    asked = {
+        "COMP_WORDS": " ".join(words),
+        "COMP_CWORD": str(len(words) - 1),
+        "_AESI_COMPLETE": "complete_bash",
+    }
+    done = subprocess.run(
+        [command], env=os.environ | asked, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout.split() == [offered], done.stderr
+
+
+def test_every_command_is_told_in_one_whole_line(call):
+    _, out, _ = call("--help")
+    assert "..." not in out.split("Commands:")[1]
