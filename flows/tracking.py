@@ -17,7 +17,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
-from aesi.pipeline.config import TrackingConfig
+from aesi.pipeline.sections import TrackingConfig
 from flows import environment
 from flows.mlflow_store import KIND, Store, now_ms
 from flows.outbox import Outbox

@@ -8,9 +8,10 @@ from pathlib import Path
 from aesi.data import read_measurement
 from aesi.data.read import Sign
 from aesi.errors import ConfigError
-from aesi.pipeline.config import DiscoverConfig, ExperimentConfig
+from aesi.pipeline.config import ExperimentConfig
 from aesi.pipeline.discover import Case
 from aesi.pipeline.load import cell_path, locator, virtual_experiment
+from aesi.pipeline.sections import DiscoverConfig
 from aesi.records import Measurement
 
 

@@ -1,7 +1,8 @@
 """What an experiment is: one validated record read from a YAML file.
 
 Files an experiment reads are named relative to its YAML file. What it writes goes below the workspace; an
-experiment's name becomes a folder there and can therefore hold letters, digits, `_` and `-` alone.
+experiment's name becomes a folder there and can therefore hold letters, digits, `_` and `-` alone. Its sections are
+in sections.py.
 """
 
 from __future__ import annotations
@@ -14,238 +15,24 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from aesi.errors import ConfigError
-from aesi.records import Hold
+from aesi.pipeline.sections import (
+    CellConfig,
+    ConformalConfig,
+    DataConfig,
+    DiscoverConfig,
+    FallbackConfig,
+    LibraryConfig,
+    RunnerConfig,
+    SearchConfig,
+    Section,
+    TrackingConfig,
+)
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
-
-Range = tuple[float, float]
-Share = Annotated[float, Field(gt=0, lt=1)]
-Positive = Annotated[float, Field(gt=0)]
-Count = Annotated[int, Field(ge=1)]
-
-
-class Section(BaseModel):
-    """Base of all sections: frozen, and unknown keys are refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class RepeatsConfig(Section):
-    """One record that repeats a schedule, cut into its repeats (numbered from 1).
-
-    The last `valid_share` of every training repeat validates, so that validation spans the state of charge. With 0
-    the search validates on contiguous pieces of the training repeats in turn, each by models that have not seen it.
-    """
-
-    period_s: Positive
-    train: tuple[Count, ...]
-    test: tuple[Count, ...]
-    valid_share: Annotated[float, Field(ge=0, lt=1)] = 0.0
-
-    @model_validator(mode="after")
-    def _apart(self) -> RepeatsConfig:
-        both = sorted(set(self.train) & set(self.test))
-        if both:
-            raise ValueError(f"repeat {both[0]} is in train and in test; a repeat has one role")
-        return self
-
-
-class VirtualConfig(Section):
-    """How a virtual measurement is made (kind: virtual): the paper's profiles on a cell that has more than the ESPM.
-
-    effects : what the cell has beyond its declared parameters; None for the laboratory's default mix.
-    magnitude : 1 is typical.  pulse_c : C-rate of the charge pulse after each schedule.
-    """
-
-    model: Literal["DFN", "SPMe"] = "DFN"
-    effects: tuple[str, ...] | None = None
-    magnitude: Positive = 1.0
-    pulse_c: Annotated[float, Field(ge=0)] = 5.0
-    seed: int = 0
-
-
-class DataConfig(Section):
-    """Records by role, or one record cut by repeats.
-
-    files: paths of measurement files; catalogue: names of records of the data set `set`; virtual: the paper's
-    profiles, which have their roles already. `repeats` cuts the one file or record `record`.
-    """
-
-    kind: Literal["files", "catalogue", "virtual"]
-    set: str | None = None
-    record: str | None = None
-    repeats: RepeatsConfig | None = None
-    train: tuple[str, ...] = ()
-    valid: tuple[str, ...] = ()
-    test: tuple[str, ...] = ()
-    dt_s: Positive = 1.0
-    hold: Hold = "backward"
-    columns: dict[str, str | None] = {}
-    sign: Literal["discharge-positive", "charge-positive"] = "discharge-positive"
-    virtual: VirtualConfig = VirtualConfig()
-
-    @model_validator(mode="after")
-    def _complete(self) -> DataConfig:
-        if self.kind == "catalogue" and not self.set:
-            raise ValueError("kind: catalogue needs `set`, the name of a data set (`aesi data list`)")
-        if self.kind == "virtual":
-            if self.repeats or self.record or self.train or self.valid or self.test:
-                raise ValueError("kind: virtual brings its own records; leave out record, repeats and roles")
-        elif self.repeats:
-            if not self.record:
-                raise ValueError("`repeats` needs `record`, the record to cut")
-        elif not (self.train and self.test):
-            raise ValueError("give `train` and `test` records, or one `record` with `repeats`")
-        return self
-
-
-class CellConfig(Section):
-    """The cell: a BPX file, a folder of a saved model (its cell and effects), or `catalogue` for the one that
-    belongs to the data set.
-
-    soc0 : state of charge at the first row; None finds it from the rest voltage.
-    effects : id -> parameters, effects added to the declared cell.
-    """
-
-    bpx: str = "catalogue"
-    soc0: Annotated[float, Field(ge=0, le=1)] | None = None
-    effects: dict[str, dict[str, float]] = {}
-
-
-class LibraryConfig(Section):
-    """The candidate terms the search may choose from (`aesi.sparse.Library.build`).
-
-    p_c, d : range of the highest polynomial order and of the total degree; their upper ends make the library.
-    factors : most variables in a product.  special : with trigonometric and hyperbolic functions.
-    mixed : and their products with first-order terms.  inputs : None takes the paper's; `aesi.sparse.inputs` names
-    those that can be derived, such as I_next, the current that flows while the predicted error arises.
-    """
-
-    p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (0, 3)
-    d: tuple[Annotated[int, Field(ge=1, le=5)], Annotated[int, Field(ge=1, le=5)]] = (1, 3)
-    factors: Annotated[int, Field(ge=1, le=3)] = 3
-    special: bool = True
-    mixed: bool = False
-    inputs: tuple[str, ...] | None = None
-
-    @field_validator("inputs")
-    @classmethod
-    def _with_the_current(cls, value: tuple[str, ...] | None) -> tuple[str, ...] | None:
-        if value is not None and "I" not in value:
-            raise ValueError("`I`, the current, has to be among the inputs")
-        return value
-
-
-class SearchConfig(Section):
-    """The evolutionary search, in the paper's symbols.
-
-    block : rows of a bootstrap block.  horizon : rows of a free run inside the losses, None for a block.
-    fold : rows of the pieces that validate in turn where no records are set aside for it, None for an eighth.
-    regime : what the losses measure.  weights : gamma of the losses (out-of-bag, validation, sparsity) in the
-    scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints.
-    warm_start : begin with a few plain candidates (strong ridge on the whole library).
-    timeout_s, memory_mb : what one candidate may take before it counts as failed.
-    """
-
-    candidates: Count = 40
-    population: Annotated[int, Field(ge=2)] = 20
-    resamples: Annotated[int, Field(ge=2)] = 100
-    block: Count | None = None
-    horizon: Count | None = None
-    fold: Annotated[int, Field(ge=10)] | None = None
-    regime: Literal["free_run", "one_step"] = "free_run"
-    top_share: Annotated[float, Field(gt=0, le=1)] = 0.1
-    lambda1: tuple[Positive, Positive] = (1e-13, 1e3)
-    lambda2: tuple[Positive, Positive] = (1e-3, 5.0)
-    tau: tuple[Share, Share] = (0.3, 0.7)
-    pearson_train: Annotated[float, Field(ge=-1, le=1)] = 0.5
-    pearson_valid: Annotated[float, Field(ge=-1, le=1)] = 0.5
-    weights: tuple[float, float, float] = (0.45, 0.45, 0.10)
-    warm_start: bool = True
-    timeout_s: Positive = 300.0
-    memory_mb: Positive = 6000.0
-    workers: Count = 1
-
-    @field_validator("lambda1", "lambda2", "tau")
-    @classmethod
-    def _ordered(cls, value: Range) -> Range:
-        if not value[0] < value[1]:
-            raise ValueError(f"the range [{value[0]:g}, {value[1]:g}] is empty; give low < high")
-        return value
-
-
-class ConformalConfig(Section):
-    """Prediction intervals: `method` is a name in `aesi.conformal.METHODS`; horizons for free-run bands.
-
-    compare : methods that the tables show beside it, calibrated on the same residuals.
-    """
-
-    method: str = "spci_boosted"
-    alpha: Share = 0.1
-    window: Annotated[int, Field(ge=2)] = 200
-    horizons_s: tuple[Positive, ...] = (1.0, 10.0, 60.0)
-    compare: tuple[str, ...] = ("split", "enbpi", "spci_linear")
-
-    @field_validator("compare")
-    @classmethod
-    def _known(cls, value: tuple[str, ...]) -> tuple[str, ...]:
-        from aesi.conformal import METHODS
-
-        unknown = [name for name in value if name not in METHODS]
-        if unknown:
-            raise ValueError(f"there is no method {unknown[0]!r}; there are: {', '.join(METHODS)}")
-        return value
-
-
-class TrackingConfig(Section):
-    """Where runs are tracked: an MLflow URI, or None for the SQLite store of the workspace.
-
-    log_model : log the chosen model so that MLflow can serve it; register_model : under the experiment's name.
-    """
-
-    uri: str | None = None
-    log_model: bool = True
-    register_model: bool = True
-    system_metrics: bool = True
-
-
-class RunnerConfig(Section):
-    """Who evaluates candidates: worker processes here, or Dask workers (`address` of a scheduler, or local).
-
-    storage : a database URL where several `aesi worker` processes share the candidates of one study.
-    stage_timeout_s : wall time after which a stage of the run (the search, the report) has failed; None for no limit.
-    """
-
-    kind: Literal["local", "dask"] = "local"
-    address: str | None = None
-    storage: str | None = None
-    stage_timeout_s: Positive | None = None
-
-
-class DiscoverConfig(Section):
-    """What `aesi discover` needs beyond cell and data.
-
-    fit, test : names of records (kind: virtual has them by role).  until_s : what comes later is left out.
-    holdout : the last share of each record, kept back where there are no test records.
-    """
-
-    fit: tuple[str, ...] = ()
-    test: tuple[str, ...] = ()
-    until_s: Positive | None = None
-    holdout: Share = 0.3
-    max_effects: Annotated[int, Field(ge=0, le=10)] = 3
-
-
-class FallbackConfig(Section):
-    """What to run instead where the measured data cannot be had."""
-
-    data: DataConfig
-    cell: CellConfig
-
 
 ModelName = Literal["ESPM", "AESI I", "AESI II", "SINDy-C", "ridge", "gradient boosting"]
 

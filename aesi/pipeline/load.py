@@ -18,7 +18,8 @@ from aesi.data import read_measurement
 from aesi.data.resample import to_even
 from aesi.errors import ConfigError, DataError
 from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
-from aesi.pipeline.config import DataConfig, ExperimentConfig, RepeatsConfig
+from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.sections import DataConfig, RepeatsConfig
 from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run, Split
 from aesi.sparse import with_inputs
 
