@@ -62,12 +62,14 @@ def _name(page):
 @pytest.mark.parametrize("page", [p for p in PAGES if p.exists() and _tested(p, False)], ids=_name)
 def test_the_quick_examples_of_a_page_run(page, workspace, request):
     _run_page(page, request, slow=False)
+    _require_ignored(workspace)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", [p for p in PAGES if p.exists() and _tested(p, True)], ids=_name)
 def test_all_examples_of_a_page_run(page, workspace, request):
     _run_page(page, request, slow=True)
+    _require_ignored(workspace)
 
 
 def _run_page(page, request, slow):
@@ -86,6 +88,18 @@ def _run_page(page, request, slow):
             _run_python(block.body, where, namespace)
         else:
             _run_console(block.body, where)
+
+
+def _require_ignored(workspace):
+    """Whoever follows a page in a checkout leaves nothing that git would offer to commit."""
+    left = [path.name + "/" * path.is_dir() for path in workspace.iterdir() if not path.is_symlink()]
+    if not left:
+        return
+    command = ["git", "-C", str(ROOT), "check-ignore", "--no-index", *left]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode == 128:
+        return  # no git, no checkout
+    assert set(left) <= set(done.stdout.splitlines())
 
 
 def _require(request, data_set):
