@@ -1,17 +1,21 @@
 """Bands for predictions without measured voltage, by how long ago the last measurement was.
 
 Errors of such predictions depend on each other for minutes, so samples are not what is counted: pieces are.
-The half-width is a scale s, which current and state of charge predict (`local_scale`), times a factor. The
-factor is the 1 - alpha quantile of |error| / s over all pieces, each scored with the scale of the others: a
-new piece, whose errors entered neither, is treated as they were.
+Each piece i is scored by |error| / s_i, where the scale s_i follows current and state of charge (`local_scale`)
+and is fitted to the other pieces. The half-width h at a sample answers to all of them (CV+):
+
+    sum_i n_i [share of the scores of piece i with s_i score <= h]   =   (1 - alpha) sum_i n_i            (1)
+
+With one scale for all this is the quantile of |error|. Where the scales differ, a piece that its fellows had not
+foreseen counts with the scale that they gave it, not with one that it has widened itself.
+Barber, Candès, Ramdas & Tibshirani, Ann. Statist. 49 (2021) 486, doi:10.1214/20-AOS1965.
 
 Only rows inside the range that their model was trained on are counted. A model fitted without the first piece
 of a drive extrapolates there; the final model, asked inside its range, does not, and outside of it says so.
 
-What this promises: 1 - alpha on average over pieces that are exchangeable with those of the calibration. With
-few pieces the share covered on one drive scatters by many points about that average; the coverage of each
-left-out piece (`HorizonBand.by_piece`) shows by how many. The exact finite-sample bound would take at least
-1 / alpha - 1 pieces and the widest of them. Outside the trained range there is no promise.
+What this promises: about 1 - alpha on average over pieces that are exchangeable with those of the calibration.
+With few pieces the share covered on one drive scatters by many points about that average; the coverage of each
+left-out piece (`HorizonBand.by_piece`) shows by how many. Outside the trained range there is no promise.
 """
 
 from __future__ import annotations
@@ -19,6 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
@@ -37,25 +42,69 @@ N_PIECES = 8
 MIN_PIECES = 3
 MIN_ROWS = 30
 """Rows from which a piece counts."""
+N_LEVELS = 101
+HALVINGS = 14
+"""Of the interval that holds the half-width: to a ten-thousandth of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class HorizonBand:
-    """One horizon: half-width = factor * scale.
+    """One horizon, by (1).
 
-    by_piece : share of each calibration piece that the factor covers with the scale of the other pieces.
+    scales : one a piece, fitted to the others.  scores : (n_pieces, n_levels) |error| / scale of each piece,
+    its quantiles at even levels from 0 to 1.  counts : (n_pieces,) rows of each piece.
+    by_piece : share of each piece whose score lies within the 1 - alpha quantile of all scores.
     extrapolated : whether rows outside the trained range had to be counted, for want of others.
     """
 
     horizon_s: float
-    factor: float
-    scale: LocalScale
+    alpha: float
+    scales: tuple[LocalScale, ...]
+    scores: Array
+    counts: Array
     by_piece: tuple[float, ...]
     extrapolated: bool = False
 
     def half_width(self, columns: Array) -> Array:
         """(n,) V; columns : (n, p) of `local_scale.covariates`."""
-        return np.asarray(self.factor * self.scale(columns))
+        scales = np.array([scale(columns) for scale in self.scales])
+        levels = np.linspace(0, 1, self.scores.shape[1])
+        own = np.array([np.interp(1 - self.alpha, levels, scores) for scores in self.scores])
+        # The quantile of the mixture lies between those of its parts.
+        low, high = (own[:, None] * scales).min(axis=0), (own[:, None] * scales).max(axis=0)
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            reached = sum(
+                count * np.interp(middle / scale, scores, levels)
+                for count, scale, scores in zip(self.counts, scales, self.scores, strict=True)
+            )
+            enough = reached >= (1 - self.alpha) * self.counts.sum()
+            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+        return high
+
+    def to_state(self) -> State:
+        """Plain values and numpy arrays only; the whole drive's horizon is None."""
+        return {
+            "horizon_s": self.horizon_s if math.isfinite(self.horizon_s) else None,
+            "scales": [scale.to_state() for scale in self.scales],
+            "scores": self.scores,
+            "counts": self.counts,
+            "by_piece": list(self.by_piece),
+            "extrapolated": self.extrapolated,
+        }
+
+    @classmethod
+    def from_state(cls, state: State, alpha: float) -> Self:
+        """Inverse of `to_state`."""
+        return cls(
+            WHOLE_DRIVE if state["horizon_s"] is None else float(state["horizon_s"]),
+            alpha,
+            tuple(LocalScale.from_state(scale) for scale in state["scales"]),
+            np.asarray(state["scores"], dtype=float),
+            np.asarray(state["counts"], dtype=float),
+            tuple(float(share) for share in state["by_piece"]),
+            bool(state["extrapolated"]),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,38 +166,20 @@ class FreeRunBands:
         return Intervals(low, high, ~free.outside)
 
     def to_dict(self) -> State:
-        """Plain values and numpy arrays only; the whole drive's horizon is None."""
+        """Plain values and numpy arrays only."""
         return {
             "schema": SCHEMA,
             "alpha": self.alpha,
-            "horizons": [
-                {
-                    "horizon_s": band.horizon_s if math.isfinite(band.horizon_s) else None,
-                    "factor": band.factor,
-                    "scale": band.scale.to_state(),
-                    "by_piece": list(band.by_piece),
-                    "extrapolated": band.extrapolated,
-                }
-                for band in self.horizons
-            ],
+            "horizons": [band.to_state() for band in self.horizons],
         }
 
     @classmethod
     def from_dict(cls, state: State) -> FreeRunBands:
-        """Inverse of `to_dict`. Raises InputError for another schema."""
+        """Inverse of `to_dict`; arrays may come back as lists. Raises InputError for another schema."""
         if state.get("schema") != SCHEMA:
             raise InputError(f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}.")
-        bands = [
-            HorizonBand(
-                WHOLE_DRIVE if item["horizon_s"] is None else float(item["horizon_s"]),
-                float(item["factor"]),
-                LocalScale.from_state(item["scale"]),
-                tuple(float(share) for share in item["by_piece"]),
-                bool(item["extrapolated"]),
-            )
-            for item in state["horizons"]
-        ]
-        return cls(float(state["alpha"]), tuple(bands))
+        alpha = float(state["alpha"])
+        return cls(alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]))
 
     def _around(self, elapsed_s: Array, dt_s: float, current_a: Array, soc: Array) -> tuple[Array, Array]:
         columns = covariates(current_a, soc, dt_s)
@@ -202,13 +233,18 @@ def _calibrate(
         )
     if not any(piece.sizes.any() for piece in pieces):
         raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
-    scores = [
-        piece.sizes / _scale([other for other in pieces if other is not piece], alpha)(piece.columns)
-        for piece in pieces
-    ]
-    factor = float(np.quantile(np.concatenate(scores), 1 - alpha, method="higher"))
-    by_piece = tuple(float(np.mean(score <= factor)) for score in scores)
-    return HorizonBand(horizon, factor, _scale(pieces, alpha), by_piece, extrapolated)
+    scales = [_scale([other for other in pieces if other is not piece], alpha) for piece in pieces]
+    scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
+    everywhere = np.quantile(np.concatenate(scores), 1 - alpha, method="higher")
+    return HorizonBand(
+        horizon,
+        alpha,
+        tuple(scales),
+        np.array([np.quantile(score, np.linspace(0, 1, N_LEVELS)) for score in scores]),
+        np.array([float(score.size) for score in scores]),
+        tuple(float(np.mean(score <= everywhere)) for score in scores),
+        extrapolated,
+    )
 
 
 def _scale(pieces: Sequence[_Piece], alpha: float) -> LocalScale:

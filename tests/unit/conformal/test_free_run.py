@@ -47,11 +47,11 @@ def test_the_band_is_as_wide_as_the_current_asks_for() -> None:
     error, current, soc = drive(30)
     low, high = bands.at(WHOLE_DRIVE, DT, current, soc)
     rest, busy = current == 0.0, current == 20.0
-    # The error's size is 1 mV at rest and 9 mV at 20 A; its 90 % point 1.64 times that. The mean current of the
-    # last minute takes part of what belongs to the current, so the ratio stays below nine.
+    # The error's size is 1 mV at rest and 9 mV at 20 A; its 90 % point 1.64 times that. Shrinkage, and the mean
+    # current of the last minute, which takes part of what belongs to the current, leave less than the nine.
     assert np.mean(high[busy]) > 3 * np.mean(high[rest])
     for where in (rest, busy):
-        assert np.mean(((error >= low) & (error <= high))[where]) > 0.78
+        assert np.mean(((error >= low) & (error <= high))[where]) > 0.75
 
 
 def test_the_band_grows_from_the_shortest_horizon_to_the_whole_drive() -> None:
@@ -102,6 +102,15 @@ def test_each_piece_is_scored_with_the_scale_of_the_others() -> None:
     assert np.mean(band.by_piece) == pytest.approx(0.9, abs=0.01)
 
 
+def test_equal_scales_give_the_quantile_of_all_errors() -> None:
+    rng = np.random.default_rng(3)
+    errors = [rng.permutation(np.linspace(1e-4, 1e-3, 1000)) for _ in range(5)]
+    flat = [np.zeros(1000)] * 5
+    bands = FreeRunBands.fit({1.0: errors}, DT, flat, flat)
+    # 90 % of numbers evenly spread from 0.1 to 1 mV lie below 0.91 mV.
+    assert bands.at(1.0, DT, flat[0], flat[0])[1][0] == pytest.approx(0.91e-3, rel=0.005)
+
+
 def test_rows_outside_the_trained_range_do_not_count() -> None:
     rng = np.random.default_rng(1)
     errors = [1e-3 * rng.standard_normal(600) for _ in range(4)]
@@ -143,4 +152,4 @@ def test_missing_predictions_are_left_out() -> None:
     bands = FreeRunBands.fit({60.0: [late]}, DT, [current], [soc])
     inside = np.arange(N) >= 60
     other = FreeRunBands.fit({60.0: [error]}, DT, [current], [soc], inside=[inside])
-    assert bands.horizons[0].factor == other.horizons[0].factor
+    np.testing.assert_array_equal(bands.horizons[0].scores, other.horizons[0].scores)
