@@ -14,8 +14,9 @@ member would have left, relative to the physics, had it drawn none of the rows.
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.sparse.judge import drive_of, free_predictions, one_step_predictions
 from aesi.sparse.problem import Problem
 
@@ -62,11 +63,18 @@ def _squares(problem: Problem, active: IntArray, fits: Array, resamples: IntArra
         else:
             prediction = one_step_predictions(problem, drive, functions, rows)
         unseen = problem.unseen[rows] if every else problem.unseen[rows][:, resamples]
-        left = np.subtract(problem.target[rows, None], prediction)
-        np.square(left, out=left)
-        left *= problem.row_weights[rows, None]
-        left[~unseen] = 0.0
-        piece = problem.piece_of_row[rows]
-        first = np.flatnonzero(np.diff(piece, prepend=-1))
-        squares[piece[first]] += np.add.reduceat(left, first, axis=0)
+        weights, pieces = problem.row_weights[rows], problem.piece_of_row[rows]
+        _add_squares(problem.target[rows], prediction, weights, unseen, pieces, squares)
     return squares
+
+
+@njit(cache=True)
+def _add_squares(
+    target: Array, prediction: Array, weights: Array, unseen: BoolArray, pieces: IntArray, squares: Array
+) -> None:
+    """Add weights * (target - prediction)**2 of the unseen rows to the pieces they belong to."""
+    for k in range(len(target)):
+        at = squares[pieces[k]]
+        for j in range(prediction.shape[1]):
+            if unseen[k, j]:
+                at[j] += weights[k] * (target[k] - prediction[k, j]) ** 2
