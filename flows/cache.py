@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from flows import codec, environment, fingerprint
-from flows.outcomes import write_atomically
+from flows.files import write_atomically
 
 T = TypeVar("T")
 

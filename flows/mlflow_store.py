@@ -111,76 +111,9 @@ class Store:
 
     def deliver(self, item: Item, again: bool) -> None:
         """Send an item; `again` says that it may have been sent before."""
-        getattr(self, f"_send_{item['kind']}")(item, again)
+        from flows.mlflow_delivery import SENDERS
 
-    def _send_run(self, item: Item, again: bool) -> None:
-        """A finished nested run: parameters, metrics, files."""
-        from mlflow.entities import Metric, Param, RunTag
-
-        run_id = self._sent_before(item) if again else None
-        tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
-        if run_id is None:
-            created = self.client.create_run(
-                item["experiment_id"], start_time=item["start_ms"], run_name=item["name"], tags=tags
-            )
-            run_id = created.info.run_id
-        self.client.log_batch(
-            run_id,
-            metrics=[Metric(k, v, item["end_ms"], 0) for k, v in item["metrics"].items()],
-            params=[Param(k, v) for k, v in item["params"].items()],
-            tags=[RunTag(k, v) for k, v in tags.items()] if again else [],
-        )
-        for name, content in item["files"].items():
-            self.client.log_dict(run_id, content, name)
-        self.client.set_terminated(run_id, item["status"], item["end_ms"])
-
-    def _send_batch(self, item: Item, again: bool) -> None:
-        """Parameters, metrics and tags of a run that exists."""
-        from mlflow.entities import Metric, Param, RunTag
-
-        self.client.log_batch(
-            item["run_id"],
-            metrics=[Metric(k, v, item["at_ms"], item.get("step", 0)) for k, v in item["metrics"].items()],
-            params=[Param(k, v) for k, v in item["params"].items()],
-            tags=[RunTag(k, v) for k, v in item["tags"].items()],
-        )
-
-    def _send_datasets(self, item: Item, again: bool) -> None:
-        from mlflow.entities import Dataset, DatasetInput, InputTag
-
-        inputs = [
-            DatasetInput(
-                Dataset(d["name"], d["digest"], "local", d["source"], profile=d["profile"]),
-                [InputTag("mlflow.data.context", d["role"])],
-            )
-            for d in item["datasets"]
-        ]
-        self.client.log_inputs(item["run_id"], inputs)
-
-    def _send_files(self, item: Item, again: bool) -> None:
-        """A file or a folder as artifacts."""
-        source = Path(item["path"])
-        if source.is_dir():
-            self.client.log_artifacts(item["run_id"], str(source), item["to"])
-        elif source.is_file():
-            self.client.log_artifact(item["run_id"], str(source), item["to"])
-        else:
-            raise ValueError(f"{source} is gone")
-
-    def _send_json(self, item: Item, again: bool) -> None:
-        self.client.log_dict(item["run_id"], item["content"], item["name"])
-
-    def _send_model(self, item: Item, again: bool) -> None:
-        from flows.mlflow_model import log_hybrid
-
-        log_hybrid(self.uri, item["run_id"], Path(item["path"]), item["registered_as"])
-
-    def _send_end(self, item: Item, again: bool) -> None:
-        self.client.set_terminated(item["run_id"], item["status"], item["at_ms"])
-
-    def _sent_before(self, item: Item) -> str | None:
-        found = self.children(item["experiment_id"], item["parent"]).get(item["label"])
-        return None if found is None else str(found.info.run_id)
+        SENDERS[item["kind"]](self, item, again)
 
 
 def now_ms() -> int:

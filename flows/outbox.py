@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from flows.outcomes import write_atomically
+from flows.files import write_atomically
 
 Item = dict[str, Any]
 Deliver = Callable[[Item, bool], None]

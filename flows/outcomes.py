@@ -8,15 +8,10 @@ from __future__ import annotations
 
 import fcntl
 import os
-import socket
-import tempfile
-import threading
-import time
-import uuid
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
-from aesi.errors import InputError
+from flows.files import write_atomically
 
 
 class Outcomes(Protocol):
@@ -49,7 +44,11 @@ class Outcomes(Protocol):
 
 def open_outcomes(folder: Path, url: str | None = None) -> Outcomes:
     """A database where a URL is given, else the folder."""
-    return DatabaseOutcomes(url) if url else FileOutcomes(folder)
+    if not url:
+        return FileOutcomes(folder)
+    from flows.database_outcomes import DatabaseOutcomes
+
+    return DatabaseOutcomes(url)
 
 
 class FileOutcomes:
@@ -99,156 +98,3 @@ class FileOutcomes:
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.bin"
-
-
-class DatabaseOutcomes:
-    """A table in any database SQLAlchemy speaks to; a claim lives as long as its owner's heartbeat."""
-
-    BEAT_S = 2.0
-    STALE_S = 20.0
-
-    def __init__(self, url: str) -> None:
-        import sqlalchemy as sa
-
-        self._sa = sa
-        options: dict[str, Any] = {"connect_args": {"timeout": 60}} if url.startswith("sqlite") else {}
-        self._engine = self._connect(url, options)
-        self._table = sa.Table(
-            "aesi_outcomes",
-            sa.MetaData(),
-            sa.Column("key", sa.String(64), primary_key=True),
-            sa.Column("owner", sa.String(100)),
-            sa.Column("beat_s", sa.Float),
-            sa.Column("data", sa.LargeBinary),
-        )
-        self._owner = f"{socket.gethostname()}:{os.getpid()}:{uuid.uuid4().hex[:8]}"
-        self._mine: set[str] = set()
-        self._stop = threading.Event()
-        self._create()
-        self._thread = threading.Thread(target=self._beat, name="aesi-claims", daemon=True)
-        self._thread.start()
-
-    def get(self, key: str) -> bytes | None:
-        with self._engine.connect() as connection:
-            row = connection.execute(
-                self._sa.select(self._table.c.data).where(self._table.c.key == key)
-            ).first()
-        return None if row is None or row[0] is None else bytes(row[0])
-
-    def put(self, key: str, data: bytes) -> None:
-        values = {"owner": None, "beat_s": None, "data": data}
-        with self._engine.begin() as connection:
-            done = connection.execute(self._table.update().where(self._table.c.key == key).values(**values))
-            if done.rowcount == 0:
-                connection.execute(self._table.insert().values(key=key, **values))
-        self._mine.discard(key)
-
-    def discard(self, key: str) -> None:
-        with self._engine.begin() as connection:
-            connection.execute(self._table.delete().where(self._table.c.key == key))
-
-    def claim(self, key: str) -> bool:
-        if key in self._mine:
-            return True
-        try:
-            with self._engine.begin() as connection:
-                connection.execute(
-                    self._table.insert().values(key=key, owner=self._owner, beat_s=self._now(connection))
-                )
-            won = True
-        except self._sa.exc.IntegrityError:
-            won = self._take_over(key)
-        if won:
-            self._mine.add(key)
-        return won
-
-    def release(self, key: str) -> None:
-        if key in self._mine:
-            self._mine.discard(key)
-            with self._engine.begin() as connection:
-                connection.execute(
-                    self._table.delete().where(
-                        self._table.c.key == key,
-                        self._table.c.owner == self._owner,
-                        self._table.c.data.is_(None),
-                    )
-                )
-
-    def close(self) -> None:
-        self._stop.set()
-        for key in list(self._mine):
-            self.release(key)
-        self._engine.dispose()
-
-    def _take_over(self, key: str) -> bool:
-        """Win the claim of an owner whose heart no longer beats."""
-        table = self._table
-        with self._engine.begin() as connection:
-            now = self._now(connection)
-            done = connection.execute(
-                table.update()
-                .where(table.c.key == key, table.c.data.is_(None), table.c.beat_s < now - self.STALE_S)
-                .values(owner=self._owner, beat_s=now)
-            )
-        return done.rowcount == 1
-
-    def _beat(self) -> None:
-        while not self._stop.wait(self.BEAT_S):
-            if not self._mine:
-                continue
-            try:
-                with self._engine.begin() as connection:
-                    connection.execute(
-                        self._table.update()
-                        .where(self._table.c.owner == self._owner)
-                        .values(beat_s=self._now(connection))
-                    )
-            except self._sa.exc.SQLAlchemyError:
-                continue  # a missed beat is made up by the next; STALE_S is ten of them
-
-    def _now(self, connection: Any) -> float:
-        """The database's clock where it has one, because the workers' clocks may differ."""
-        if self._engine.dialect.name == "postgresql":
-            return float(
-                connection.execute(self._sa.text("select extract(epoch from clock_timestamp())")).scalar()
-            )
-        return time.time()
-
-    def _connect(self, url: str, options: dict[str, Any]) -> Any:
-        for scheme in ("postgresql://", "postgres://"):
-            if url.startswith(scheme):  # the driver that the `cluster` extra installs
-                url = f"postgresql+psycopg2://{url.removeprefix(scheme)}"
-        try:
-            return self._sa.create_engine(url, pool_pre_ping=True, **options)
-        except (ImportError, self._sa.exc.ArgumentError) as error:
-            advice = "; pip install 'aesi[cluster]'" if isinstance(error, ImportError) else ""
-            raise InputError(f"runner.storage is no database that can be used: {error}{advice}.") from None
-
-    def _create(self) -> None:
-        try:
-            self._table.create(self._engine, checkfirst=True)
-        except self._sa.exc.SQLAlchemyError as error:
-            # Two workers may both have found no table; the second to create it is not wrong.
-            try:
-                exists = self._sa.inspect(self._engine).has_table(self._table.name)
-            except self._sa.exc.SQLAlchemyError:
-                exists = False
-            if not exists:
-                where = self._engine.url.render_as_string(hide_password=True)
-                reason = str(error.__cause__ or error).strip().splitlines()[0]
-                raise InputError(f"runner.storage {where} cannot be used: {reason}.") from None
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write beside the target, then rename: whoever reads sees the old file or the whole new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".tmp")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise

@@ -12,11 +12,9 @@ them and however many at a time.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import optuna
 from optuna.storages import BaseStorage, JournalStorage, RDBStorage
@@ -24,26 +22,17 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.study import Study
 from optuna.trial import FrozenTrial, TrialState
 
-from aesi.errors import ConfigError, FitError
+from aesi.errors import ConfigError
 from aesi.records import Failed
-from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate, fitness
+from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
 from aesi.sparse.genome_space import GenomeSpace
-from flows.term_sampler import INDEX, TermSampler, genome_of, violation
+from flows.search_result import FINISHED, RECORD, RECORDED, SearchResult
+from flows.term_sampler import INDEX, TermSampler
 
 Outcome = Candidate | Failed
 EvaluateMany = Callable[[Sequence[Genome]], Iterable[tuple[int, Outcome]]]
 """A generation in, (position, outcome) out, in any order."""
 OnCandidate = Callable[[int, Genome, Outcome], None]
-
-_FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
-_RECORD = "record"
-_RECORDED = (
-    "fitness",
-    "pearson_train",
-    "pearson_valid",
-    "free_run_valid_mser_pct",
-    "one_step_valid_rmse_v",
-)
 
 
 @dataclass(frozen=True)
@@ -52,84 +41,6 @@ class Constraints:
 
     pearson_train: float = 0.5
     pearson_valid: float = 0.5
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One finished trial. `losses` is None where it failed, and `reason` says why.
-
-    number : its index in the search.
-    numbers : fitness, correlations and validation figures by name, as in `Candidate`.
-    """
-
-    number: int
-    genome: Genome
-    losses: tuple[float, float, float] | None
-    feasible: bool
-    numbers: dict[str, float]
-    reason: str | None
-
-
-@dataclass(frozen=True)
-class Pick:
-    """Which trial the fitness takes under given weights."""
-
-    weights: FitnessWeights
-    trial: Trial
-    fitness: float
-
-
-@dataclass(frozen=True, eq=False)
-class SearchResult:
-    """All finished trials of a study, and what to choose from them."""
-
-    study: Study
-    trials: tuple[Trial, ...]
-    library_size: int
-    weights: FitnessWeights
-
-    @classmethod
-    def of(cls, study: Study, library_size: int, weights: FitnessWeights) -> SearchResult:
-        """What the study holds now, in the order of the index."""
-        stored = study.get_trials(deepcopy=False, states=_FINISHED)
-        trials = sorted((_read(trial) for trial in stored), key=lambda trial: trial.number)
-        return cls(study, tuple(trials), library_size, weights)
-
-    @property
-    def feasible(self) -> tuple[Trial, ...]:
-        """Those that were evaluated and meet the constraints."""
-        return tuple(trial for trial in self.trials if trial.feasible)
-
-    def front(self) -> tuple[Trial, ...]:
-        """Feasible trials that no other feasible one beats in all losses."""
-        return tuple(
-            trial for trial in self.feasible if not any(_dominates(other, trial) for other in self.feasible)
-        )
-
-    def best(self, weights: FitnessWeights | None = None) -> Pick:
-        """The trial of highest fitness; the earlier one on a tie.
-
-        Raises FitError, with the reasons counted, where no trial is feasible.
-        """
-        weights = weights or self.weights
-        front = self.front()
-        if not front:
-            raise FitError(self._nothing_feasible())
-        scored = [(fitness(t.losses, self.library_size, weights), -t.number, t) for t in front if t.losses]
-        score, _, trial = max(scored, key=lambda entry: entry[:2])
-        return Pick(weights, trial, score)
-
-    def sensitivity(self, several: Sequence[FitnessWeights] = ()) -> tuple[Pick, ...]:
-        """The picks under other weights (default: each loss in turn counting little, or most)."""
-        return tuple(self.best(weights) for weights in several or _around(self.weights))
-
-    def _nothing_feasible(self) -> str:
-        reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)
-        listed = "; ".join(f"{count} x {reason}" for reason, count in reasons.most_common(4))
-        return (
-            f"none of {len(self.trials)} candidates is feasible ({listed or 'none was evaluated'}); "
-            "lower the correlation constraints, widen the ranges, or evaluate more candidates."
-        )
 
 
 def search(
@@ -171,7 +82,7 @@ def search(
     def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:
         return ((k, evaluate_one(problem, genome)) for k, genome in enumerate(genomes))
 
-    while (missing := n_trials - len(study.get_trials(deepcopy=False, states=_FINISHED))) > 0:
+    while (missing := n_trials - len(study.get_trials(deepcopy=False, states=FINISHED))) > 0:
         _generation(
             study,
             sampler,
@@ -228,7 +139,7 @@ def _claim(study: Study, sampler: TermSampler, genome: Genome, index: int) -> in
 
 def _next_indices(study: Study, population: int, most: int) -> list[int]:
     """The lowest free indices, within one generation so that the next one has all of its parents."""
-    trials = study.get_trials(deepcopy=False, states=(*_FINISHED, TrialState.RUNNING))
+    trials = study.get_trials(deepcopy=False, states=(*FINISHED, TrialState.RUNNING))
     taken = {trial.user_attrs[INDEX] for trial in trials}
     free = [index for index in range(len(trials) + most) if index not in taken][:most]
     return [index for index in free if index // population == free[0] // population]
@@ -244,7 +155,7 @@ def _finished(
         index,
         TrialState.COMPLETE,
         values=list(outcome.losses),
-        user_attrs={_RECORD: {key: float(getattr(outcome, key)) for key in _RECORDED}},
+        user_attrs={RECORD: {key: float(getattr(outcome, key)) for key in RECORDED}},
         constraints={
             "pearson_train": constraints.pearson_train - outcome.pearson_train,
             "pearson_valid": constraints.pearson_valid - outcome.pearson_valid,
@@ -270,34 +181,3 @@ def _storage(storage: str | Path | BaseStorage | None) -> BaseStorage | None:
         return RDBStorage(str(storage))
     Path(storage).parent.mkdir(parents=True, exist_ok=True)
     return JournalStorage(JournalFileBackend(str(storage)))
-
-
-def _read(trial: FrozenTrial) -> Trial:
-    done = trial.state == TrialState.COMPLETE
-    numbers: dict[str, Any] = trial.user_attrs.get(_RECORD, {})
-    losses = (trial.values[0], trial.values[1], trial.values[2]) if done else None
-    return Trial(
-        trial.user_attrs[INDEX],
-        genome_of(trial),
-        losses,
-        done and violation(trial) == 0,
-        numbers,
-        trial.user_attrs.get("reason"),
-    )
-
-
-def _dominates(a: Trial, b: Trial) -> bool:
-    pairs = list(zip(a.losses or (), b.losses or (), strict=True))
-    return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)
-
-
-def _around(centre: FitnessWeights) -> tuple[FitnessWeights, ...]:
-    few, most = 0.1, 0.8
-    return (
-        centre,
-        FitnessWeights(most, few, few),
-        FitnessWeights(few, most, few),
-        FitnessWeights(few, few, most),
-        FitnessWeights(0.5, 0.5, 0.0),
-        FitnessWeights(1 / 3, 1 / 3, 1 / 3),
-    )

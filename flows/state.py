@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import IO
 
 from flows import environment
-from flows.outcomes import write_atomically
+from flows.files import write_atomically
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,8 @@ from flows.console import Console
 from flows.evaluation import Evaluation, Tally
 from flows.outcomes import Outcomes, open_outcomes
 from flows.pool import LocalPool, Pool
-from flows.search import Constraints, SearchResult, search
+from flows.search import Constraints, search
+from flows.search_result import SearchResult
 
 OnScored = Callable[[int, Genome, Scored | Failed], None]
 """Told of each candidate: its number, its genome, what became of it."""

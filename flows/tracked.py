@@ -12,7 +12,8 @@ from aesi.pipeline.config import ExperimentConfig
 from aesi.pipeline.load import ROLES, Loaded
 from aesi.records import Failed
 from aesi.sparse import Genome, Problem, SparseModel
-from flows.tracking import Tracker, flat, versions
+from flows.provenance import versions
+from flows.tracking import Tracker, flat
 
 MILLIVOLT_PER_VOLT = 1e3
 

@@ -7,13 +7,9 @@ from __future__ import annotations
 
 import json
 import math
-import platform
-import subprocess
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -21,11 +17,11 @@ from aesi.pipeline.sections import TrackingConfig
 from flows import environment
 from flows.mlflow_store import KIND, Store, now_ms
 from flows.outbox import Outbox
+from flows.provenance import source_tags
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 SAMPLE_S = 10.0
 FLUSH_S = 60.0
-VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect", "quantile-forest")
 
 
 class Trackable(Protocol):
@@ -239,34 +235,6 @@ def _belongs(store: Store, run_id: str) -> bool:
     except MlflowException:
         return False
     return True
-
-
-@cache
-def versions() -> str:
-    """The versions a result depends on, as one readable parameter."""
-    return ", ".join(
-        [f"python {platform.python_version()}", *(f"{name} {version(name)}" for name in VERSIONS)]
-    )
-
-
-@cache
-def source_tags() -> dict[str, str]:
-    """Git commit of the code in use, and whether the tree had changes; empty outside a repository."""
-    root = Path(__file__).resolve().parents[1]
-
-    def git(*arguments: str) -> str:
-        done = subprocess.run(
-            ["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=20, check=True
-        )
-        return done.stdout.strip()
-
-    tags = {"mlflow.source.name": "aesi", "mlflow.source.type": "PROJECT"}
-    try:
-        tags["mlflow.source.git.commit"] = git("rev-parse", "HEAD")
-        tags["aesi.dirty"] = str(bool(git("status", "--porcelain", "--untracked-files=no"))).lower()
-    except (OSError, subprocess.SubprocessError):
-        tags["aesi.dirty"] = "unknown"
-    return tags
 
 
 def flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

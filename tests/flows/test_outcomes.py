@@ -9,7 +9,9 @@ import time
 import pytest
 
 from aesi.errors import InputError
-from flows.outcomes import DatabaseOutcomes, FileOutcomes, open_outcomes, write_atomically
+from flows.database_outcomes import DatabaseOutcomes
+from flows.files import write_atomically
+from flows.outcomes import FileOutcomes, open_outcomes
 
 KEY = "ab" * 16
 
