@@ -119,7 +119,9 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
     if one.bands is not None:
         residuals = [r.series.error_v - r.free.error_v for r in test]
         whole = _interval_figures(test, [r.bands for r in test], residuals, one.bands.alpha)
-        row["free_run_intervals"] = whole | _left_out(one.bands.horizons[-1])
+        row["free_run_intervals"] = (
+            whole | _inside([r.bands for r in test], residuals) | _left_out(one.bands.horizons[-1])
+        )
         row["bands_by_horizon"] = {
             _seconds(band.horizon_s): _horizon_figures(one.bands, band, test, ahead[band.horizon_s])
             for band in one.bands.horizons
@@ -148,7 +150,19 @@ def _horizon_figures(
     bands: FreeRunBands, band: HorizonBand, test: Sequence[_Judged], left: Sequence[Array]
 ) -> dict[str, float]:
     intervals = [bands.intervals(r.series, r.free, band.horizon_s) for r in test]
-    return _interval_figures(test, intervals, left, bands.alpha) | _left_out(band)
+    figures = _interval_figures(test, intervals, left, bands.alpha)
+    return figures | _inside(intervals, left) | _left_out(band)
+
+
+def _inside(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
+    """Coverage of the rows inside the trained range, where alone the band promises any; NaN without such rows."""
+    covered = [
+        each.covers(residual)[each.warm & np.isfinite(residual)]
+        for each, residual in zip(intervals, residuals, strict=True)
+        if each is not None
+    ]
+    inside = _joined(covered)
+    return {"inside_coverage_pct": 100.0 * float(np.mean(inside)) if inside.size else float("nan")}
 
 
 def _left_out(band: HorizonBand) -> dict[str, float]:

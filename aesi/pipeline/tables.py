@@ -7,7 +7,8 @@ absent; beyond the published schema a row may carry
     one_step   {train,valid,test}_rmse_mv, persistence_rmse_mv (test)
     k_step     {"1": mV, "10": mV, ...}: test RMSE by horizon in seconds; likewise k_step_persistence
     intervals  nominal_pct, coverage_pct, average_width_v, winkler_v, worst_bin_coverage_pct (one step ahead)
-    free_run_intervals   the same keys, in free run; with pieces and worst_piece_coverage_pct of the calibration
+    free_run_intervals   the same keys, in free run; with inside_coverage_pct, and pieces and
+                         worst_piece_coverage_pct of the calibration
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
     spread     {"seeds": n, "test_mser_pct": [low, high]}
     seconds    wall time of fit and evaluation
@@ -98,11 +99,13 @@ def free_run_band_table(models: Sequence[Row]) -> Table:
     caption = (
         "Prediction bands on the test set. Regime: the measured voltage is given once, the stated time before "
         "the sample that is predicted, and not again; whole drive: a free run from the first sample. Worst bin: the "
-        "lowest coverage in any (current, SOC) bin. Pieces: how many calibrated the band, and the lowest coverage "
-        "among them when each is left out; one drive may scatter as far."
+        "lowest coverage in any (current, SOC) bin. Inside: of the samples within the trained range of inputs; outside "
+        "of it no band is calibrated. Pieces: how many calibrated the band, and the lowest coverage among them when "
+        "each is left out; one drive may scatter as far."
     )
     columns = [
         *_interval_columns("bands"),
+        ("coverage inside, %", lambda row: _number(row, "bands.inside_coverage_pct", 2)),
         ("pieces", lambda row: _number(row, "bands.pieces", 0)),
         ("worst piece, %", lambda row: _number(row, "bands.worst_piece_coverage_pct", 1)),
     ]
