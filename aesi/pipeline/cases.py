@@ -14,6 +14,9 @@ from aesi.pipeline.load import cell_path, locator, virtual_experiment
 from aesi.pipeline.sections import DiscoverConfig
 from aesi.records import Measurement
 
+MOST_ROWS = 240_000
+"""A hypothesis is simulated hundreds of times: more rows than these take hours, and tell hardly more."""
+
 
 def case_of_files(
     cell: Path,
@@ -27,8 +30,10 @@ def case_of_files(
     seed: int = 0,
     effect_files: Sequence[Path] = (),
 ) -> Case:
-    """A case of measurement files."""
-    read = [read_measurement(path, columns, sign) for path in (*data, *tests)]
+    """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told."""
+    paths = (*data, *tests)
+    rows = MOST_ROWS // max(1, len(paths))
+    read = [read_measurement(path, columns, sign, max_rows=rows) for path in paths]
     return Case(
         cell,
         tuple(read[: len(data)]),

@@ -119,23 +119,11 @@ def test_a_flow_runs_under_prefect(tracked, finished, monkeypatch):
 
 
 @pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="needs two cores")
-def test_two_processes_do_at_least_1_6_times_the_work_of_one(tracked):
+def test_two_dask_workers_do_at_least_1_6_times_the_work_of_one(tracked):
     if os.getloadavg()[0] > 0.7 * (os.cpu_count() or 1) or psutil.cpu_percent(2.0) > 40:
         pytest.skip("the machine is busy with something else")
-    from aesi.pipeline.config import read_experiment
-    from aesi.pipeline.fit import build_problem
-    from aesi.pipeline.load import load
-    from flows.console import Console
-    from flows.studies import run_study
+    from flows import benchmarks
 
     smoke = Path(__file__).resolve().parents[2] / "experiments" / "smoke.yaml"
-    heavier = ["library.p_c=[0, 2]", "library.d=[1, 3]", "search.resamples=100", "search.candidates=24"]
-    config = read_experiment(smoke, [*heavier, "search.population=12", "data.dt_s=1.0"])
-    problem = build_problem(load(config), config)
-    seconds = {}
-    for workers in (1, 2):
-        several = config.model_copy(update={"search": config.search.model_copy(update={"workers": workers})})
-        started = time.monotonic()
-        run_study(problem, several, Console(), reuse=False)
-        seconds[workers] = time.monotonic() - started
-    assert seconds[1] / seconds[2] >= 1.6, seconds
+    (line,) = benchmarks.run("scale", experiment=str(smoke))
+    assert line["ratio"] >= 1.6, line
