@@ -8,7 +8,7 @@ says by how much. `score_ratio` is against the best constant width in hindsight,
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from time import process_time
@@ -76,13 +76,17 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
 
 
 def run(
-    cell: str = "experiments/cells/nmc_30ah.bpx.json", cells: int = 40, seed: int = 0, **_: Any
+    cell: str = "experiments/cells/nmc_30ah.bpx.json",
+    cells: int = 40,
+    layouts: Sequence[Layout] = get_args(Layout),
+    seed: int = 0,
+    **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """cell : BPX file of the declared cell.  cells : virtual cells a layout."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
-        for layout in get_args(Layout):
+        for layout in layouts:
             splits = virtual_splits(Cell.from_bpx(cell), layout, cells, seed)
             errors = [e for e in map(_errors, splits) if e is not None]
             for name, design in DESIGNS.items():

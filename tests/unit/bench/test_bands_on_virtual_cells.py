@@ -1,0 +1,37 @@
+"""The benchmark of free-run bands, on one virtual cell."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from aesi.bench.bands import DESIGNS, HORIZONS_S, run
+from aesi.bench.virtual_drives import virtual_splits
+from aesi.physics import Cell
+
+
+@pytest.fixture(scope="module")
+def cell(request):
+    return request.config.rootpath / "experiments" / "cells" / "nmc_30ah.bpx.json"
+
+
+def test_every_horizon_and_design_has_a_line(cell) -> None:
+    lines = list(run(cell=str(cell), cells=1, layouts=["repeats"]))
+    assert len(lines) == len(DESIGNS) * (len(HORIZONS_S) + 1)
+    for line in lines:
+        assert 0 < line["coverage_pct"] <= 100
+        assert line["interval_score_mv"] >= line["width_mv"] > 0
+
+
+def test_cells_of_one_seed_are_the_same_and_differ_among_each_other(cell) -> None:
+    declared = Cell.from_bpx(cell)
+    first, again = (list(virtual_splits(declared, "repeats", 2, seed=3)) for _ in range(2))
+    assert [s.train[0].digest for s in first] == [s.train[0].digest for s in again]
+    assert first[0].train[0].digest != first[1].train[0].digest
+
+
+def test_test_repeats_lie_between_training_repeats_in_charge(cell) -> None:
+    (split,) = virtual_splits(Cell.from_bpx(cell), "repeats", 1)
+    for (before, after), test in zip(pairwise(split.train), split.test, strict=True):
+        assert before.soc[-1] >= test.soc[0] > test.soc[-1] >= after.soc[0]
+    assert np.abs(split.test[0].error_v).max() < 0.5
