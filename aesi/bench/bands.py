@@ -97,7 +97,7 @@ def run(
                     figures = np.array(
                         [_judged(e.test, w, horizon) for e, w in zip(errors, widths, strict=True)]
                     )
-                    yield _line(layout, name, horizon, figures) | {"fit_s": round(fit_s, 4)}
+                    yield _line(layout, name, horizon, seed, figures) | {"fit_s": round(fit_s, 4)}
 
 
 def _errors(split: Split) -> _Errors | None:
@@ -130,13 +130,14 @@ def _judged(test: HonestErrors, widths: HalfWidths, horizon: float) -> tuple[flo
     )
 
 
-def _line(layout: str, design: str, horizon: float, figures: Array) -> dict[str, Any]:
+def _line(layout: str, design: str, horizon: float, seed: int, figures: Array) -> dict[str, Any]:
     coverage, width, score, worst, ratio = figures.T
     return {
         "layout": layout,
         "method": design,
         "horizon_s": horizon if isfinite(horizon) else None,
         "cells": len(figures),
+        "seed": seed,
         "coverage_pct": round(100 * float(coverage.mean()), 2),
         "coverage_sd_pct": round(100 * float(coverage.std()), 2),
         "width_mv": round(MV * float(width.mean()), 3),

@@ -1,9 +1,9 @@
 """Virtual cells by the dozen, quickly: one drive, and cells that differ at random from what is declared.
 
 The measurement is the project's own simulation of the declared cell with effects added, and noise on the
-voltage: a second a cell, where the laboratory's porous-electrode model takes minutes. The error series are
-smooth functions of the states with hysteresis and heat, as on real cells; they are for ranking designs of the
-error model and its bands, not for judging the physics.
+voltage, where the laboratory solves a porous-electrode model. The error series are smooth functions of the states
+with hysteresis and heat, as on real cells; they are for ranking designs of the error model and its bands, not for
+judging the physics.
 """
 
 from __future__ import annotations

@@ -43,6 +43,7 @@ WATCHED = {
     "spci": Watch(
         ("method", "n_calibration", "n_test"), higher={"ratio": TIMING}, lower={"score_ratio": RESULT}
     ),
+    "bands": Watch(("layout", "horizon_s", "method", "cells", "seed"), lower={"score_ratio": RESULT}),
     "blind": Watch(
         ("summary", "cases"),
         higher={"effect_right_pct": RATE, "none_right_pct": RATE, "unknown_right_pct": RATE},
