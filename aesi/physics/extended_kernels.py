@@ -73,7 +73,7 @@ def run_general(  # type: ignore[no-untyped-def]
         y[u] = share[u] * current[0] / area * (1.0 if units[u, 0] == 0 else -1.0)
     t_k = temperature[0]
     t_weights, faster = -1.0, np.ones(3)
-    watts = 0.0
+    watts, last_j = 0.0, current[0] / area
     before, last_step = np.zeros(n_e), 0.0
     fault_at, fault = -1, 0
     for k in range(time.shape[0]):
@@ -140,7 +140,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 lo, hi = (0, split) if side == 0 else (split, n_units)
                 total = j1 if side == 0 else -j1
                 for u in range(lo, hi):  # start from the last deviations
-                    held = y[u] - share[u] * (j0 if side == 0 else -j0) if k > 0 else 0.0
+                    held = y[u] - share[u] * (last_j if side == 0 else -last_j)
                     y[u] = share[u] * total + held
                 drops(ohm_solid[side], ohm_salt[side], kappa, side * regions, contrast, ohm)
                 phi = solve_electrode(
@@ -163,6 +163,7 @@ def run_general(  # type: ignore[no-untyped-def]
                             for j in range(n_modes):
                                 z[u, j] -= gains[u, j] * (w[slot, u, 1, j] + w[slot, u, 2, j]) * extra
                             means[u] -= lump[u] * dt * extra
+            last_j = j1
             if plating[0] > 0.0:
                 for r in range(regions):
                     plated[r] = max(plated[r] - plating_to_c * plating_current[r] * dt, 0.0)

@@ -155,3 +155,12 @@ def test_arrays_that_cannot_be_simulated_are_refused(nmc, time, current, words):
 def test_neither_state_of_charge_nor_rest_voltage_is_refused(nmc):
     with pytest.raises(DataError, match="rest_voltage_v"):
         simulate(nmc, np.arange(3.0), np.zeros(3))
+
+
+@pytest.mark.parametrize("hold", ["linear", "backward"])
+def test_lithium_leaves_as_charge_where_the_temperature_was_measured(nmc, load, hold):
+    time, current = load
+    warm = 25.0 + 2.0 * np.sin(time / 300.0)
+    run = simulate(nmc, time, current, soc0=0.9, temperature_degc=warm, hold=hold)
+    plain = simulate(nmc, time, current, soc0=0.9, hold=hold)
+    assert run.series["soc"] == pytest.approx(plain.series["soc"], abs=1e-9)
