@@ -47,13 +47,14 @@ def _stages(
     from aesi.pipeline.evaluate import evaluate
     from aesi.pipeline.fit import build_problem, final_models
     from aesi.pipeline.load import load
+    from aesi.pipeline.notes import together
     from aesi.pipeline.outputs import Result, write_outputs
     from flows.cache import Cache
     from flows.studies import run_study
     from flows.tracked import CandidateTracker, track_result, track_start
 
     loaded = run("data and physics", lambda: load(config), retries=2)
-    for note in loaded.notes:
+    for note in together(loaded.notes):
         console.say(f"  {note}")
     track_start(tracker, config, loaded)
     problem = run("library and resamples", lambda: build_problem(loaded, config))

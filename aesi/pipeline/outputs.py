@@ -17,6 +17,7 @@ from aesi.pipeline.figures import paper_figures
 from aesi.pipeline.fit import Fitted
 from aesi.pipeline.hybrid import HybridModel
 from aesi.pipeline.load import Loaded
+from aesi.pipeline.notes import together
 from aesi.pipeline.report import write_figures, write_run_report
 from aesi.pipeline.report.views import BootstrapView, RunView, Trace
 from aesi.sparse import Candidate, Problem, SparseModel
@@ -86,7 +87,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
 def notes(result: Result) -> tuple[str, ...]:
     """What a reader should know: of the data, of terms left out, of intervals that could not be calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
-    return (*result.loaded.notes, *result.problem.notes, *without_intervals)
+    return together((*result.loaded.notes, *result.problem.notes, *without_intervals))
 
 
 def published(name: str) -> str:
