@@ -2,8 +2,8 @@
 
 Full and empty are defined by the rest voltages of the declared windows, or by an electrode that is full or
 empty before they are reached. At both, the lithium in the two electrodes
-together is what is left of it; at full the loss of active material leaves the stoichiometries where they are
-(the material goes with the lithium it holds when the cell is full), the loss of lithium does not.
+together is what is left of it. Active material goes with the lithium it holds, at a state of charge at which the loss
+leaves the stoichiometries where they are.
 Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
 """
 
@@ -15,10 +15,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from aesi.errors import SimulationError
+from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 
 EDGE = 1e-6
 SOC_BEYOND = 0.05
+GRID = 257
 
 
 def without_lithium(cell: Cell, fraction: float) -> Cell:
@@ -34,17 +36,24 @@ def without_lithium(cell: Cell, fraction: float) -> Cell:
     return _with_windows(cell, _at(cell, lithium, full), _at(cell, lithium, empty))
 
 
-def with_active_material(cell: Cell, negative: float, positive: float) -> Cell:
-    """The cell with fractions of its active material left (1 = all), full at the same stoichiometries."""
+def with_active_material(cell: Cell, negative: float, positive: float, lost_at_soc: float = 1.0) -> Cell:
+    """The cell with fractions of its active material left (1 = all).
+
+    lost_at_soc : state of charge at which the material went, with the lithium that it held there; the stoichiometries
+    of that state stay.  Full and empty are at the declared rest voltages again.
+    """
     if negative == 1.0 and positive == 1.0:
         return cell
-    empty = float(cell.rest_voltage_v(0.0)[0])
+    full, empty = (float(cell.rest_voltage_v(s)[0]) for s in (1.0, 0.0))
     n, p = cell.negative, cell.positive
     aged = cell.with_negative(area_per_volume_1_m=n.area_per_volume_1_m * negative)
     aged = aged.with_positive(area_per_volume_1_m=p.area_per_volume_1_m * positive)
     q_n, q_p = aged.electrode_capacity_ah(aged.negative), aged.electrode_capacity_ah(aged.positive)
-    lithium = q_n * n.theta_max + q_p * p.theta_min
-    return _with_windows(aged, (n.theta_max, p.theta_min), _at(aged, lithium, empty))
+    x_n = n.theta_min + lost_at_soc * (n.theta_max - n.theta_min)
+    x_p = p.theta_max - lost_at_soc * (p.theta_max - p.theta_min)
+    lithium = q_n * x_n + q_p * x_p
+    kept = (n.theta_max, p.theta_min) if lost_at_soc == 1.0 else _at(aged, lithium, full)
+    return _with_windows(aged, kept, _at(aged, lithium, empty))
 
 
 def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
@@ -87,29 +96,32 @@ def _at(cell: Cell, lithium_ah: float, voltage_v: float) -> tuple[float, float]:
     """Stoichiometries (negative, positive) that hold `lithium_ah` together and rest at `voltage_v`."""
     q_n, q_p = cell.electrode_capacity_ah(cell.negative), cell.electrode_capacity_ah(cell.positive)
 
-    def positive(theta_n: float) -> float:
+    def positive(theta_n: Array) -> Array:
         return (lithium_ah - q_n * theta_n) / q_p
 
-    def excess(theta_n: float) -> float:
-        u_p, u_n = cell.positive.ocp, cell.negative.ocp
-        return float((u_p(np.array([positive(theta_n)])) - u_n(np.array([theta_n])))[0]) - voltage_v
+    def excess(theta_n: Array) -> Array:
+        return cell.positive.ocp(positive(theta_n)) - cell.negative.ocp(theta_n) - voltage_v
 
     low = max(EDGE, (lithium_ah - q_p * (1.0 - EDGE)) / q_n)
     high = min(1.0 - EDGE, (lithium_ah - q_p * EDGE) / q_n)
     theta_n = _root(excess, low, high, cell.name)
-    return theta_n, positive(theta_n)
+    return theta_n, (lithium_ah - q_n * theta_n) / q_p
 
 
-def _root(excess: Callable[[float], float], low: float, high: float, name: str) -> float:
+def _root(excess: Callable[[Array], Array], low: float, high: float, name: str) -> float:
+    """Where a rising function crosses nought, or the nearer end; a grid narrows the bracket in one evaluation."""
     if not low < high:
         raise SimulationError(
             f"{name}: after this loss no stoichiometries are left; a smaller loss is needed."
         )
-    if excess(low) >= 0.0:
+    grid = np.linspace(low, high, GRID)
+    values = excess(grid)
+    if values[0] >= 0.0:
         return low
-    if excess(high) <= 0.0:
+    if values[-1] <= 0.0:
         return high
-    return float(brentq(excess, low, high, xtol=1e-13))
+    k = int(np.flatnonzero(values > 0.0)[0])
+    return float(brentq(lambda x: float(excess(np.array([x]))[0]), grid[k - 1], grid[k], xtol=1e-13))
 
 
 def _with_windows(cell: Cell, full: tuple[float, float], empty: tuple[float, float]) -> Cell:

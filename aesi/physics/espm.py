@@ -92,8 +92,15 @@ def _model_with(cell: Cell, effects: tuple[ActiveEffect, ...]) -> EspmModel:
     model = EspmModel(cell)
     for active in effects:
         if active.effect.on_model is not None:
-            model = active.effect.on_model(model, **active.parameters)
+            model = _changed(model, active)
     return model
+
+
+@lru_cache(maxsize=256)
+def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
+    """One effect's change; the records of a case share all but the last of them."""
+    assert active.effect.on_model is not None
+    return active.effect.on_model(model, **active.parameters)
 
 
 def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:

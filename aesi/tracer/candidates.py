@@ -38,17 +38,33 @@ class Candidate:
 
 
 def ranking(
-    search: Search, steps: Sequence[Scored], verdict: Verdict, test_rmse: Callable[[Fit], float]
+    search: Search,
+    steps: Sequence[Scored],
+    verdict: Verdict,
+    test_rmse: Callable[[Fit], float],
+    moved: Mapping[str, float],
 ) -> tuple[Candidate, ...]:
     """Rows for every effect that could be fitted, best first.
 
     An effect of the verdict is shown as it stands in the chosen hypothesis, another one alone or beside the
-    chosen.
+    chosen.  moved : parameters that every hypothesis had free and that mattered, with the nats that they bring.
     """
     base, chosen = steps[0], steps[-1]
     sizes = {1, max(len(chosen.hypothesis), 1)}
-    rows = []
-    for effect in search.problem.effects:
+    kinds = search.problem.effects
+    rows = [
+        Candidate(
+            name,
+            str(kinds[name].kind),
+            nats,
+            test_rmse(chosen.fit),
+            estimates(chosen.fit, name),
+            (),
+            "recalibrated in every hypothesis",
+        )
+        for name, nats in moved.items()
+    ]
+    for effect in search.problem.competing:
         held = [
             s
             for s in search.scored.values()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,17 +14,26 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Hold, Measurement, Run
+from aesi.tracer import second_look
 from aesi.tracer.candidates import Candidate, ranking
 from aesi.tracer.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.explain import Explained, explain
 from aesi.tracer.fit import Fit, fit_hypothesis
-from aesi.tracer.knobs import SOC0
 from aesi.tracer.outcome import FileOutcome, States, outcomes, polarisation_v, simulated, test_rmse_v
 from aesi.tracer.problem import TOLERANCES, Problem
 from aesi.tracer.records import Record, noise_floor_v, prepare_all, prepare_test
-from aesi.tracer.search import Admission, Archive, Scored, Search, context_of, select
+from aesi.tracer.search import (
+    EVIDENCE_NATS,
+    Admission,
+    Archive,
+    Breadth,
+    Scored,
+    Search,
+    context_of,
+    select,
+)
 from aesi.tracer.tell_apart import experiment
-from aesi.tracer.verdict import Verdict, judge, tolerance_v
+from aesi.tracer.verdict import Verdict, beyond, judge, tolerance_v
 
 NUMERICS = "numerical_error"
 NUMERICS_SHARE = 0.1
@@ -102,16 +111,73 @@ def discover(
     problem = _refined(Problem(cell, records, tried, fixed=tuple(given)), effects.get(NUMERICS))
     _check_cells(problem, tested)
     problem = _with_noise_of_residual(problem)
+    another = second_look.is_possible(problem)
+    breadth = second_look.FIRST if another else Breadth()
+    looked = _look(problem, max_effects, seed, archive, progress, breadth)
+    if another and looked.verdict.word == "unknown":
+        looked = _look_again(looked, max_effects, seed, archive, progress)
+    return _told(looked, tested, time.perf_counter() - began)
+
+
+@dataclass(frozen=True, eq=False)
+class _Looked:
+    """A finished search and what it allows one to say.
+
+    steps : hypotheses chosen after each addition.  chosen : what `after` is.  recalibrated : the model with its own
+    parameters free.  moved : own parameters of it that mattered, with the evidence that they bring (nats).
+    """
+
+    search: Search
+    steps: list[Scored]
+    verdict: Verdict
+    chosen: Scored
+    recalibrated: Fit
+    moved: Mapping[str, float] = field(default_factory=dict)
+
+
+def _look(
+    problem: Problem,
+    max_effects: int,
+    seed: int,
+    archive: Path | None,
+    progress: Progress | None,
+    breadth: Breadth,
+) -> _Looked:
+    noise_v = _noise_v(problem)
     search = Search(problem, np.random.default_rng(seed), Archive(archive, context_of(problem)))
+    steps, verdict = _searched(search, max_effects, progress, breadth, noise_v)
+    chosen = search.fit(verdict.effects) or steps[0]
+    return _Looked(search, steps, verdict, chosen, _recalibrated(problem, steps[0].fit))
+
+
+def _look_again(
+    first: _Looked, max_effects: int, seed: int, archive: Path | None, progress: Progress | None
+) -> _Looked:
+    """The search once more, on top of a recalibrated model."""
+    problem, noise_v = second_look.freed(first.search.problem), _noise_v(first.search.problem)
+    archived = Archive(archive, context_of(problem))
+    search = second_look.SecondSearch(problem, np.random.default_rng(seed), archived)
+    steps, verdict = _searched(search, max_effects, progress, second_look.BREADTH, noise_v)
+    nats = second_look.nats_of_potential(problem, steps[0].fit)
+    moved = {second_look.OCP: nats} if nats >= EVIDENCE_NATS else {}
+    left = [beyond(scored, noise_v) for scored in (first.steps[0], steps[0], steps[-1])]
+    verdict = second_look.reworded(verdict, steps[-1].hypothesis, moved, left)
+    return _Looked(search, steps, verdict, steps[-1], steps[0].fit, moved)
+
+
+def _searched(
+    search: Search, max_effects: int, progress: Progress | None, breadth: Breadth, noise_v: float
+) -> tuple[list[Scored], Verdict]:
+    problem = search.problem
     if progress is not None:
         search.report = lambda scored, admission: progress("+".join(scored.hypothesis), scored, admission)
-    steps = select(search, max_effects, lambda base, current: _explained_enough(problem, base, current))
+    enough = lambda base, current: _explained_enough(problem, base, current)  # noqa: E731
+    steps = select(search, max_effects, enough, breadth)
     if steps is None:
         raise DataError(
-            f"the model of {cell.name} cannot be simulated on {records[0].name}; check the cell file."
+            f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
         )
-    verdict = judge(search, steps, _noise_v(problem), polarisation_v(problem, steps[-1].fit))
-    return _told(search, steps, verdict, tested, time.perf_counter() - began)
+    return steps, judge(search, steps, noise_v, polarisation_v(problem, steps[-1].fit))
 
 
 def _refined(problem: Problem, numerics: Effect | None) -> Problem:
@@ -165,27 +231,25 @@ def _recalibrated(problem: Problem, base: Fit) -> Fit:
     return fit_hypothesis(problem, own) or base
 
 
-def _told(
-    search: Search, steps: Sequence[Scored], verdict: Verdict, tested: Sequence[Record], seconds: float
-) -> Discovery:
+def _told(looked: _Looked, tested: Sequence[Record], seconds: float) -> Discovery:
+    search, verdict, chosen = looked.search, looked.verdict, looked.chosen
     problem = search.problem
-    chosen = search.fit(verdict.effects) or steps[0]
-    shown = (*steps, chosen) if verdict.effects else steps
-    own = _recalibrated(problem, steps[0].fit)
-    fits: States = {"before": None, "recalibrated": own, "after": chosen.fit}
-    values = chosen.fit.values
+    shown = (*looked.steps, chosen) if verdict.effects else looked.steps
+    fits: States = {"before": None, "recalibrated": looked.recalibrated, "after": chosen.fit}
     kinds = {k: str(e.kind) for k, e in problem.effects.items()}
-
+    cell, model_effects, soc0 = second_look.settled(problem, chosen.fit)
     return Discovery(
-        cell=problem.cell,
+        cell=cell,
         verdict=verdict,
-        candidates=ranking(search, shown, verdict, lambda fit: test_rmse_v(problem, fit, tested)),
+        candidates=ranking(
+            search, shown, verdict, lambda fit: test_rmse_v(problem, fit, tested), looked.moved
+        ),
         files=outcomes(problem, fits, tested, search.rng),
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in problem.records]))),
         explained_before=_explained(problem, None),
         explained_after=_explained(problem, chosen.fit),
-        model_effects=problem.active(values),
-        soc0=values[SOC0]["0"],
+        model_effects=model_effects,
+        soc0=soc0,
         hold=problem.records[0].hold,
         effects=problem.effects,
         experiments=tuple((g, experiment(g, kinds)) for g in verdict.groups),

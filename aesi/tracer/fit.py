@@ -19,6 +19,8 @@ TOLERATED_STEP = 0.2
 GAIN_NATS = 0.1
 """A descent stops when a step gains less than this in log-likelihood."""
 NOISE_ROUNDS = 2
+REPEATS = 100
+"""Samples over which what a model misses stays the same, at the one sample a second that fits see."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +145,10 @@ class Fitter:
 
         return descend(linearise, cost, x0, self.low, self.high, steps, GAIN_NATS).x
 
+    def repeated(self, model_error_v: float) -> list[ColouredNoise]:
+        """The model's own error, whose samples repeat one another, as white noise that says as little."""
+        return [ColouredNoise(model_error_v * REPEATS**0.5, 1e-9, 100.0)] * len(self.problem.records)
+
     def noise_of(self, residual: Array, start: Sequence[ColouredNoise] | None = None) -> list[ColouredNoise]:
         """The noise model of each record's residual."""
         out = []
@@ -152,19 +158,19 @@ class Fitter:
         return out
 
     def white(self, residual: Array) -> list[ColouredNoise]:
-        """Plain least squares: every sample counts, at the scale of the residual of its record."""
+        """Plain least squares: every sample counts, at the scale of the residual of its record or the model's error."""
+        if self.problem.model_error_v is not None:
+            return [ColouredNoise(self.problem.model_error_v, 1e-9, 100.0)] * len(self.problem.records)
         return [
             ColouredNoise(max(float(np.sqrt(np.mean(residual[rows] ** 2))), r.noise_v), 1e-9, 100.0)
             for rows, r in zip(self.problem.slices, self.problem.records, strict=True)
         ]
 
 
-def fit_hypothesis(
-    problem: Problem, hypothesis: Hypothesis, warm: Sequence[Array] = (), *, budget: int = 8
-) -> Fit | None:
+def fit_hypothesis(problem: Problem, hypothesis: Hypothesis, warm: Sequence[Array] = ()) -> Fit | None:
     """The best fit of a hypothesis over several starts, or None where no start can be simulated.
 
-    warm : further starting vectors, in the knobs' order.  budget : steps of a descent.
+    warm : further starting vectors, in the knobs' order.
     """
     fitter = Fitter(problem, hypothesis)
     best: tuple[float, Array] | None = None
@@ -172,19 +178,21 @@ def fit_hypothesis(
         e = fitter.residual(np.clip(x0, fitter.low, fitter.high))
         if e is None:
             continue
-        x = fitter.descend(x0, fitter.white(e), budget)
+        x = fitter.descend(x0, fitter.white(e), problem.steps)
         e = fitter.residual(x)
         if e is not None and (best is None or float(e @ e) < best[0]):
             best = float(e @ e), x
-    return None if best is None else _polish(fitter, best[1], budget)
+    return None if best is None else _polish(fitter, best[1])
 
 
-def _polish(fitter: Fitter, x: Array, budget: int) -> Fit | None:
+def _polish(fitter: Fitter, x: Array) -> Fit | None:
     e = fitter.residual(x)
     assert e is not None
-    noise = fitter.noise_of(e)
-    for _ in range(NOISE_ROUNDS):
-        x = fitter.descend(x, noise, max(budget // 2, 3))
+    noise, rounds = fitter.noise_of(e), NOISE_ROUNDS
+    if fitter.problem.model_error_v is not None:
+        noise, rounds = fitter.repeated(fitter.problem.model_error_v), 0
+    for _ in range(rounds):
+        x = fitter.descend(x, noise, max(fitter.problem.steps // 2, 3))
         e = fitter.residual(x)
         assert e is not None
         noise = fitter.noise_of(e, noise)

@@ -42,7 +42,11 @@ class Problem:
 
     effects : id -> Effect, everything that may be tried.  tolerances : see TOLERANCES.  fixed : effects that
     are in
-    every simulation (finer numerics, where the declared ones do not suffice).
+    every simulation (finer numerics, where the declared ones do not suffice).  nuisances : effects that are there for
+    their tolerance alone and do not compete.
+    model_error_v : what the model is known to miss (V): fits are then plain least squares at this weight, because a
+    residual's memory is the model's fault and not the sensor's. None lets the residual's own memory decide.
+    steps : of a descent.  judged : records whose blocks are held out when a fit is judged on unseen data (None: all).
     """
 
     cell: Cell
@@ -50,6 +54,15 @@ class Problem:
     effects: Mapping[str, Effect]
     tolerances: Mapping[str, Mapping[str, float] | float] = field(default_factory=lambda: dict(TOLERANCES))
     fixed: tuple[ActiveEffect, ...] = ()
+    nuisances: frozenset[str] = frozenset()
+    model_error_v: float | None = None
+    steps: int = 8
+    judged: tuple[int, ...] | None = None
+
+    @property
+    def competing(self) -> tuple[str, ...]:
+        """Ids of the effects that may be found."""
+        return tuple(name for name in self.effects if name not in self.nuisances)
 
     def parameters(self, effect: str) -> Mapping[str, Parameter]:
         """The declared parameters of an effect."""

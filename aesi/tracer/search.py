@@ -17,11 +17,6 @@ from aesi.tracer.knobs import placed_in, starts
 from aesi.tracer.problem import Hypothesis, Problem
 from aesi.tracer.score import held_out_rmse_v, placebo_gain, structured_v
 
-ABREAST = 3
-"""Hypotheses of a size that are grown further: the best single effect need not be half of the best pair."""
-GROWN_FULLY = 6
-ABREAST_WHEN_LOST, GROWN_WHEN_LOST = 2, 4
-"""Effects that are fitted in full on top of each of them, the most promising by a linear estimate."""
 EVIDENCE_NATS = 10.0
 """What an effect has to bring beyond its own complexity: the price of having tried some twenty others."""
 MATERIAL_SHARE = 0.35
@@ -30,6 +25,27 @@ PLACEBO_FACTOR = 2.0
 """An effect brings this many times what a placebo brings, or leaves at most its inverse of what a placebo
 leaves."""
 PLACEBO_MARGIN_SHARE = 0.25
+RICHER = 3
+"""Parameters more, from which on a hypothesis is a flexible curve beside a plain one."""
+WITHIN_MODEL_SHARE = 0.4
+"""What a flexible curve takes off beyond a plain effect, as a share of the noise, that may be the model's own error."""
+
+
+@dataclass(frozen=True)
+class Breadth:
+    """How widely a search looks.
+
+    singles : effects that are fitted alone, the most promising by a linear estimate (None: all).  abreast : hypotheses
+    of a size that are grown further, since the best single effect need not be half of the best pair.  grown : effects
+    that are fitted in full on top of each of them.  lost : abreast and grown where not one effect was admitted.
+    least_share : of the structured variance that the best effect so far has to explain for the search to go on.
+    """
+
+    singles: int | None = None
+    abreast: int = 3
+    grown: int = 6
+    lost: tuple[int, int] = (2, 4)
+    least_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +65,16 @@ class Scored:
     def evidence(self) -> float:
         """Nats."""
         return self.fit.log_evidence
+
+
+def only_by_freedom(plain: Scored, richer: Scored, noise_v: float) -> bool:
+    """True where `richer` does better than `plain` by so little that its many parameters may follow the model's error.
+
+    Thousands of samples make nats of tenths of a millivolt, and no two models agree to that.
+    """
+    more = len(richer.fit.knobs) - len(plain.fit.knobs)
+    better = plain.held_out_rmse_v**2 - richer.held_out_rmse_v**2
+    return more >= RICHER and better <= (WITHIN_MODEL_SHARE * noise_v) ** 2
 
 
 @dataclass(frozen=True)
@@ -105,6 +131,7 @@ def context_of(problem: Problem) -> str:
         repr(problem.cell),
         repr(sorted(problem.effects)),
         repr(sorted(problem.tolerances.items(), key=str)),
+        f"{problem.model_error_v} {problem.steps} {problem.judged}",
     ]
     pieces += [f"{r.data.digest}{r.n_fit}{r.soc0}{r.soc0_sd}{r.noise_v}" for r in problem.records]
     return digest(np.frombuffer("".join(pieces).encode(), dtype=np.uint8).astype(float))
@@ -125,6 +152,11 @@ class Search:
     notes: list[str] = field(default_factory=list)
     admissions: dict[tuple[frozenset[str], frozenset[str]], Admission] = field(default_factory=dict)
 
+    @property
+    def noise_v(self) -> float:
+        """Mean white noise of the records, V."""
+        return float(np.mean([r.noise_v for r in self.problem.records]))
+
     def fit(self, hypothesis: Hypothesis, warm: Iterable[Array] = ()) -> Scored | None:
         """Fit once; the order in which effects were added does not matter to the fit."""
         key = frozenset(hypothesis)
@@ -144,7 +176,7 @@ class Search:
 
     def grow(self, parent: Scored, limit: int | None = None) -> list[Scored]:
         """Full fits of `parent` plus one effect, for the `limit` most promising effects (None: all)."""
-        names = [n for n in self.problem.effects if n not in parent.hypothesis]
+        names = [n for n in self.problem.competing if n not in parent.hypothesis]
         if limit is not None:
             names = self._promising(parent, names)[:limit]
         children = []
@@ -174,11 +206,12 @@ class Search:
         base, _ = self.problem.whiten(np.column_stack([fit.residual_v, fit.jacobian]), fit.noise)
         for name in names:
             alone = self.scored.get(frozenset((name,)))
-            if alone is None:
+            does = self._responses(parent, name)
+            if alone is not None:
+                does += [alone.fit.jacobian[:, j] for j, k in enumerate(alone.fit.knobs) if k.owner == name]
+            if not does:
                 continue
-            mine = [j for j, k in enumerate(alone.fit.knobs) if k.owner == name]
-            does = np.column_stack([alone.fit.jacobian[:, mine], *self._responses(parent, name)])
-            extra, _ = self.problem.whiten(does, fit.noise)
+            extra, _ = self.problem.whiten(np.column_stack(does), fit.noise)
             columns = np.column_stack([base[:, 1:], extra])
             scale = np.linalg.norm(columns, axis=0) + 1e-300
             solution = np.linalg.lstsq(columns / scale, base[:, 0], rcond=1e-8)[0]
@@ -217,7 +250,7 @@ class Search:
         nats = child.evidence - parent.evidence
         gain = parent.held_out_rmse_v**2 - child.held_out_rmse_v**2
         placebo = placebo_gain(self.problem, parent.fit, child.fit, self.rng)
-        noise = float(np.mean([r.noise_v for r in self.problem.records]))
+        noise = self.noise_v
         left = max(child.held_out_rmse_v**2 - noise**2, (MATERIAL_SHARE * noise) ** 2)
         left_by_placebo = parent.held_out_rmse_v**2 - placebo - noise**2
         over = max(gain / max(placebo, 1e-4 * noise**2), left_by_placebo / left)
@@ -233,7 +266,12 @@ class Search:
         return Admission(not reasons, "; ".join(reasons), nats, root, float(np.sqrt(placebo)), over)
 
 
-def select(search: Search, max_effects: int, enough: Callable[[Scored, Scored], bool]) -> list[Scored] | None:
+def select(
+    search: Search,
+    max_effects: int,
+    enough: Callable[[Scored, Scored], bool],
+    breadth: Breadth | None = None,
+) -> list[Scored] | None:
     """Add effects one at a time while that is admitted and the rest is not explained well enough.
 
     enough : (empty hypothesis, current one) -> True where what is left is within what a model may miss; such a
@@ -243,22 +281,25 @@ def select(search: Search, max_effects: int, enough: Callable[[Scored, Scored], 
     be
     simulated. Two effects may come in one step, where neither shows without the other.
     """
+    breadth = breadth or Breadth()
     base = search.fit(())
     if base is None:
         return None
-    steps, front = [base], search.grow(base)
+    steps, front = [base], search.grow(base, breadth.singles)
     for size in range(1, max_effects + 1):
         needed = [s for s in front if _all_needed(search, s)]
         sufficient = [s for s in needed if enough(base, s)]
         best = max(sufficient or needed, key=lambda s: s.evidence, default=None)
+        plainer = [s for s in sufficient if best and only_by_freedom(s, best, search.noise_v)]
+        best = max(plainer, key=lambda s: s.evidence, default=best)
         if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
             steps.append(best)
-        hopeless = size > 1 and len(steps[-1].hypothesis) < size
+        left = (1.0 - breadth.least_share) * base.structured_v**2
+        hopeless = (size > 1 and len(steps[-1].hypothesis) < size) or steps[-1].structured_v ** 2 > left
         if size == max_effects or hopeless or enough(base, steps[-1]):
             break
-        lost = len(steps) == 1
-        parents = _abreast(front, steps[-1])[: ABREAST_WHEN_LOST if lost else ABREAST]
-        front = _grown(search, parents, GROWN_WHEN_LOST if lost else GROWN_FULLY)
+        abreast, grown = breadth.lost if len(steps) == 1 else (breadth.abreast, breadth.grown)
+        front = _grown(search, _abreast(front, steps[-1], abreast), grown)
     return steps
 
 
@@ -267,8 +308,8 @@ def _grown(search: Search, parents: list[Scored], limit: int) -> list[Scored]:
     return list({frozenset(c.hypothesis): c for c in children}.values())
 
 
-def _abreast(front: list[Scored], current: Scored) -> list[Scored]:
-    ranked = sorted(front, key=lambda s: -s.evidence)[:ABREAST]
+def _abreast(front: list[Scored], current: Scored, count: int) -> list[Scored]:
+    ranked = sorted(front, key=lambda s: -s.evidence)[:count]
     if current in front and current not in ranked:
         ranked = [current, *ranked[:-1]]
     return ranked

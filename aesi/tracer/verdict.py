@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from aesi.tracer.search import EVIDENCE_NATS, MATERIAL_SHARE, Scored, Search
+from aesi.tracer.search import EVIDENCE_NATS, MATERIAL_SHARE, Scored, Search, only_by_freedom
 
 Word = Literal["found", "none", "unknown"]
 
@@ -145,7 +145,7 @@ def _clear(search: Search, chosen: Scored, group: set[str]) -> bool:
     if any(bound.split(".")[0] in group for bound in chosen.fit.at_bounds):
         return False
     for other in search.scored.values():
-        if other is None or group & set(other.hypothesis):
+        if other is None or group & set(other.hypothesis) or only_by_freedom(chosen, other, search.noise_v):
             continue
         dearer = EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0)
         ahead = chosen.evidence - other.evidence + dearer
@@ -177,7 +177,7 @@ def _alike(search: Search, chosen: Scored, other: Scored, rest: frozenset[str]) 
     parent = search.scored.get(rest)
     if parent is None:
         return False
-    noise = float(np.mean([r.noise_v for r in search.problem.records]))
+    noise = search.noise_v
     worse = other.held_out_rmse_v**2 - chosen.held_out_rmse_v**2
     gain = parent.held_out_rmse_v**2 - chosen.held_out_rmse_v**2
     if worse > 0.5 * gain:
@@ -189,7 +189,7 @@ def _alike(search: Search, chosen: Scored, other: Scored, rest: frozenset[str]) 
 
 def _best_rival(search: Search, base: Scored) -> float:
     """Evidence, beyond the base, of the best hypothesis that would also be material."""
-    noise = float(np.mean([r.noise_v for r in search.problem.records]))
+    noise = search.noise_v
     best = -np.inf
     for other in search.scored.values():
         if other is not None and other.hypothesis:
@@ -208,6 +208,8 @@ def _confidence(
     lead = chosen.evidence - steps[0].evidence - EVIDENCE_NATS
     for other in search.scored.values():
         if other is None or other is chosen or _covered(chosen.hypothesis, other.hypothesis, twins):
+            continue
+        if only_by_freedom(chosen, other, search.noise_v):
             continue
         dearer = EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0)
         ahead = chosen.evidence - other.evidence + dearer

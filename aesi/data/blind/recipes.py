@@ -219,5 +219,5 @@ RECIPES: dict[str, Recipe] = {
         also=("ocp_shape",),
     ),
     "voltage_lag": Recipe("clock_skew", lambda m, q: {"lag_s": 0.3 * m}, instrument=_lag, most=10.0),
-    "clock_rate": Recipe("clock_skew", lambda m, q: {"skew": 0.02 * m}, instrument=_rate),
+    "clock_rate": Recipe("clock_skew", lambda m, q: {"skew": 0.02 * m}, instrument=_rate, most=4.0),
 }

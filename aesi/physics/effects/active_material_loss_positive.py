@@ -2,9 +2,9 @@
 
     a = (1 - loss) a_declared        a reactive area per volume, at the declared particle radius
 
-The full cell keeps its stoichiometries (the material goes with the lithium it holds then); empty follows
-from the declared rest voltage and the lithium left; a simulation starts from the
-rest voltage that soc0 declares.
+The material goes with the lithium that it holds at one state of charge, whose stoichiometries stay; full and empty
+follow from their declared rest voltages and the lithium left. A simulation starts from the rest voltage that soc0
+declares.
 
 Leaves out the change of porosity and conductivity. Holds for isolated or cracked-off particles.
 
@@ -24,13 +24,20 @@ PARAMETERS = {
         neutral=0.0,
         source="an electrode declared too small by 30 % to half of it gone",
         description="share of the declared active material",
-    )
+    ),
+    "lost_at_soc": Parameter(
+        1.0,
+        "dimensionless",
+        bounds=(0.0, 1.0),
+        source="lost while empty of lithium or while full of it, both are seen",
+        description="state of charge at which the material was lost",
+    ),
 }
 
 
-def lose_material(model: EspmModel, *, loss: float) -> EspmModel:
+def lose_material(model: EspmModel, *, loss: float, lost_at_soc: float) -> EspmModel:
     """The model with less active material in the positive electrode."""
-    return model.of(with_active_material(model.cell, 1.0, 1.0 - loss))
+    return model.of(with_active_material(model.cell, 1.0, 1.0 - loss, lost_at_soc))
 
 
 EFFECT = Effect("active_material_loss_positive", "parameter", __doc__, PARAMETERS, on_model=lose_material)

@@ -1,0 +1,203 @@
+"""A second look, where the declared parameters are off in many ways at once.
+
+The file of a real cell is rarely off in one thing. Where single effects leave a structured residual, and the data hold
+what a calibration needs (a slow, nearly full discharge), the model's own parameters and its open-circuit potential are
+freed for every hypothesis, the empty one included. That empty hypothesis is the recalibrated model, and what is
+missing from the physics competes on top of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from aesi.physics.balance import same_rest
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.effects import CATALOGUE
+from aesi.physics.espm import model_with
+from aesi.tracer.fit import Fit, fit_hypothesis
+from aesi.tracer.knobs import SOC0, placed_in
+from aesi.tracer.ocp_correction import EFFECT as OCP_CORRECTION
+from aesi.tracer.problem import TOLERANCES, Problem
+from aesi.tracer.records import Record
+from aesi.tracer.score import structured_v
+from aesi.tracer.search import EVIDENCE_NATS, Admission, Breadth, Scored, Search
+from aesi.tracer.verdict import Verdict, Word
+
+OCP = "ocp_shape"
+OWN: Mapping[str, float] = {
+    OCP: 0.05,
+    "active_material_loss_negative": 0.1,
+    "active_material_loss_positive": 0.1,
+    "lithium_inventory_loss": 0.05,
+    "solid_diffusivity": 1.0,
+    "charge_transfer_kinetics": 1.0,
+    "electrolyte_transport": 0.7,
+}
+"""What a published parametrisation may be off by: V for the potential, shares for the balance, e-folds for the rest."""
+RESISTANCE = "series_resistance"
+RESISTANCE_OHM_AH = 0.02
+"""Of contacts that were not declared, for a cell of one ampere-hour."""
+MODEL_ERROR_V = 3e-3
+"""What a calibrated single-particle model is expected to miss: the weight of a sample."""
+STEPS = 14
+"""Of a descent: many parameters at once, far from where they were declared."""
+SOC_TOLERANCE = 0.01
+"""Of a state of charge from a rest voltage, where the open-circuit potential itself is in doubt."""
+SLOW_C_RATE = 0.15
+SPAN = 0.8
+FIRST = Breadth(least_share=0.5)
+"""Of the search before: it goes on from single effects only where one explains most of what there is."""
+BREADTH = Breadth(singles=5, abreast=1, grown=3, lost=(1, 3))
+LIKELY = (
+    "reaction_nonuniformity",
+    "self_heating",
+    "ocv_hysteresis",
+    "concentration_dependent_diffusivity",
+    "film_growth",
+    "double_layer",
+)
+"""What a real cell has under load, more or less of it, in the order in which it is tried."""
+UNSEEN = 0.25
+"""Share of the quick records, their last part, that a hypothesis has to predict unseen."""
+UNSEEN_SHARE = 0.97
+"""And with an error of at most this share of what is left without the effect."""
+
+
+def is_possible(problem: Problem) -> bool:
+    """True where a slow discharge over most of the range is among the data."""
+    return any(_is_slow_and_wide(problem.cell, r) for r in problem.records)
+
+
+def _is_slow_and_wide(cell: Cell, record: Record) -> bool:
+    seen = record.thin.take(slice(0, record.n_fit))
+    slow = float(np.quantile(np.abs(seen.current_a), 0.95)) <= SLOW_C_RATE * cell.nominal_capacity_ah
+    moved_ah = np.concatenate([[0.0], np.cumsum(seen.current_a[1:] * np.diff(seen.time_s))]) / 3600.0
+    return slow and float(np.ptp(moved_ah)) >= SPAN * cell.capacity_ah
+
+
+def freed(problem: Problem) -> Problem:
+    """The same case with the model's own parameters open in every hypothesis."""
+    resistance = RESISTANCE_OHM_AH / problem.cell.nominal_capacity_ah
+    own = {**TOLERANCES, **OWN, RESISTANCE: resistance}
+    effects = {name: CATALOGUE[name] for name in own if name != OCP} | {OCP: OCP_CORRECTION}
+    quick = tuple(i for i, r in enumerate(problem.records) if not _is_slow_and_wide(problem.cell, r))
+    return replace(
+        problem,
+        records=tuple(_in_doubt(r) for r in problem.records),
+        effects=dict(problem.effects) | effects,
+        tolerances=own,
+        nuisances=frozenset(own),
+        model_error_v=MODEL_ERROR_V,
+        steps=STEPS,
+        judged=quick or None,
+    )
+
+
+def _in_doubt(record: Record) -> Record:
+    noise_v, soc0_sd = max(record.noise_v, MODEL_ERROR_V), max(record.soc0_sd, SOC_TOLERANCE)
+    return replace(record, noise_v=noise_v, soc0_sd=soc0_sd)
+
+
+def nats_of_potential(problem: Problem, fit: Fit) -> float:
+    """Evidence that the recalibrated model loses where its open-circuit potential stays as declared."""
+    tolerances = {name: sd for name, sd in problem.tolerances.items() if name != OCP}
+    without = replace(problem, tolerances=tolerances)
+    knobs = without.knobs(())
+    other = fit_hypothesis(without, (), [placed_in(knobs, fit.placed, np.zeros(len(knobs)))])
+    return np.inf if other is None else fit.log_evidence - other.log_evidence
+
+
+def reworded(
+    verdict: Verdict, added: tuple[str, ...], moved: Mapping[str, float], left_v: Sequence[float]
+) -> Verdict:
+    """The verdict of the second search, with what recalibration did and which of its parameters mattered.
+
+    added : effects on top.  moved : own parameter -> nats that it brings.
+    left_v : beyond noise as declared, recalibrated, and with the effects added, V.
+    """
+    before, recalibrated, after = (1e3 * v for v in left_v)
+    reason = (
+        f"{before:.2f} mV beyond the noise as declared, {recalibrated:.2f} mV after the model's own parameters were "
+        f"recalibrated, {after:.2f} mV with {' + '.join(added) or 'nothing'} on top; "
+        f"{1e3 * verdict.tolerance_v:.2f} mV would be within what a model may miss"
+    )
+    effects = (*moved, *added)
+    groups = tuple(g for g in verdict.groups if g[0] in effects)
+    word: Word = "found" if verdict.word == "found" else "unknown"
+    return replace(verdict, word=word, effects=effects, groups=groups, reason=reason)
+
+
+@dataclass
+class SecondSearch(Search):
+    """A search on top of a recalibrated model.
+
+    With so many parameters free a linear estimate says little, so that a short list of what real cells have under load
+    is fitted in full, and unseen data are a refit without the last part of the quick records.
+    """
+
+    unseen: dict[frozenset[str], float] = field(default_factory=dict)
+
+    def _promising(self, parent: Scored, names: list[str]) -> list[str]:
+        return [name for name in LIKELY if name in names]
+
+    def _score(self, fit: Fit) -> Scored:
+        return Scored(fit, fit.rmse_v, structured_v(self.problem, fit.residual_v))
+
+    def _admission(self, parent: Scored, child: Scored) -> Admission:
+        nats = child.evidence - parent.evidence
+        reasons = []
+        if nats < EVIDENCE_NATS:
+            reasons.append(f"brings {nats:.1f} nats, {EVIDENCE_NATS:g} are asked for")
+        if child.fit.at_bounds:
+            reasons.append(f"ends on a bound: {', '.join(child.fit.at_bounds)}")
+        gain = 0.0
+        if not reasons:
+            before, after = self._unseen_rmse_v(parent), self._unseen_rmse_v(child)
+            gain = float(np.sqrt(max(before**2 - after**2, 0.0)))
+            if after > UNSEEN_SHARE * before:
+                reasons.append(
+                    f"leaves {1e3 * after:.2f} mV on the last part of the data, {1e3 * before:.2f} mV without it"
+                )
+        return Admission(not reasons, "; ".join(reasons), nats, gain, 0.0, np.inf)
+
+    def _unseen_rmse_v(self, scored: Scored) -> float:
+        """RMSE on the last part of the quick records by a fit that has not seen it, V."""
+        key = frozenset(scored.hypothesis)
+        if key not in self.unseen:
+            judged = self.problem.judged or range(len(self.problem.records))
+            records = list(self.problem.records)
+            for i in judged:
+                records[i] = replace(records[i], n_fit=int((1.0 - UNSEEN) * records[i].n_fit))
+            cut = replace(self.problem, records=tuple(records))
+            fit = fit_hypothesis(cut, scored.hypothesis, [scored.fit.x])
+            predicted = None if fit is None else self.problem.predict(fit.knobs, fit.x)
+            tails = (
+                []
+                if predicted is None
+                else [
+                    (self.problem.measured[self.problem.slices[i]] - predicted[i])[records[i].n_fit :]
+                    for i in judged
+                ]
+            )
+            self.unseen[key] = float(np.sqrt(np.mean(np.concatenate(tails) ** 2))) if tails else np.inf
+        return self.unseen[key]
+
+
+def settled(problem: Problem, fit: Fit) -> tuple[Cell, tuple[ActiveEffect, ...], float]:
+    """The recalibrated cell, the effects on top of it, and its state of charge at the first sample.
+
+    The cell says by itself what its own parameters said, so that a BPX file holds it.
+    """
+    values = {owner: given for owner, given in fit.values.items() if owner != SOC0}
+    folded = {
+        o: v for o, v in values.items() if o in problem.nuisances and problem.effects[o].on_model is not None
+    }
+    beside = {owner: given for owner, given in values.items() if owner not in folded}
+    resistance = folded.pop(RESISTANCE, {}).get("resistance_ohm", 0.0)
+    cell = model_with(problem.cell, replace(problem, fixed=()).active(folded)).cell
+    cell = replace(cell, contact_resistance_ohm=cell.contact_resistance_ohm + resistance)
+    return cell, problem.active(beside), same_rest(problem.cell, cell, fit.values[SOC0]["0"])
