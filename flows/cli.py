@@ -63,6 +63,8 @@ def main() -> NoReturn:
         if error.code == INTERRUPTED:
             print("Interrupted.", file=sys.stderr)
         raise
+    except RecursionError:
+        _fail("a file is nested too deeply to be read.", 2)
     except Exception as error:
         if os.environ.get("AESI_DEBUG"):
             raise

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 from flows.mlflow_store import NUMBER, PARENT
 from flows.outbox import Item
 
 if TYPE_CHECKING:
+    from mlflow.entities import RunInfo
+
     from flows.mlflow_store import Store
 
 
@@ -17,22 +21,34 @@ def _send_run(store: Store, item: Item, again: bool) -> None:
     """A finished nested run: parameters, metrics, files."""
     from mlflow.entities import Metric, Param, RunTag
 
-    run_id = _sent_before(store, item) if again else None
+    info = _sent_before(store, item) if again else None
     tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
-    if run_id is None:
-        created = store.client.create_run(
+    if info is None:
+        info = store.client.create_run(
             item["experiment_id"], start_time=item["start_ms"], run_name=item["name"], tags=tags
-        )
-        run_id = created.info.run_id
+        ).info
     store.client.log_batch(
-        run_id,
+        info.run_id,
         metrics=[Metric(k, v, item["end_ms"], 0) for k, v in item["metrics"].items()],
         params=[Param(k, v) for k, v in item["params"].items()],
         tags=[RunTag(k, v) for k, v in tags.items()] if again else [],
     )
-    for name, content in item["files"].items():
-        store.client.log_dict(run_id, content, name)
-    store.client.set_terminated(run_id, item["status"], item["end_ms"])
+    _write_files(store, info.artifact_uri, item["files"])
+    store.client.set_terminated(info.run_id, item["status"], item["end_ms"])
+
+
+def _write_files(store: Store, artifact_uri: str, files: Mapping[str, Any]) -> None:
+    """JSON artifacts, to where the run is known to keep them: the client would ask the store once a file."""
+    from mlflow.store.artifact.artifact_repository_registry import get_artifact_repository
+
+    if not files:
+        return
+    repository = get_artifact_repository(artifact_uri, store.uri)
+    with TemporaryDirectory(prefix="aesi-") as folder:
+        for name, content in files.items():
+            path = Path(folder) / name
+            path.write_text(json.dumps(content), encoding="utf-8")
+            repository.log_artifact(str(path))
 
 
 def _send_batch(store: Store, item: Item, again: bool) -> None:
@@ -85,9 +101,9 @@ def _send_end(store: Store, item: Item, again: bool) -> None:
     store.client.set_terminated(item["run_id"], item["status"], item["at_ms"])
 
 
-def _sent_before(store: Store, item: Item) -> str | None:
+def _sent_before(store: Store, item: Item) -> RunInfo | None:
     found = store.children(item["experiment_id"], item["parent"]).get(item["label"])
-    return None if found is None else str(found.info.run_id)
+    return None if found is None else found.info
 
 
 SENDERS: dict[str, Callable[[Store, Item, bool], None]] = {

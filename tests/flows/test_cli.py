@@ -49,6 +49,17 @@ def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, wor
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize("name", ["deep.yaml", "deep.json"])
+def test_a_file_nested_without_end_is_one_sentence(call, tmp_path, current, name):
+    path = tmp_path / name
+    path.write_text("[" * 5000 + "]" * 5000)
+    simulate = ("simulate", "--cell", path, "--current", current, "--soc0", 0.5, "--out", tmp_path / "o.csv")
+    code, _, err = call(*(("run", path) if name == "deep.yaml" else simulate))
+    assert code == 2
+    assert err.startswith("aesi: ")
+    assert err.count("\n") == 1
+
+
 def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):
     def broken(*_):
         raise RuntimeError("odd\nand more")

@@ -89,7 +89,9 @@ def test_killed_in_the_calibration_of_the_intervals(killed, aesi, arguments, tra
 @pytest.mark.slow
 def test_killed_in_the_delivery_of_a_candidate(killed, aesi, arguments, tracked, finished):
     # The first JSON artifact is the experiment; the fourth belongs to a candidate that is then there in part.
-    killed("mlflow", "MlflowClient.log_dict", 4, arguments())
+    killed(
+        "mlflow.store.artifact.local_artifact_repo", "LocalArtifactRepository.log_artifact", 4, arguments()
+    )
     waiting = list((tracked / ".aesi/outbox").glob("*/[0-9]*.json"))
     assert waiting
     before = candidates_on_disk(tracked)
