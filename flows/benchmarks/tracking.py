@@ -37,7 +37,7 @@ def run(
     n: int = 88_200,
     resamples: int = 100,
     candidates: int = 10,
-    rounds: int = 3,
+    rounds: int = 5,
     artifact_kb: float = 50.0,
     seed: int = 0,
 ) -> Iterator[dict[str, Any]]:
