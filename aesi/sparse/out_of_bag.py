@@ -1,13 +1,13 @@
 """What the members of an ensemble leave on rows they did not draw, made comparable.
 
 Every resample leaves out other rows, so a member whose rows happen to be easy would win. The rows are cut into
-pieces of a block; where s[p, b] is the squared error of member b on the u[p, b] rows of piece p that it did not
-draw, each row counting as in the fits, the difficulty that all members share is taken out piece by piece:
+pieces of a block; s[p, b] is the squared error of member b on the u[p, b] rows of piece p that it did not draw, each
+row counting as in the fits. A member's error is set against what the members typically leave on the same pieces:
 
-    L_b = [ sum_p (s[p, b] - m_p u[p, b]) / sum_p u[p, b] + sum_p m_p n_p / sum_p n_p ] / bare
+    L_b = [ sum_p s[p, b] / sum_p m_p u[p, b] ] [ sum_p m_p n_p / sum_p n_p ] / bare
     m_p = median over b of s[p, b] / u[p, b]                                                            (1)
 
-n_p is the number of rows of the piece and `bare` the mean squared error of the physics model: (1) is what the
+n_p is the number of rows of the piece and `bare` the mean squared error of the physics model: (1) estimates what the
 member would have left, relative to the physics, had it drawn none of the rows.
 """
 
@@ -32,7 +32,7 @@ def out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntAr
 
 
 def comparable(squares: Array, rows: Array, sizes: Array) -> Array:
-    """(models,) mean squared error of each model, less what the pieces it was judged on add.
+    """(models,) mean squared error of each model on all rows, as estimated from those it was judged on.
 
     squares : (pieces, models) summed over the `rows` (pieces, models) on which a model is judged; `sizes`
     (pieces,) are all rows of a piece. Pieces on which no model with finite errors is judged are left out.
@@ -43,10 +43,10 @@ def comparable(squares: Array, rows: Array, sizes: Array) -> Array:
     some = judged.any(axis=1)
     if not some.any():
         return np.full(squares.shape[1], np.inf)
-    shared = np.nanmedian(mean[some], axis=1)
-    own = (squares[some] - shared[:, None] * rows[some]).sum(axis=0)
+    typical = np.nanmedian(mean[some], axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        losses = own / rows[some].sum(axis=0) + float(shared @ sizes[some]) / float(sizes[some].sum())
+        ratio = squares[some].sum(axis=0) / (typical @ rows[some])
+    losses = ratio * float(typical @ sizes[some]) / float(sizes[some].sum())
     return np.where(np.isfinite(squares).all(axis=0) & np.isfinite(losses), losses, np.inf)
 
 

@@ -23,6 +23,14 @@ def test_a_member_that_diverges_is_infinitely_bad_and_spoils_no_other():
     np.testing.assert_allclose(comparable(squares, rows, np.array([10.0])), [1.0, 2.0, np.inf])
 
 
+def test_who_does_well_where_most_fail_is_not_better_than_perfect():
+    # Three of four members run away on the second piece; the loss of the one that does not is no less than zero.
+    squares = np.array([[10.0, 10.0, 10.0, 10.0], [10.0, 9e4, 9e4, 9e4]])
+    rows = np.array([[10.0, 10.0, 10.0, 10.0], [90.0, 10.0, 10.0, 10.0]])
+    losses = comparable(squares, rows, np.array([30.0, 90.0]))
+    assert 0.0 < losses[0] < losses[1:].min() / 100
+
+
 def test_a_piece_that_every_resample_holds_is_left_out():
     squares = np.array([[10.0, 20.0], [0.0, 0.0]])
     rows = np.array([[10.0, 10.0], [0.0, 0.0]])
