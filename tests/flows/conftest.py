@@ -69,6 +69,7 @@ def copy_store(database, folder):
 def workspace(tmp_path, monkeypatch):
     """An empty workspace, in the environment and as the current folder."""
     monkeypatch.setenv("AESI_HOME", str(tmp_path))
+    monkeypatch.setenv("PREFECT_HOME", str(tmp_path / ".aesi" / "prefect"))
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     monkeypatch.chdir(tmp_path)
     environment.prepare()
