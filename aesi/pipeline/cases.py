@@ -14,7 +14,7 @@ from aesi.pipeline.load import cell_path, locator, virtual_experiment
 from aesi.pipeline.sections import DiscoverConfig
 from aesi.records import Measurement
 
-MOST_ROWS = 120_000
+MOST_ROWS = 80_000
 """A hypothesis is simulated hundreds of times: more rows than these take hours, and tell hardly more."""
 
 
