@@ -52,7 +52,7 @@ USEFUL_PCT = 45.0
 
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
-    cells: int = 6,
+    cells: int = 4,
     candidates: int = 40,
     settings: Sequence[str] = tuple(SETTINGS),
     seed: int = 0,
