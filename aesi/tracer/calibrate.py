@@ -27,6 +27,9 @@ from aesi.tracer.records import Record, prepare_all
 MODEL_ERROR_V = 3e-3
 """What a calibrated single-particle model is expected to miss: the weight of a sample."""
 OCP_TOLERANCE_V = 0.05
+SOC_TOLERANCE = 0.01
+"""Of a state of charge from a rest voltage, where the open-circuit potential itself is in doubt; one that was given is
+believed."""
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
 RATES = ("solid_diffusivity", "charge_transfer_kinetics", "electrolyte_transport", "series_resistance")
 TYPICAL_SOLID_EA_J_MOL = 30e3
@@ -183,7 +186,8 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
 
 
 def _with_model_error(record: Record) -> Record:
-    return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=max(record.soc0_sd, 0.01))
+    soc0_sd = record.soc0_sd if record.soc0_given else max(record.soc0_sd, SOC_TOLERANCE)
+    return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=soc0_sd)
 
 
 def _best(fitter: Fitter, noise: list[ColouredNoise], rng: np.random.Generator) -> Array:

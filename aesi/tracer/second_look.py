@@ -18,6 +18,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.espm import model_with
+from aesi.tracer.calibrate import MODEL_ERROR_V, SOC_TOLERANCE
 from aesi.tracer.fit import Fit, fit_hypothesis
 from aesi.tracer.knobs import SOC0, placed_in
 from aesi.tracer.ocp_correction import EFFECT as OCP_CORRECTION
@@ -41,12 +42,8 @@ OWN: Mapping[str, float] = {
 RESISTANCE = "series_resistance"
 RESISTANCE_OHM_AH = 0.02
 """Of contacts that were not declared, for a cell of one ampere-hour."""
-MODEL_ERROR_V = 3e-3
-"""What a calibrated single-particle model is expected to miss: the weight of a sample."""
 STEPS = 14
 """Of a descent: many parameters at once, far from where they were declared."""
-SOC_TOLERANCE = 0.01
-"""Of a state of charge from a rest voltage, where the open-circuit potential itself is in doubt."""
 SLOW_C_RATE = 0.15
 SPAN = 0.8
 FIRST = Breadth(least_share=0.5)
@@ -98,8 +95,8 @@ def freed(problem: Problem) -> Problem:
 
 
 def _in_doubt(record: Record) -> Record:
-    noise_v, soc0_sd = max(record.noise_v, MODEL_ERROR_V), max(record.soc0_sd, SOC_TOLERANCE)
-    return replace(record, noise_v=noise_v, soc0_sd=soc0_sd)
+    soc0_sd = record.soc0_sd if record.soc0_given else max(record.soc0_sd, SOC_TOLERANCE)
+    return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=soc0_sd)
 
 
 def nats_of_potential(problem: Problem, fit: Fit) -> float:
