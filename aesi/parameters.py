@@ -19,10 +19,10 @@ class Parameter:
     """One scalar parameter.
 
     `default` is the value at which an effect is typically seen; `neutral` is the value at which it vanishes
-    (None where it has none). `log` asks for a search on a logarithmic scale. `expected` is the standard deviation of
-    its distance from neutral (or from the default; of the logarithm where `log`) where small ones are likelier than large
-    ones, None where all within bounds are alike.
-    `linear` says that the voltage is all but linear in it, so that a fit need not take its slope anew at every step.
+    (None where it has none). `log` asks for a search on a logarithmic scale. `expected` is the standard deviation
+    of its distance from neutral (or from the default; of the logarithm where `log`) where small ones are likelier
+    than large ones, None where all within bounds are alike. `linear` says that the voltage is all but linear in it,
+    so that a fit need not take its slope anew at every step.
     """
 
     default: float
