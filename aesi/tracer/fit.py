@@ -160,7 +160,7 @@ class Fitter:
     def white(self, residual: Array) -> list[ColouredNoise]:
         """Plain least squares: every sample counts, at the scale of the residual of its record or the model's error."""
         if self.problem.model_error_v is not None:
-            return [ColouredNoise(self.problem.model_error_v, 1e-9, 100.0)] * len(self.problem.records)
+            return self.repeated(self.problem.model_error_v)
         return [
             ColouredNoise(max(float(np.sqrt(np.mean(residual[rows] ** 2))), r.noise_v), 1e-9, 100.0)
             for rows, r in zip(self.problem.slices, self.problem.records, strict=True)
