@@ -59,12 +59,13 @@ def with_active_material(cell: Cell, negative: float, positive: float, lost_at_s
 def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
     """State of charge in the windows of `aged` at which it rests where `declared` rests at `soc`.
 
-    The same number where the windows are the same: an open-circuit potential that is off does not move a state of
-    charge that is known. Beyond both ends of the new windows the nearer end.
+    By the potentials of `aged` on both sides: an open-circuit potential that is off does not move a state of charge
+    that is known, and windows that are the same leave it the same. Beyond both ends of the new windows the nearer end.
     """
     if _windows(declared) == _windows(aged):
         return soc
-    voltage = float(declared.rest_voltage_v(soc)[0])
+    alike = declared.with_negative(ocp=aged.negative.ocp).with_positive(ocp=aged.positive.ocp)
+    voltage = float(alike.rest_voltage_v(soc)[0])
 
     def excess(z: float) -> float:
         return float(aged.rest_voltage_v(z)[0]) - voltage
