@@ -52,7 +52,8 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
     if config.data.kind == "virtual":
         fit, test, soc0 = _virtual(config)
     else:
-        fit, test = (_read(config, names, wanted.until_s) for names in (wanted.fit, wanted.test))
+        fit = _read(config, wanted.fit, wanted.fit_until_s)
+        test = _read(config, wanted.test, dict.fromkeys(wanted.test, wanted.until_s))
         soc0 = None
     if not fit:
         raise ConfigError("discover.fit names no record; give at least one to look at.")
@@ -67,11 +68,14 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
     )
 
 
-def _read(config: ExperimentConfig, names: Sequence[str], until_s: float | None) -> tuple[Measurement, ...]:
+def _read(
+    config: ExperimentConfig, names: Sequence[str], until_s: Mapping[str, float | None]
+) -> tuple[Measurement, ...]:
     where = locator(config)
     data = config.data
     return tuple(
-        read_measurement(where(name), data.columns or None, data.sign, stop_s=until_s) for name in names
+        read_measurement(where(name), data.columns or None, data.sign, stop_s=until_s.get(name))
+        for name in names
     )
 
 

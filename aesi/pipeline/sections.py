@@ -215,12 +215,14 @@ class RunnerConfig(Section):
 class DiscoverConfig(Section):
     """What `aesi discover` needs beyond cell and data.
 
-    fit, test : names of records (kind: virtual has them by role).  until_s : what comes later is left out.
+    fit, test : names of records (kind: virtual has them by role); a record in both goes on where the fit ends.
+    fit_until_s : record -> time up to which fits see it.  until_s : what comes later is left out of every test record.
     holdout : the last share of each record, kept back where there are no test records.
     """
 
     fit: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
+    fit_until_s: dict[str, Positive] = {}
     until_s: Positive | None = None
     holdout: Share = 0.3
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3

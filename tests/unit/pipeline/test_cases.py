@@ -1,32 +1,17 @@
-"""Cases for the tracer: files that are longer than a hypothesis can afford are thinned, and it is said."""
+"""Cases of the tracer from experiment files."""
 
-import numpy as np
-import pandas as pd
-import pytest
+from pathlib import Path
 
-from aesi.pipeline import cases
+from aesi.pipeline.cases import case_of_experiment
+from aesi.pipeline.config import read_experiment
 
-
-@pytest.fixture
-def drive(tmp_path):
-    def write(name, rows):
-        time_s = np.arange(rows) * 1.0
-        current_a = np.where(time_s % 40 < 20, 3.0, -2.0)
-        table = pd.DataFrame({"time_s": time_s, "current_a": current_a, "voltage_v": 3.7 - 0.01 * current_a})
-        table.to_csv(tmp_path / name, index=False)
-        return tmp_path / name
-
-    return write
+EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
 
 
-def test_long_files_share_the_rows_and_keep_their_charge(drive, monkeypatch, tmp_path):
-    monkeypatch.setattr(cases, "MOST_ROWS", 1000)
-    case = cases.case_of_files(tmp_path / "cell.json", [drive("a.csv", 4000)], [drive("b.csv", 100)])
-    (long,), (short,) = case.measurements, case.tests
-    assert len(long) <= 500
-    assert any("Decimated from 4000" in note for note in long.notes)
-    assert len(short) == 100
-    assert not short.notes
-    charge = float(np.sum(long.current_a[1:] * np.diff(long.time_s)))
-    whole = np.where(np.arange(4000) % 40 < 20, 3.0, -2.0)[1:]
-    assert charge == pytest.approx(whole[: int(long.time_s[-1])].sum())
+def test_the_measured_case_is_judged_where_its_fit_ends(shared_data, monkeypatch):
+    monkeypatch.setenv("AESI_DATA", str(shared_data / "measured"))
+    case = case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", []))
+    assert [m.name for m in case.measurements] == ["C20", "C2", "1C", "drive_cycle"]
+    assert case.measurements[0].time_s[-1] > 70_000
+    assert case.measurements[-1].time_s[-1] == 4000
+    assert case.tests[0].time_s[-1] == 8000
