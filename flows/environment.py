@@ -26,7 +26,7 @@ QUIET = {
     "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
     # Errors are told once, in one sentence, by the command line; Prefect's own log keeps them in full.
     "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",
-    "PREFECT_SERVER_LOGGING_LEVEL": "ERROR",
+    "PREFECT_SERVER_LOGGING_LEVEL": "CRITICAL",  # what goes wrong is said by the run, in one sentence
     "PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW": "ignore",
     "PREFECT_LOGGING_EXTRA_LOGGERS": "aesi",  # what a run says shows in Prefect's log of it
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "2",

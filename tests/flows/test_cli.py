@@ -64,7 +64,7 @@ def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):
     def broken(*_):
         raise RuntimeError("odd\nand more")
 
-    monkeypatch.setattr("aesi.pipeline.config.read_experiment", broken)
+    monkeypatch.setattr("flows.worker.read_experiment", broken)
     code, _, err = call("worker", "x.yaml")
     assert code == 1
     assert err == "aesi: unexpected RuntimeError: odd (AESI_DEBUG=1 shows where).\n"
