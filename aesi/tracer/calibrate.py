@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +31,8 @@ SOC_TOLERANCE = 0.01
 """Of a state of charge from a rest voltage, where the open-circuit potential itself is in doubt; one that was given is
 believed."""
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
-RATES = ("solid_diffusivity", "charge_transfer_kinetics", "electrolyte_transport", "series_resistance")
+RESISTANCE = "series_resistance"
+RATES = ("solid_diffusivity", "charge_transfer_kinetics", "electrolyte_transport", RESISTANCE)
 TYPICAL_SOLID_EA_J_MOL = 30e3
 TYPICAL_RATE_EA_J_MOL = 35e3
 TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
@@ -89,7 +90,7 @@ def calibrate(
     start, notes = sized(cell, measurements)
     start, more = with_activation(start)
     notes = (*notes, *more)
-    records = tuple(_with_model_error(r) for r in prepare_all(start, measurements, soc0, 0.0))
+    records = tuple(with_model_error(r) for r in prepare_all(start, measurements, soc0, 0.0))
     for record in records:
         check_record(start, record)
     effects = {OCP_CORRECTION.id: OCP_CORRECTION} | {n: CATALOGUE[n] for n in (*BALANCE, *RATES)}
@@ -116,7 +117,7 @@ def calibrate(
     rms = [float(np.sqrt(np.mean(residual[rows] ** 2))) for rows in problem.slices]
     old = [_declared_error_v(cell, problem, record) for record in records]
     return Calibration(
-        cell=_settled(start, problem, values),
+        cell=settled(problem, values),
         declared=cell,
         parameters=parameters,
         undetermined=_undetermined(fitter, fit.jacobian),
@@ -185,7 +186,9 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     return float(steps.sum()) / SECONDS_PER_HOUR
 
 
-def _with_model_error(record: Record) -> Record:
+def with_model_error(record: Record) -> Record:
+    """The record as a fit of the model's own parameters sees it: no surer than the model is, nor of a state of charge
+    that the potential in doubt gave."""
     soc0_sd = record.soc0_sd if record.soc0_given else max(record.soc0_sd, SOC_TOLERANCE)
     return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=soc0_sd)
 
@@ -233,11 +236,11 @@ def _redundancy(residual: Array) -> float:
     return float(np.sqrt((1.0 + rho) / (1.0 - rho)))
 
 
-def _settled(start: Cell, problem: Problem, values: dict[str, dict[str, float]]) -> Cell:
-    """One cell that says what cell and parameters said: a BPX file needs no effects."""
-    resistance = values.get("series_resistance", {}).get("resistance_ohm", 0.0)
-    others = {owner: given for owner, given in values.items() if owner != "series_resistance"}
-    cell = model_with(start, problem.active(others)).cell
+def settled(problem: Problem, values: Mapping[str, Mapping[str, float]]) -> Cell:
+    """One cell that says what the problem's cell and its own parameters said: a BPX file needs no effects."""
+    resistance = values.get(RESISTANCE, {}).get("resistance_ohm", 0.0)
+    others = {owner: given for owner, given in values.items() if owner != RESISTANCE}
+    cell = model_with(problem.cell, replace(problem, fixed=()).active(others)).cell
     return replace(cell, contact_resistance_ohm=cell.contact_resistance_ohm + resistance)
 
 

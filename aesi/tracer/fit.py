@@ -145,10 +145,6 @@ class Fitter:
 
         return descend(linearise, cost, x0, self.low, self.high, steps, GAIN_NATS).x
 
-    def repeated(self, model_error_v: float) -> list[ColouredNoise]:
-        """The model's own error, whose samples repeat one another, as white noise that says as little."""
-        return [ColouredNoise(model_error_v * REPEATS**0.5, 1e-9, 100.0)] * len(self.problem.records)
-
     def noise_of(self, residual: Array, start: Sequence[ColouredNoise] | None = None) -> list[ColouredNoise]:
         """The noise model of each record's residual."""
         out = []
@@ -158,9 +154,11 @@ class Fitter:
         return out
 
     def white(self, residual: Array) -> list[ColouredNoise]:
-        """Plain least squares: every sample counts, at the scale of the residual of its record or the model's error."""
+        """Plain least squares: every sample counts, at the scale of its record's residual, or of the model's error,
+        which says as little as its repeating samples do."""
         if self.problem.model_error_v is not None:
-            return self.repeated(self.problem.model_error_v)
+            weight_v = self.problem.model_error_v * REPEATS**0.5
+            return [ColouredNoise(weight_v, 1e-9, 100.0)] * len(self.problem.records)
         return [
             ColouredNoise(max(float(np.sqrt(np.mean(residual[rows] ** 2))), r.noise_v), 1e-9, 100.0)
             for rows, r in zip(self.problem.slices, self.problem.records, strict=True)
@@ -188,10 +186,9 @@ def fit_hypothesis(problem: Problem, hypothesis: Hypothesis, warm: Sequence[Arra
 def _polish(fitter: Fitter, x: Array) -> Fit | None:
     e = fitter.residual(x)
     assert e is not None
-    noise, rounds = fitter.noise_of(e), NOISE_ROUNDS
-    if fitter.problem.model_error_v is not None:
-        noise, rounds = fitter.repeated(fitter.problem.model_error_v), 0
-    for _ in range(rounds):
+    own = fitter.problem.model_error_v is None
+    noise = fitter.noise_of(e) if own else fitter.white(e)
+    for _ in range(NOISE_ROUNDS if own else 0):
         x = fitter.descend(x, noise, max(fitter.problem.steps // 2, 3))
         e = fitter.residual(x)
         assert e is not None

@@ -46,7 +46,7 @@ class Problem:
     their tolerance alone and do not compete.
     model_error_v : what the model is known to miss (V): fits are then plain least squares at this weight, because a
     residual's memory is the model's fault and not the sensor's. None lets the residual's own memory decide.
-    steps : of a descent.  judged : records whose blocks are held out when a fit is judged on unseen data (None: all).
+    steps : of a descent.
     """
 
     cell: Cell
@@ -57,7 +57,6 @@ class Problem:
     nuisances: frozenset[str] = frozenset()
     model_error_v: float | None = None
     steps: int = 8
-    judged: tuple[int, ...] | None = None
 
     @property
     def competing(self) -> tuple[str, ...]:

@@ -14,11 +14,10 @@ PLACEBOS = 12
 
 
 def blocks_of(problem: Problem, count: int = BLOCKS) -> list[Array]:
-    """Rows of `count` contiguous blocks, shared among the judged records by their length."""
-    judged = range(len(problem.records)) if problem.judged is None else problem.judged
-    total = sum(problem.records[i].n_fit for i in judged)
+    """Rows of `count` contiguous blocks, shared among the records by their length."""
+    total = sum(r.n_fit for r in problem.records)
     blocks: list[Array] = []
-    for rows in (problem.slices[i] for i in judged):
+    for rows in problem.slices:
         length = rows.stop - rows.start
         pieces = max(1, round(count * length / total))
         blocks += [b for b in np.array_split(np.arange(rows.start, rows.stop), pieces) if len(b)]
@@ -60,7 +59,7 @@ def _held_out(
     e, sensitivities = whitened[:, 0], whitened[:, 1:]
     precision = sensitivities.T @ sensitivities + np.diag(prior)
     ridge = 1e-9 * np.diag(np.diag(precision) + 1e-300)
-    out = residual.copy()
+    out = np.empty_like(residual)
     for rows in blocks_of(problem):
         s = sensitivities[rows]
         change = np.linalg.lstsq(precision - s.T @ s + ridge, -s.T @ e[rows], rcond=None)[0]

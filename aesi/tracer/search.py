@@ -131,7 +131,7 @@ def context_of(problem: Problem) -> str:
         repr(problem.cell),
         repr(sorted(problem.effects)),
         repr(sorted(problem.tolerances.items(), key=str)),
-        f"{problem.model_error_v} {problem.steps} {problem.judged}",
+        f"{problem.model_error_v} {problem.steps}",
     ]
     pieces += [f"{r.data.digest}{r.n_fit}{r.soc0}{r.soc0_sd}{r.noise_v}" for r in problem.records]
     return digest(np.frombuffer("".join(pieces).encode(), dtype=np.uint8).astype(float))

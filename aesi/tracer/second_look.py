@@ -17,8 +17,8 @@ from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.espm import model_with
-from aesi.tracer.calibrate import MODEL_ERROR_V, SOC_TOLERANCE
+from aesi.tracer.calibrate import MODEL_ERROR_V, RESISTANCE, with_model_error
+from aesi.tracer.calibrate import settled as settled_cell
 from aesi.tracer.fit import Fit, fit_hypothesis
 from aesi.tracer.knobs import SOC0, placed_in
 from aesi.tracer.ocp_correction import EFFECT as OCP_CORRECTION
@@ -39,7 +39,6 @@ OWN: Mapping[str, float] = {
     "electrolyte_transport": 0.7,
 }
 """What a published parametrisation may be off by: V for the potential, shares for the balance, e-folds for the rest."""
-RESISTANCE = "series_resistance"
 RESISTANCE_OHM_AH = 0.02
 """Of contacts that were not declared, for a cell of one ampere-hour."""
 STEPS = 14
@@ -81,22 +80,15 @@ def freed(problem: Problem) -> Problem:
     resistance = RESISTANCE_OHM_AH / problem.cell.nominal_capacity_ah
     own = {**TOLERANCES, **OWN, RESISTANCE: resistance}
     effects = {name: CATALOGUE[name] for name in own if name != OCP} | {OCP: OCP_CORRECTION}
-    quick = tuple(i for i, r in enumerate(problem.records) if not _is_slow_and_wide(problem.cell, r))
     return replace(
         problem,
-        records=tuple(_in_doubt(r) for r in problem.records),
+        records=tuple(with_model_error(r) for r in problem.records),
         effects=dict(problem.effects) | effects,
         tolerances=own,
         nuisances=frozenset(own),
         model_error_v=MODEL_ERROR_V,
         steps=STEPS,
-        judged=quick or None,
     )
-
-
-def _in_doubt(record: Record) -> Record:
-    soc0_sd = record.soc0_sd if record.soc0_given else max(record.soc0_sd, SOC_TOLERANCE)
-    return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=soc0_sd)
 
 
 def nats_of_potential(problem: Problem, fit: Fit) -> float:
@@ -165,8 +157,9 @@ class SecondSearch(Search):
         """RMSE on the last part of the quick records by a fit that has not seen it, V."""
         key = frozenset(scored.hypothesis)
         if key not in self.unseen:
-            judged = self.problem.judged or range(len(self.problem.records))
             records = list(self.problem.records)
+            quick = [i for i, r in enumerate(records) if not _is_slow_and_wide(self.problem.cell, r)]
+            judged = quick or range(len(records))
             for i in judged:
                 records[i] = replace(records[i], n_fit=int((1.0 - UNSEEN) * records[i].n_fit))
             cut = replace(self.problem, records=tuple(records))
@@ -194,7 +187,5 @@ def settled(problem: Problem, fit: Fit) -> tuple[Cell, tuple[ActiveEffect, ...],
         o: v for o, v in values.items() if o in problem.nuisances and problem.effects[o].on_model is not None
     }
     beside = {owner: given for owner, given in values.items() if owner not in folded}
-    resistance = folded.pop(RESISTANCE, {}).get("resistance_ohm", 0.0)
-    cell = model_with(problem.cell, replace(problem, fixed=()).active(folded)).cell
-    cell = replace(cell, contact_resistance_ohm=cell.contact_resistance_ohm + resistance)
+    cell = settled_cell(problem, folded)
     return cell, problem.active(beside), same_rest(problem.cell, cell, fit.values[SOC0]["0"])
