@@ -24,7 +24,7 @@ from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 
 Model = Literal["SPMe", "DFN"]
-VERSION = 2
+VERSION = 3
 """Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
 
 SECONDS_PER_HOUR = 3600.0
@@ -37,7 +37,7 @@ CHARGE_TOLERANCE = 6e-4
 2C that is stepped over makes 1.1e-3."""
 MESH: dict[Model, dict[str, int]] = {
     "SPMe": {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 60, "r_p": 60, "R_n": 12, "R_p": 12},
-    "DFN": {"x_n": 12, "x_s": 8, "x_p": 12, "r_n": 25, "r_p": 25, "R_n": 12, "R_p": 12},
+    "DFN": {"x_n": 20, "x_s": 12, "x_p": 20, "r_n": 50, "r_p": 50, "R_n": 12, "R_p": 12},
 }
 """10 points across and 20 in radius move a DFN under SC03 and a 5C pulse by 0.35 mV RMS against 20 and 40."""
 TOLERANCE: dict[Model, float] = {"SPMe": 1e-6, "DFN": 1e-5}
