@@ -31,7 +31,7 @@ class ColouredNoise:
     tau_s: float
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _filter(columns, gap_s, white, slow, tau_s):  # type: ignore[no-untyped-def]
     n, m = columns.shape
     out = np.empty((n, m))

@@ -35,7 +35,7 @@ def bounded_exp(x):  # type: ignore[no-untyped-def]
     return math.exp(min(max(x, SMALLEST_EXPONENT), LARGEST_EXPONENT))
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def overpotential(y, exchange, occupancy, g1, g2, g3, log_salt, alpha, thermal):  # type: ignore[no-untyped-def]
     """Overpotential (V) of a current y and its slope, for j = j0 (exp(alpha f eta) - exp(-(1 - alpha) f eta)).
 
@@ -72,7 +72,7 @@ def end_weight(z):  # type: ignore[no-untyped-def]
     return 1.0 / (1.0 - math.exp(-min(z, LARGEST_EXPONENT))) - 1.0 / z
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def solve_electrode(  # type: ignore[no-untyped-def]
     lo, hi, regions, side, total, dt, thermal, temperature_rise, chi,
     region_of, share, exchange, exchange_factor, alpha, capacity, plating, plated,
@@ -183,7 +183,7 @@ def local_conductivity(table, salt, first, unit):  # type: ignore[no-untyped-def
     return 18.0 / (5.0 / k1 + 8.0 / k2 + 5.0 / k3)
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def drops(solid, salt, kappa, first, contrast, ohm):  # type: ignore[no-untyped-def]
     """ohm[r, v] : drop of region r per current of region v, differences between regions times `contrast`."""
     regions = ohm.shape[0]
@@ -198,7 +198,7 @@ def drops(solid, salt, kappa, first, contrast, ohm):  # type: ignore[no-untyped-
             ohm[r, v] = mean + contrast * (ohm[r, v] - mean)
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def eliminate(matrix, n):  # type: ignore[no-untyped-def]
     """Solve in place: the right-hand side stands in column n and is replaced by the solution."""
     for k in range(n):

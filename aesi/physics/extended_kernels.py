@@ -30,7 +30,7 @@ DIFFUSIONS = (0, 1, 4)
 """Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def run_general(  # type: ignore[no-untyped-def]
     time, current, temperature, given, backward, substep, theta0,
     units, rates, gains, lump, share, volume, exchange,

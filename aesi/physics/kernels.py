@@ -71,7 +71,7 @@ def kinetic_ratio(density, exchange, theta):  # type: ignore[no-untyped-def]
     return abs(density) / (2.0 * exchange * math.sqrt(occupancy))
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def run_linear(  # type: ignore[no-untyped-def]
     time, current, backward,
     theta0, rates, gains, lump,

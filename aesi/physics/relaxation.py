@@ -17,7 +17,7 @@ def relax(discharge_ah: Array, charge_ah: Array, rate_1_ah: float, start: float)
     return out
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def _relax(discharge, charge, rate, start, out):  # type: ignore[no-untyped-def]
     out[0] = h = start
     for k in range(discharge.shape[0]):

@@ -15,7 +15,7 @@ def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
     return math.exp(energy / GAS * (1.0 / reference - 1.0 / temperature))
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def renew_weights(dt, faster, units, rates, e_rates, w, w_e):  # type: ignore[no-untyped-def]
     """Decay and input weights of all modes for a step; w : (units, 3, modes), w_e : (3, modes).
 
@@ -89,7 +89,7 @@ def step_particle(  # type: ignore[no-untyped-def]
     return mean, taken
 
 
-@njit(cache=True, fastmath=FASTMATH)
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
 def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-untyped-def]
     """force[k] : mode k of the integral psi of the diffusivity's variable part, at the profile of (mean, z)."""
     nodes[:] = mean

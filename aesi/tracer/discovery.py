@@ -144,7 +144,8 @@ def _look(
     breadth: Breadth,
 ) -> _Looked:
     noise_v = _noise_v(problem)
-    search = Search(problem, np.random.default_rng(seed), Archive(archive, context_of(problem)))
+    archived = Archive(archive, context_of(problem))
+    search = Search(problem, np.random.default_rng(seed), archived, polarisation_v(problem, None))
     steps, verdict = _searched(search, max_effects, progress, breadth, noise_v)
     chosen = search.fit(verdict.effects) or steps[0]
     return _Looked(search, steps, verdict, chosen, _recalibrated(problem, steps[0].fit))

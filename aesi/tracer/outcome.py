@@ -146,7 +146,7 @@ def test_rmse_v(problem: Problem, fit: Fit, tests: Sequence[Record]) -> float:
     return float(np.sqrt(np.mean(np.concatenate(parts or [fit.residual_v]) ** 2)))
 
 
-def polarisation_v(problem: Problem, fit: Fit) -> float:
+def polarisation_v(problem: Problem, fit: Fit | None) -> float:
     """Root mean square distance of the modelled voltage from equilibrium on the fit part, V."""
     parts = []
     for index, record in enumerate(problem.records):

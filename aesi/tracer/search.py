@@ -4,7 +4,9 @@ resumes."""
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -21,6 +23,9 @@ EVIDENCE_NATS = 10.0
 """What an effect has to bring beyond its own complexity: the price of having tried some twenty others."""
 MATERIAL_SHARE = 0.35
 """An effect that moves the voltage by less than this share of the noise is not worth a name."""
+POLARISATION_SHARE = 0.012
+"""No two solvers of the same equations agree better than to this share of the polarisation, and what moves the voltage
+by less is not told from them."""
 PLACEBO_FACTOR = 2.0
 """An effect brings this many times what a placebo brings, or leaves at most its inverse of what a placebo
 leaves."""
@@ -117,8 +122,8 @@ class Archive:
             return None
 
     def put(self, fit: Fit) -> None:
-        """Append a fit."""
-        if self.path is None:
+        """Append a fit that is not there yet."""
+        if self.path is None or "+".join(fit.hypothesis) in self.stored:
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with self.path.open("a", encoding="utf-8") as file:
@@ -141,12 +146,14 @@ def context_of(problem: Problem) -> str:
 class Search:
     """One case's hypotheses, fitted on demand.
 
+    polarisation_v : root mean square distance of the declared model's voltage from equilibrium, V.
     report : called with every newly scored hypothesis and its parent (progress, tracking).
     """
 
     problem: Problem
     rng: np.random.Generator
     archive: Archive
+    polarisation_v: float = 0.0
     report: Callable[[Scored, Admission | None], None] = lambda scored, admission: None
     scored: dict[frozenset[str], Scored | None] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
@@ -157,19 +164,28 @@ class Search:
         """Mean white noise of the records, V."""
         return float(np.mean([r.noise_v for r in self.problem.records]))
 
+    @property
+    def material_v(self) -> float:
+        """What an effect has to take off the error on unseen data to be worth a name, V."""
+        return float(np.hypot(MATERIAL_SHARE * self.noise_v, POLARISATION_SHARE * self.polarisation_v))
+
     def fit(self, hypothesis: Hypothesis, warm: Iterable[Array] = ()) -> Scored | None:
         """Fit once; the order in which effects were added does not matter to the fit."""
-        key = frozenset(hypothesis)
-        if key not in self.scored:
-            found = self.archive.get(self.problem, hypothesis)
-            if found is None:
-                found = fit_hypothesis(self.problem, hypothesis, list(warm))
-                if found is not None:
-                    self.archive.put(found)
-            self.scored[key] = None if found is None else self._score(found)
-            if found is None:
-                self.notes.append(f"{' + '.join(hypothesis)}: not tried; {self.problem.why_not(hypothesis)}")
-        return self.scored[key]
+        if frozenset(hypothesis) not in self.scored:
+            self._keep(hypothesis, self._found(hypothesis, list(warm)))
+        return self.scored[frozenset(hypothesis)]
+
+    def _found(self, hypothesis: Hypothesis, warm: list[Array]) -> Fit | None:
+        stored = self.archive.get(self.problem, hypothesis)
+        return fit_hypothesis(self.problem, hypothesis, warm) if stored is None else stored
+
+    def _keep(self, hypothesis: Hypothesis, found: Fit | None) -> None:
+        if found is None:
+            self.notes.append(f"{' + '.join(hypothesis)}: not tried; {self.problem.why_not(hypothesis)}")
+            self.scored[frozenset(hypothesis)] = None
+            return
+        self.archive.put(found)
+        self.scored[frozenset(hypothesis)] = self._score(found)
 
     def _score(self, fit: Fit) -> Scored:
         return Scored(fit, held_out_rmse_v(self.problem, fit), structured_v(self.problem, fit.residual_v))
@@ -180,12 +196,25 @@ class Search:
         if limit is not None:
             names = self._promising(parent, names)[:limit]
         children = []
-        for name in names:
-            child = self.fit((*parent.hypothesis, name), self._warm(parent, name))
+        for child in self._side_by_side({(*parent.hypothesis, n): self._warm(parent, n) for n in names}):
             if child is not None:
                 children.append(child)
                 self.report(child, self.admit(parent, child))
         return children
+
+    def _side_by_side(self, wanted: Mapping[Hypothesis, list[Array]]) -> Iterator[Scored | None]:
+        """Fits in threads, since simulations do not hold the interpreter's lock; in the order in which they were asked
+        for, so that the outcome does not depend on how many threads there are."""
+        pool = ThreadPoolExecutor(os.cpu_count())
+        try:
+            new = [h for h in wanted if frozenset(h) not in self.scored]
+            fits = {h: pool.submit(self._found, h, wanted[h]) for h in new}
+            for hypothesis in wanted:
+                if hypothesis in fits:
+                    self._keep(hypothesis, fits[hypothesis].result())
+                yield self.scored[frozenset(hypothesis)]
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
 
     def _warm(self, parent: Scored, name: str) -> list[Array]:
         """Where parent and the effect alone ended, joined: a start beside the standard ones."""
@@ -257,7 +286,7 @@ class Search:
         beaten = gain - placebo >= (PLACEBO_MARGIN_SHARE * noise) ** 2 and over >= PLACEBO_FACTOR
         verdict = [
             (nats < EVIDENCE_NATS, f"brings {nats:.1f} nats, {EVIDENCE_NATS:g} are asked for"),
-            (gain < (MATERIAL_SHARE * noise) ** 2, "moves the voltage by less than the noise hides"),
+            (gain < self.material_v**2, "moves the voltage by less than noise and solvers hide"),
             (not beaten, "does not clearly beat a placebo"),
             (bool(child.fit.at_bounds), f"ends on a bound: {', '.join(child.fit.at_bounds)}"),
         ]

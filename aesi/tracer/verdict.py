@@ -8,16 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from aesi.tracer.search import EVIDENCE_NATS, MATERIAL_SHARE, Scored, Search, only_by_freedom
+from aesi.tracer.search import EVIDENCE_NATS, POLARISATION_SHARE, Scored, Search, only_by_freedom
 
 Word = Literal["found", "none", "unknown"]
 
 NOISE_SHARE = 0.6
-POLARISATION_SHARE = 0.012
 EXPLAINED_SHARE = 0.08
-"""What may be left beyond white noise and still count as explained: this share of the noise, of the
-polarisation
-(no two solvers of the same equations agree better) and of what there was to explain, added as squares."""
+"""What may be left beyond white noise and still count as explained: this share of the noise, what solvers differ by,
+and this share of what there was to explain, added as squares."""
 
 LOOK_ALIKE_NATS = 8.0
 LOOK_ALIKE_SHARE = 0.2
@@ -189,12 +187,11 @@ def _alike(search: Search, chosen: Scored, other: Scored, rest: frozenset[str]) 
 
 def _best_rival(search: Search, base: Scored) -> float:
     """Evidence, beyond the base, of the best hypothesis that would also be material."""
-    noise = search.noise_v
     best = -np.inf
     for other in search.scored.values():
         if other is not None and other.hypothesis:
             gain = base.held_out_rmse_v**2 - other.held_out_rmse_v**2
-            if gain > (0.5 * MATERIAL_SHARE * noise) ** 2:
+            if gain > search.material_v**2:
                 best = max(best, other.evidence - base.evidence)
     return best
 

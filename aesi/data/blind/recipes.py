@@ -198,10 +198,12 @@ RECIPES: dict[str, Recipe] = {
     ),
     "lithium_plating": Recipe(
         "lithium_plating",
-        lambda m, q: {"rate_m_s": 3e-8 * m},
+        lambda m, q: {"rate_m_s": 1e-9 * m},
         "lithium_plating",
-        most=300.0,
+        _algebraic,
+        most=100.0,
         duty=fast_charge,
+        radial_points=25,
     ),
     "current_sensor_gain": Recipe(
         "current_sensor_gain", lambda m, q: {"gain": 1 + 0.03 * m}, instrument=_gain

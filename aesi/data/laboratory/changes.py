@@ -293,6 +293,11 @@ CHANGES: dict[str, Change] = {
             {"particle size": "distribution", "surface form": "algebraic"},
             _sizes,
         ),
-        Change("lithium_plating", {"rate_m_s": 1e-9}, {"lithium plating": "reversible"}, _plating),
+        Change(
+            "lithium_plating",
+            {"rate_m_s": 1e-9},
+            {"lithium plating": "reversible", "surface form": "algebraic"},  # without, no current is shared
+            _plating,
+        ),
     )
 }
