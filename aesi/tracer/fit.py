@@ -19,6 +19,10 @@ TOLERATED_STEP = 0.2
 GAIN_NATS = 0.1
 """A descent stops when a step gains less than this in log-likelihood."""
 NOISE_ROUNDS = 2
+REFRESH = 4
+"""Steps over which the slopes of what is tolerated, which moves little, are kept."""
+REMEMBERED = 4
+"""Residuals: a point is met again as trial, as start of the next step and as the end."""
 REPEATS = 100
 """Samples over which what a model misses stays the same, at the one sample a second that fits see."""
 
@@ -88,9 +92,18 @@ class Fitter:
         self.prior = np.array([k.prior_root for k in self.knobs])
         self.steps = np.array([TOLERATED_STEP if k.sd is not None else FREE_STEP for k in self.knobs])
         self.simulations = 0
+        self.remembered: dict[bytes, Array | None] = {}
 
     def residual(self, x: Array) -> Array | None:
         """(n,) V, or None where the model fails."""
+        key = x.tobytes()
+        if key not in self.remembered:
+            while len(self.remembered) >= REMEMBERED:
+                del self.remembered[next(iter(self.remembered))]
+            self.remembered[key] = self._simulated(x)
+        return self.remembered[key]
+
+    def _simulated(self, x: Array) -> Array | None:
         self.simulations += 1
         predicted = self.problem.predict(self.knobs, x)
         return None if predicted is None else self.measured - np.concatenate(predicted)
@@ -98,7 +111,8 @@ class Fitter:
     def jacobian(self, x: Array, residual: Array, kept: dict[int, Array] | None = None) -> Array | None:
         """(n, n_knobs) V per working unit, by one-sided differences that stay inside the box.
 
-        kept : columns of linear knobs from an earlier point of the same descent; filled where it lacks them.
+        kept : columns of linear or tolerated knobs from an earlier point of the same descent; filled where it lacks
+        them.
         """
         columns = np.zeros((len(residual), len(x)))
         for j, step in enumerate(self.steps):
@@ -108,13 +122,13 @@ class Fitter:
             for h in (step, -step) if x[j] + step <= self.high[j] else (-step, step):
                 moved = x.copy()
                 moved[j] = x[j] + h
-                other = self.residual(moved)
+                other = self._simulated(moved)
                 if other is not None:
                     columns[:, j] = (residual - other) / h
                     break
             else:
                 return None
-            if kept is not None and self.knobs[j].linear:
+            if kept is not None and (self.knobs[j].linear or self.knobs[j].sd is not None):
                 kept[j] = columns[:, j]
         return columns
 
@@ -143,7 +157,19 @@ class Fitter:
                 np.vstack([table[:, 1:], np.diag(self.prior)]),
             )
 
-        return descend(linearise, cost, x0, self.low, self.high, steps, GAIN_NATS).x
+        x, left = x0, steps
+        while left > 0:
+            end = descend(linearise, cost, x, self.low, self.high, min(left, REFRESH), GAIN_NATS)
+            x, left = end.x, left - end.steps
+            if end.steps < REFRESH and not (end.stalled and end.steps > 1):
+                break
+            kept = {j: column for j, column in kept.items() if self.knobs[j].linear}
+        return x
+
+    def descend_white(self, x0: Array, steps: int) -> Array | None:
+        """Plain least squares; None where the model fails at the start."""
+        e = self.residual(np.clip(x0, self.low, self.high))
+        return None if e is None else self.descend(x0, self.white(e), steps)
 
     def noise_of(self, residual: Array, start: Sequence[ColouredNoise] | None = None) -> list[ColouredNoise]:
         """The noise model of each record's residual."""
@@ -173,14 +199,14 @@ def fit_hypothesis(problem: Problem, hypothesis: Hypothesis, warm: Sequence[Arra
     fitter = Fitter(problem, hypothesis)
     best: tuple[float, Array] | None = None
     for x0 in [*warm, *(starts(fitter.knobs) if not warm or hypothesis else [])]:
-        e = fitter.residual(np.clip(x0, fitter.low, fitter.high))
-        if e is None:
-            continue
-        x = fitter.descend(x0, fitter.white(e), problem.steps)
-        e = fitter.residual(x)
-        if e is not None and (best is None or float(e @ e) < best[0]):
+        x = fitter.descend_white(x0, REFRESH)
+        e = None if x is None else fitter.residual(x)
+        if x is not None and e is not None and (best is None or float(e @ e) < best[0]):
             best = float(e @ e), x
-    return None if best is None else _polish(fitter, best[1])
+    if best is None:
+        return None
+    x = fitter.descend_white(best[1], problem.steps - REFRESH)
+    return None if x is None else _polish(fitter, x)
 
 
 def _polish(fitter: Fitter, x: Array) -> Fit | None:
