@@ -15,7 +15,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import digest
 from aesi.tracer.fit import Fit, as_dict, fit_hypothesis, from_dict
-from aesi.tracer.knobs import placed_in, starts
+from aesi.tracer.knobs import SOC0, placed_in, starts
 from aesi.tracer.problem import Hypothesis, Problem
 from aesi.tracer.score import held_out_rmse_v, placebo_gain, structured_v
 
@@ -32,8 +32,12 @@ leaves."""
 PLACEBO_MARGIN_SHARE = 0.25
 RICHER = 3
 """Parameters more, from which on a hypothesis is a flexible curve beside a plain one."""
-WITHIN_MODEL_SHARE = 0.4
-"""What a flexible curve takes off beyond a plain effect, as a share of the noise, that may be the model's own error."""
+FAR = 1.5
+"""Times more left on unseen data, from which on evidence does not count: its noise model forgives what is slow."""
+AT_REST = (SOC0, "voltage_sensor_offset")
+"""Owners of what a cell's voltage at rest is known to."""
+RELIEF_NATS = 5.0
+"""An effect that sets these right by so much need not move the voltage: without it, they hide it."""
 
 
 @dataclass(frozen=True)
@@ -72,14 +76,20 @@ class Scored:
         return self.fit.log_evidence
 
 
-def only_by_freedom(plain: Scored, richer: Scored, noise_v: float) -> bool:
+def only_by_freedom(plain: Scored, richer: Scored, material_v: float) -> bool:
     """True where `richer` does better than `plain` by so little that its many parameters may follow the model's error.
 
     Thousands of samples make nats of tenths of a millivolt, and no two models agree to that.
     """
     more = len(richer.fit.knobs) - len(plain.fit.knobs)
     better = plain.held_out_rmse_v**2 - richer.held_out_rmse_v**2
-    return more >= RICHER and better <= (WITHIN_MODEL_SHARE * noise_v) ** 2
+    return more >= RICHER and better <= material_v**2
+
+
+def strain_at_rest(fit: Fit) -> float:
+    """Nats that it costs the fit to set the voltage at rest right within its tolerances."""
+    owned = [x for k, x in zip(fit.knobs, fit.x, strict=True) if k.owner in AT_REST and k.sd is not None]
+    return 0.5 * float(np.sum(np.square(owned)))
 
 
 @dataclass(frozen=True)
@@ -168,6 +178,11 @@ class Search:
     def material_v(self) -> float:
         """What an effect has to take off the error on unseen data to be worth a name, V."""
         return float(np.hypot(MATERIAL_SHARE * self.noise_v, POLARISATION_SHARE * self.polarisation_v))
+
+    def far_behind(self, one: Scored, other: Scored) -> bool:
+        """Does `one` leave so much more on unseen data than `other` that its evidence does not count?"""
+        left = [max(s.held_out_rmse_v**2 - self.noise_v**2, self.material_v**2) for s in (one, other)]
+        return left[0] > FAR**2 * left[1]
 
     def fit(self, hypothesis: Hypothesis, warm: Iterable[Array] = ()) -> Scored | None:
         """Fit once; the order in which effects were added does not matter to the fit."""
@@ -284,10 +299,12 @@ class Search:
         left_by_placebo = parent.held_out_rmse_v**2 - placebo - noise**2
         over = max(gain / max(placebo, 1e-4 * noise**2), left_by_placebo / left)
         beaten = gain - placebo >= (PLACEBO_MARGIN_SHARE * noise) ** 2 and over >= PLACEBO_FACTOR
+        hidden = strain_at_rest(parent.fit) - strain_at_rest(child.fit) >= RELIEF_NATS
+        immaterial = gain < self.material_v**2
         verdict = [
             (nats < EVIDENCE_NATS, f"brings {nats:.1f} nats, {EVIDENCE_NATS:g} are asked for"),
-            (gain < self.material_v**2, "moves the voltage by less than noise and solvers hide"),
-            (not beaten, "does not clearly beat a placebo"),
+            (immaterial and not hidden, "moves the voltage by less than noise and solvers hide"),
+            (not (beaten or hidden), "does not clearly beat a placebo"),
             (bool(child.fit.at_bounds), f"ends on a bound: {', '.join(child.fit.at_bounds)}"),
         ]
         reasons = [reason for failed, reason in verdict if failed]
@@ -318,8 +335,10 @@ def select(
     for size in range(1, max_effects + 1):
         needed = [s for s in front if _all_needed(search, s)]
         sufficient = [s for s in needed if enough(base, s)]
-        best = max(sufficient or needed, key=lambda s: s.evidence, default=None)
-        plainer = [s for s in sufficient if best and only_by_freedom(s, best, search.noise_v)]
+        wanted = sufficient or needed
+        near = [s for s in wanted if not any(search.far_behind(s, other) for other in wanted)]
+        best = max(near, key=lambda s: s.evidence, default=None)
+        plainer = [s for s in sufficient if best and only_by_freedom(s, best, search.material_v)]
         best = max(plainer, key=lambda s: s.evidence, default=best)
         if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
             steps.append(best)

@@ -143,7 +143,9 @@ def _clear(search: Search, chosen: Scored, group: set[str]) -> bool:
     if any(bound.split(".")[0] in group for bound in chosen.fit.at_bounds):
         return False
     for other in search.scored.values():
-        if other is None or group & set(other.hypothesis) or only_by_freedom(chosen, other, search.noise_v):
+        if other is None or group & set(other.hypothesis):
+            continue
+        if only_by_freedom(chosen, other, search.material_v):
             continue
         dearer = EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0)
         ahead = chosen.evidence - other.evidence + dearer
@@ -206,7 +208,7 @@ def _confidence(
     for other in search.scored.values():
         if other is None or other is chosen or _covered(chosen.hypothesis, other.hypothesis, twins):
             continue
-        if only_by_freedom(chosen, other, search.noise_v):
+        if only_by_freedom(chosen, other, search.material_v) or search.far_behind(other, chosen):
             continue
         dearer = EVIDENCE_NATS * max(len(other.hypothesis) - len(chosen.hypothesis), 0)
         ahead = chosen.evidence - other.evidence + dearer
