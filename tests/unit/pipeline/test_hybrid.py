@@ -10,8 +10,8 @@ import aesi
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.hybrid import HybridModel
-from aesi.pipeline.model_folder import SCHEMA
 from aesi.pipeline.load import load
+from aesi.pipeline.model_folder import SCHEMA
 
 
 @pytest.fixture(scope="module")
