@@ -8,7 +8,7 @@ from pathlib import Path
 
 from aesi.data.checks import Columns, Context, check_finite, check_time
 from aesi.data.columns import map_columns
-from aesi.data.read import Sign, read_measurement
+from aesi.data.read import Sign, orient, read_measurement
 from aesi.data.readers import open_table
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -16,7 +16,10 @@ from aesi.numerics.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class CurrentProfile:
-    """time_s, current_a : (n,) s, A (discharge positive).  voltage_v, temperature_degc : (n,) or None."""
+    """time_s, current_a : (n,) s, A (discharge positive).  voltage_v, temperature_degc : (n,) or None.
+
+    notes : what the reader dropped, mapped or turned, one sentence each.
+    """
 
     time_s: Array
     current_a: Array
@@ -61,8 +64,12 @@ def read_current(
     context = Context(file, mapped.header, table.where)
     check_finite(data, context)
     check_time(data["time_s"], context)
-    if mapped.bdf_current or sign == "charge-positive":
-        data["current_a"] = -data["current_a"]
+    notes = [*table.notes, *mapped.notes]
+    orient(data, mapped, sign, notes)
     return CurrentProfile(
-        data["time_s"], data["current_a"], None, data.get("temperature_degc"), (*table.notes, *mapped.notes)
+        data["time_s"],
+        data["current_a"],
+        None,
+        data.get("temperature_degc"),
+        tuple(f"{file}: {note}" for note in notes),
     )

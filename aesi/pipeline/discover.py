@@ -15,6 +15,7 @@ from aesi.errors import InputError
 from aesi.physics import ActiveEffect, Cell
 from aesi.physics.effects import CATALOGUE, Effect, load_effect
 from aesi.pipeline.hybrid import HybridModel
+from aesi.pipeline.notes import together
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
@@ -87,7 +88,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
     from aesi.pipeline.report import write_discovery_report
 
-    content = to_json(found)
+    content = to_json(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content, indent=1, allow_nan=False)
     (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
@@ -97,8 +98,8 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     return content
 
 
-def to_json(found: Discovery) -> dict[str, Any]:
-    """The content of discovery.json."""
+def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
+    """The content of discovery.json.  read : what a reader dropped, mapped or averaged in the files."""
     verdict = found.verdict
     return {
         "schema": SCHEMA,
@@ -130,7 +131,7 @@ def to_json(found: Discovery) -> dict[str, Any]:
         "files": _file_rows(found),
         "dependence": _dependence(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
-        "notes": list(found.notes),
+        "notes": list(together((*read, *found.notes))),
         "seconds": round(found.seconds, 2),
         "simulations": found.simulations,
     }
@@ -179,7 +180,7 @@ def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id
         dependence=tuple(content["dependence"]),
         experiments=tuple(content["experiments"]),
         titles=titles,
-        notes=(f"{found.verdict.word}: {found.verdict.reason}.", *found.notes),
+        notes=tuple(content["notes"]),
         versions={name: version(name) for name in ("aesi", "numpy", "scipy")},
         mlflow_run_id=mlflow_run_id,
         seconds=found.seconds,
