@@ -186,7 +186,8 @@ def _track_result(
 def _say(console: Console, content: dict[str, Any], out: Path, started: float) -> None:
     from aesi.pipeline.report.words import confidence, reason_finding
 
-    effects = ", ".join(content["effects"]) or "no effect"
+    nothing = "nothing to add" if content["verdict"] == "none" else "no effect of the catalogue explains it"
+    effects = ", ".join(content["effects"]) or nothing
     console.say(f"{content['verdict']}: {effects} ({confidence(content)})")
     console.say(f"  {reason_finding(content)}")
     for group in content["indistinguishable"]:

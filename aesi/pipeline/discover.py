@@ -26,6 +26,8 @@ SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
 ARCHIVE = "hypotheses.jsonl"
 MV = 1e3
+ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
+"""Words of effect ids that a title writes in another way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,9 +164,7 @@ def _dependence(found: Discovery) -> list[dict[str, Any]]:
 
 def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = "") -> DiscoveryView:
     """What the report shows."""
-    titles = {name: name.replace("_", " ") for name in CATALOGUE} | {
-        c.effect: c.effect.replace("_", " ") for c in found.candidates
-    }
+    titles = {name: _title(name) for name in (*CATALOGUE, *(c.effect for c in found.candidates))}
     return DiscoveryView(
         title=title,
         cell=found.cell.name,
@@ -187,6 +187,10 @@ def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id
     )
 
 
+def _title(effect: str) -> str:
+    return " ".join(ABBREVIATIONS.get(word, word) for word in effect.split("_"))
+
+
 def _effect_view(found: Discovery, name: str) -> EffectView:
     effect = found.effects[name]
     candidate = next(c for c in found.candidates if c.effect == name)
@@ -204,7 +208,7 @@ def _effect_view(found: Discovery, name: str) -> EffectView:
     )
     return EffectView(
         id=name,
-        title=name.replace("_", " "),
+        title=_title(name),
         kind=effect.kind,
         equation=effect.equation,
         validity=effect.validity,

@@ -112,12 +112,12 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
             "such model leave open, so these data give no reason to change it."
         )
     if discovery["verdict"] == "found":
-        return f"Why: with the finding added, {amount} on the data looked at; up to {allowed:.2f} mV count as explained."
+        return f"Why: with the finding added {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed:
         found = "with what was found added, " if discovery["effects"] else ""
         return (
             f"Why: {found}{amount} on the data looked at, and no more than {allowed:.2f} mV would count as explained. "
-            "The hypotheses below say what came nearest, and why it was not accepted; data of another kind (a slow "
+            "The list of hypotheses says what came nearest, and why it was not accepted; data of another kind (a slow "
             "discharge, pulses with rests, another temperature) would narrow it down."
         )
     return f"Why: {discovery['reason']}."
@@ -202,10 +202,18 @@ def rest_finding(discovery: Mapping[str, Any]) -> str:
     """What a data-driven correction could still explain."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")
     text = f"A flexible correction learnt on what is left could still explain {rest:.1f} mV"
-    if after:
-        share = "much" if rest > LARGE_SHARE * after else "little"
-        text += f" of {after:.1f} mV: {share} structure is left for physics to name"
-    return text + "."
+    if not after:
+        return text + "."
+    text += f" of {after:.1f} mV: "
+    if rest > LARGE_SHARE * after:
+        return text + "much structure is left for physics to name."
+    if discovery["structured_mv"] > discovery["tolerance_mv"]:
+        return (
+            text
+            + "what is left is more than noise, but follows none of the model's variables in a way that carries "
+            "over to unseen data. That points to an instrument, or to a state that the model does not have."
+        )
+    return text + "little structure is left for physics to name."
 
 
 def listed(names: Sequence[str]) -> str:

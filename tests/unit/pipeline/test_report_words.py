@@ -113,7 +113,7 @@ def test_a_refit_that_does_as_well_is_said_to(views):
             "none",
             ("0.30 mV of voltage error are left beyond the noise", "Up to 0.80 mV", "no reason to change"),
         ),
-        ("found", ("with the finding added, 0.30 mV", "up to 0.80 mV count as explained")),
+        ("found", ("with the finding added 0.30 mV", "up to 0.80 mV count as explained")),
         ("unknown", ("4.00 mV of voltage error", "no more than 0.80 mV", "a slow discharge")),
     ],
 )
@@ -125,6 +125,13 @@ def test_the_verdict_says_what_it_rests_on(views, verdict, phrases):
 def test_a_rest_that_several_hypotheses_explain_names_the_best(views):
     discovery = {**views.discovery_view(200, verdict="unknown").discovery, "structured_mv": 0.3}
     assert words.reason_finding(discovery) == "Why: as the tracer words it."
+
+
+def test_a_rest_that_follows_nothing_is_not_called_little(views):
+    unknown = views.discovery_view(200, verdict="unknown").discovery
+    assert "follows none of the model's variables" in words.rest_finding(unknown)
+    assert "much structure" in words.rest_finding({**unknown, "explainable_mv": 0.9})
+    assert "little structure" in words.rest_finding(views.discovery_view(200).discovery)
 
 
 def test_no_verdict_is_called_certain():
