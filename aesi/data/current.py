@@ -38,12 +38,8 @@ def read_current(
     """
     table = open_table(path)
     file = table.path.name
-    try:
-        map_columns(table.header, columns, file)
-    except DataError:
-        if columns and columns.get("voltage_v"):
-            raise
-    else:
+    mapped = map_columns(table.header, columns, file, required=("time_s", "current_a"))
+    if "voltage_v" in mapped.position:
         measured = read_measurement(path, columns, sign, max_rows=None)
         return CurrentProfile(
             measured.time_s,
@@ -52,9 +48,7 @@ def read_current(
             measured.temperature_degc,
             measured.notes,
         )
-    # The mapping asks for a voltage; a name beyond the last column stands for the one that is not there.
-    mapped = map_columns((*table.header, "voltage_v"), columns, file)
-    quantities = tuple(q for q in mapped.position if q != "voltage_v")
+    quantities = tuple(mapped.position)
     arrays = table.read(tuple(mapped.position[q] for q in quantities))
     data: Columns = dict(zip(quantities, arrays, strict=True))
     if len(data["time_s"]) < 2:
