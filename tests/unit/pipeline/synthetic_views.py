@@ -128,8 +128,17 @@ def run_view(n=4000, seed=0, name="synthetic_cell"):
 
 
 def discovery_row(effect, kind, score, rmse_mv):
-    parameters = {"strength": {"value": 1.25, "low": 1.1, "high": 1.4, "unit": "mohm"}}
-    return {"effect": effect, "kind": kind, "score": score, "test_rmse_mv": rmse_mv, "parameters": parameters}
+    parameters = {
+        "concentration_dependent_strength_factor": {"value": 1.25, "low": 1.1, "high": 1.4, "unit": "mohm"}
+    }
+    return {
+        "effect": effect,
+        "kind": kind,
+        "score": score,
+        "test_rmse_mv": rmse_mv,
+        "parameters": parameters,
+        "remark": "ends on a bound: concentration_dependent_diffusivity.negative_slope_at_full_charge",
+    }
 
 
 def discovery_view(n=4000, seed=0, verdict="found"):
