@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.pipeline.calibrate import calibrate_files
+from aesi.pipeline.notes import together
 from aesi.records import Measurement
 from flows import environment
 from flows.console import Console
@@ -19,12 +20,15 @@ def calibrate(
     environment.prepare()
     console = Console()
     console.say(f"Fitting the model's own parameters to {', '.join(m.name for m in measurements)} ...")
+    read = together(note for m in measurements for note in m.notes)
+    for note in read:
+        console.say(note)
     content = calibrate_files(cell, measurements, out, soc0, seed)
     for row in content["files"]:
         console.say(
             f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after"
         )
-    for text in (*content["undetermined"], *content["notes"]):
+    for text in (*content["undetermined"], *(note for note in content["notes"] if note not in read)):
         console.say(f"  {text}")
     if content["at_bounds"]:
         console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")

@@ -11,7 +11,7 @@ from functools import lru_cache
 from queue import Empty, Queue
 from typing import Any
 
-from aesi.errors import AesiError
+from aesi.errors import AesiError, InputError
 from aesi.records import Failed
 from flows import codec
 from flows.pool import guarded
@@ -37,9 +37,14 @@ class DaskPool:
     """
 
     def __init__(self, content: str, base: str, address: str | None, workers: int, timeout_s: float) -> None:
-        import dask
-        from distributed import Client, LocalCluster
-
+        try:
+            import dask
+            from distributed import Client, LocalCluster
+        except ImportError as error:
+            raise InputError(
+                f"the runner dask needs Dask, which is not installed ({error}): pip install 'dask[distributed]', "
+                "or use the runner local."
+            ) from None
         self._content, self._base, self._timeout_s = content, base, timeout_s
         self._cluster = None
         if address is None:

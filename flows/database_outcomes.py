@@ -132,7 +132,7 @@ class DatabaseOutcomes:
         try:
             return self._sa.create_engine(url, pool_pre_ping=True, **options)
         except (ImportError, self._sa.exc.ArgumentError) as error:
-            advice = "; pip install 'aesi[cluster]'" if isinstance(error, ImportError) else ""
+            advice = "; pip install psycopg2-binary" if isinstance(error, ImportError) else ""
             raise InputError(f"runner.storage is no database that can be used: {error}{advice}.") from None
 
     def _create(self) -> None:

@@ -184,8 +184,12 @@ def _track_result(
 
 
 def _say(console: Console, content: dict[str, Any], out: Path, started: float) -> None:
-    effects = ", ".join(content["effects"]) or "no effect"
-    console.say(f"{content['verdict']}: {effects} ({100 * content['confidence']:.0f} % confidence)")
+    from aesi.pipeline.report.words import confidence, reason_finding
+
+    nothing = "nothing to add" if content["verdict"] == "none" else "no effect of the catalogue explains it"
+    effects = ", ".join(content["effects"]) or nothing
+    console.say(f"{content['verdict']}: {effects} ({confidence(content)})")
+    console.say(f"  {reason_finding(content)}")
     for group in content["indistinguishable"]:
         console.say(f"  these data cannot tell apart: {', '.join(group)}")
     rmse: Callable[[str, str], float] = lambda state, part: content[state][part]["rmse_mv"]  # noqa: E731

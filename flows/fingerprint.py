@@ -9,7 +9,7 @@ from pathlib import Path
 import aesi
 
 # Presentation does not change a number, so editing a report keeps the cache.
-PRESENTATION = ("pipeline/report", "pipeline/tables.py", "pipeline/figures.py", "bench")
+PRESENTATION = ("pipeline/report", "pipeline/table", "pipeline/figures.py", "bench")
 
 
 @cache

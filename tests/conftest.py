@@ -15,15 +15,19 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
+BESIDE = ROOT.parent / "shared" / "data"
+
+if BESIDE.is_dir():
+    # Here and not in a fixture: experiments that tests run in processes of their own look there too.
+    os.environ.setdefault("AESI_DATA", str(BESIDE))
 
 
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The folder of measured cells, drive schedules and labelled virtual cases; skips where it is absent."""
-    candidates = [os.environ.get("AESI_DATA"), ROOT.parent / "shared" / "data"]
-    for candidate in candidates:
-        if candidate and Path(candidate).is_dir():
-            return Path(candidate)
+    folder = Path(os.environ.get("AESI_DATA", ""))
+    if os.environ.get("AESI_DATA") and folder.is_dir():
+        return folder
     pytest.skip("no measured data here: set AESI_DATA to their folder")
 
 

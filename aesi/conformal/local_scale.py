@@ -25,8 +25,8 @@ from aesi.numerics.typing import Array
 LOW_SOC = 0.25
 MEMORY_S = 60.0
 TRUST = 0.7
-"""Chosen on virtual cells (`aesi bench bands`) and on left-out training pieces of measured ones: drives over many
-schedules want 1, a drive of few unlike pieces wants 0.5 or less."""
+"""A judgement between one width for all (0) and the fitted size as it is (1). `aesi bench bands` shows what it gives,
+beside one width for all."""
 RELATIVE_FLOOR = 0.1
 """q stays above this share of the mean |error|: a scale near zero would promise a perfect model."""
 MOST_ROWS = 6000

@@ -16,8 +16,8 @@ from aesi.data.fetch import Remote, fetch
 from aesi.data.laboratory.cache import cache_folder
 from aesi.errors import DataError
 
-NEIGHBOUR = Path("..", "shared", "data")
-"""A folder of data beside the project, looked into from the working directory."""
+FOLDER_VARIABLE = "AESI_DATA"
+"""Names a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""
 SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".bpx.json", ".json")
 
 ABOUT_ENERGY = (
@@ -131,7 +131,10 @@ def listing() -> tuple[str, ...]:
         elif one.files:
             place = f"not here yet: aesi data get {one.name}"
         else:
-            place = f"not here; by hand: {one.how} Put the files into {_own_folder(one.name)}."
+            place = (
+                f"not here; by hand: {one.how} Put the files into {_own_folder(one.name)}, or into a folder "
+                f"{one.name} of the one that {FOLDER_VARIABLE} names."
+            )
         lines += [
             f"{one.name}: {one.cell}",
             f"  {one.tests}",
@@ -191,10 +194,9 @@ def _own_folder(name: str) -> Path:
 
 def _folder(name: str) -> Path | None:
     """The first folder on this machine that holds the set."""
-    roots = [Path(os.environ["AESI_DATA"]).expanduser()] if os.environ.get("AESI_DATA") else []
-    roots.append(NEIGHBOUR)
-    places = [place for root in roots for place in (root / name, root / "measured" / name)]
-    for place in (*places, _own_folder(name)):
+    own = os.environ.get(FOLDER_VARIABLE)
+    given = [Path(own).expanduser() / below / name for below in ("", "measured")] if own else []
+    for place in (*given, _own_folder(name)):
         if place.is_dir() and _complete(name, place):
             return place
     return None

@@ -58,10 +58,16 @@ class Mapped:
     notes: tuple[str, ...]
 
 
-def map_columns(header: tuple[str, ...], columns: Mapping[str, str | None] | None, file: str) -> Mapped:
+def map_columns(
+    header: tuple[str, ...],
+    columns: Mapping[str, str | None] | None,
+    file: str,
+    required: tuple[str, ...] = REQUIRED,
+) -> Mapped:
     """Find the quantities among the header's names.
 
     columns : quantity -> name, or None to leave it out; goes before the known names.
+    required : what has to be there; the rest is found where it is.
     Raises DataError for an unknown quantity, a name that is missing or there twice, and a unit not SI.
     """
     given = dict(columns or {})
@@ -76,7 +82,7 @@ def map_columns(header: tuple[str, ...], columns: Mapping[str, str | None] | Non
         if quantity in given:
             name = given[quantity]
             if name is None:
-                if quantity in REQUIRED:
+                if quantity in required:
                     raise DataError(f"{file}: {quantity} cannot be left out.")
                 notes.append(f"{quantity} was left out as asked.")
                 continue
@@ -91,7 +97,7 @@ def map_columns(header: tuple[str, ...], columns: Mapping[str, str | None] | Non
                 bdf_current |= quantity == "current_a"
         if found is not None:
             position[quantity] = found
-        elif quantity in REQUIRED:
+        elif quantity in required:
             missing.append(quantity)
     if missing:
         raise _missing(missing, header, file)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from aesi.data.checks import Columns, Context, check_finite, check_time
 from aesi.data.columns import map_columns
-from aesi.data.read import Sign, read_measurement
+from aesi.data.read import Sign, orient, read_measurement
 from aesi.data.readers import open_table
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -16,7 +16,10 @@ from aesi.numerics.typing import Array
 
 @dataclass(frozen=True, eq=False)
 class CurrentProfile:
-    """time_s, current_a : (n,) s, A (discharge positive).  voltage_v, temperature_degc : (n,) or None."""
+    """time_s, current_a : (n,) s, A (discharge positive).  voltage_v, temperature_degc : (n,) or None.
+
+    notes : what the reader dropped, mapped or turned, one sentence each.
+    """
 
     time_s: Array
     current_a: Array
@@ -35,12 +38,8 @@ def read_current(
     """
     table = open_table(path)
     file = table.path.name
-    try:
-        map_columns(table.header, columns, file)
-    except DataError:
-        if columns and columns.get("voltage_v"):
-            raise
-    else:
+    mapped = map_columns(table.header, columns, file, required=("time_s", "current_a"))
+    if "voltage_v" in mapped.position:
         measured = read_measurement(path, columns, sign, max_rows=None)
         return CurrentProfile(
             measured.time_s,
@@ -49,9 +48,7 @@ def read_current(
             measured.temperature_degc,
             measured.notes,
         )
-    # The mapping asks for a voltage; a name beyond the last column stands for the one that is not there.
-    mapped = map_columns((*table.header, "voltage_v"), columns, file)
-    quantities = tuple(q for q in mapped.position if q != "voltage_v")
+    quantities = tuple(mapped.position)
     arrays = table.read(tuple(mapped.position[q] for q in quantities))
     data: Columns = dict(zip(quantities, arrays, strict=True))
     if len(data["time_s"]) < 2:
@@ -61,8 +58,12 @@ def read_current(
     context = Context(file, mapped.header, table.where)
     check_finite(data, context)
     check_time(data["time_s"], context)
-    if mapped.bdf_current or sign == "charge-positive":
-        data["current_a"] = -data["current_a"]
+    notes = [*table.notes, *mapped.notes]
+    orient(data, mapped, sign, notes)
     return CurrentProfile(
-        data["time_s"], data["current_a"], None, data.get("temperature_degc"), (*table.notes, *mapped.notes)
+        data["time_s"],
+        data["current_a"],
+        None,
+        data.get("temperature_degc"),
+        tuple(f"{file}: {note}" for note in notes),
     )

@@ -74,7 +74,7 @@ def read_measurement(
         )
     context = Context(file, mapped.header, table.where)
     notes = [*table.notes, *mapped.notes]
-    _orient(data, mapped, sign, notes)
+    orient(data, mapped, sign, notes)
     data, context = _window(data, context, start_s, stop_s, notes)
     check_finite(data, context)
     data, context = _without_duplicates(data, context, duplicates, notes)
@@ -101,8 +101,8 @@ def _check_choice(what: str, value: str, choices: tuple[str, ...]) -> None:
         raise DataError(f"{what} = {value!r} is unknown; give {' or '.join(choices)}.")
 
 
-def _orient(data: Columns, mapped: Mapped, sign: Sign, notes: list[str]) -> None:
-    """Turn the current discharge-positive."""
+def orient(data: Columns, mapped: Mapped, sign: Sign, notes: list[str]) -> None:
+    """Turn the current of `data` discharge-positive, in place, and add a note where that took a turn."""
     if mapped.bdf_current:
         notes.append("BDF current is positive on charge; its sign was turned.")
     elif sign == "charge-positive":

@@ -90,7 +90,7 @@ def to_even(measurement: Measurement, dt_s: float) -> Measurement:
     if is_even(time, dt_s):
         return measurement
     note = (
-        f"Resampled from {len(time)} rows to {{rows}} rows every {dt_s:g} s: interval averages of the "
+        f"Resampled from {len(time):,} rows to {{rows:,}} rows every {dt_s:g} s: interval averages of the "
         "current, {voltage}."
     )
     return _onto(measurement, even_stamps(time, dt_s), note)
@@ -105,7 +105,7 @@ def decimate(measurement: Measurement, max_rows: int) -> Measurement:
         raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")
     run = -(-(n - 1) // (max_rows - 1))
     note = (
-        f"Decimated from {n} to {{rows}} rows: runs of {run} rows, interval averages of the current, "
+        f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, interval averages of the current, "
         "{voltage}."
     )
     return _onto(measurement, measurement.time_s[::run], note)
@@ -117,11 +117,12 @@ def _onto(measurement: Measurement, stamps: Array, note: str) -> Measurement:
     along = intervals.linear if dense else intervals.sampled
     temperature = measurement.temperature_degc
     voltage = "interval averages of the voltage" if dense else "the voltage at the stamps"
+    told = f"{measurement.name}: {note.format(rows=len(stamps), voltage=voltage)}"
     return replace(
         measurement,
         time_s=stamps,
         current_a=intervals.held(measurement.current_a),
         voltage_v=along(measurement.voltage_v),
         temperature_degc=None if temperature is None else along(temperature),
-        notes=(*measurement.notes, note.format(rows=len(stamps), voltage=voltage)),
+        notes=(*measurement.notes, told),
     )

@@ -111,13 +111,13 @@ class Cell:
 
         Raises CellError, one sentence, for a file that fails the schema or lacks a field this model needs.
         """
-        from aesi.physics.bpx_io import read_bpx
+        from aesi.physics.bpx_read import read_bpx
 
         return read_bpx(source)
 
     def to_bpx(self) -> dict[str, Any]:
         """The cell as a BPX 1.x dict; `Cell.from_bpx` gives the cell back."""
-        from aesi.physics.bpx_io import write_bpx
+        from aesi.physics.bpx_write import write_bpx
 
         return write_bpx(self)
 

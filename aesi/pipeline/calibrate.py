@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.pipeline.discover import declared
+from aesi.pipeline.notes import together
 from aesi.records import Measurement
 from aesi.tracer.calibrate import Calibration, calibrate
 
@@ -23,7 +24,7 @@ def calibrate_files(
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
     found = calibrate(declared(cell)[0], measurements, soc0=soc0, seed=seed)
-    content = to_json(found)
+    content = to_json(found, [note for m in measurements for note in m.notes])
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
     report = out.with_suffix(".report.json")
@@ -32,8 +33,11 @@ def calibrate_files(
     return content
 
 
-def to_json(found: Calibration) -> dict[str, Any]:
-    """The report: errors by file, parameters with intervals, what stays open."""
+def to_json(found: Calibration, read: Sequence[str] = ()) -> dict[str, Any]:
+    """The report: errors by file, parameters with intervals, what stays open.
+
+    read : what a reader dropped, mapped or averaged in the files.
+    """
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
@@ -49,7 +53,7 @@ def to_json(found: Calibration) -> dict[str, Any]:
         "declared_capacity_ah": found.declared.capacity_ah,
         "undetermined": list(found.undetermined),
         "at_bounds": list(found.at_bounds),
-        "notes": list(found.notes),
+        "notes": list(together((*read, *found.notes))),
         "seconds": round(found.seconds, 2),
     }
 

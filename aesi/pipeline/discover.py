@@ -15,6 +15,7 @@ from aesi.errors import InputError
 from aesi.physics import ActiveEffect, Cell
 from aesi.physics.effects import CATALOGUE, Effect, load_effect
 from aesi.pipeline.hybrid import HybridModel
+from aesi.pipeline.notes import together
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
@@ -25,6 +26,8 @@ SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
 ARCHIVE = "hypotheses.jsonl"
 MV = 1e3
+ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
+"""Words of effect ids that a title writes in another way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +90,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
     from aesi.pipeline.report import write_discovery_report
 
-    content = to_json(found)
+    content = to_json(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content, indent=1, allow_nan=False)
     (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
@@ -97,8 +100,8 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     return content
 
 
-def to_json(found: Discovery) -> dict[str, Any]:
-    """The content of discovery.json."""
+def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
+    """The content of discovery.json.  read : what a reader dropped, mapped or averaged in the files."""
     verdict = found.verdict
     return {
         "schema": SCHEMA,
@@ -130,7 +133,7 @@ def to_json(found: Discovery) -> dict[str, Any]:
         "files": _file_rows(found),
         "dependence": _dependence(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
-        "notes": list(found.notes),
+        "notes": list(together((*read, *found.notes))),
         "seconds": round(found.seconds, 2),
         "simulations": found.simulations,
     }
@@ -161,9 +164,7 @@ def _dependence(found: Discovery) -> list[dict[str, Any]]:
 
 def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = "") -> DiscoveryView:
     """What the report shows."""
-    titles = {name: name.replace("_", " ") for name in CATALOGUE} | {
-        c.effect: c.effect.replace("_", " ") for c in found.candidates
-    }
+    titles = {name: _title(name) for name in (*CATALOGUE, *(c.effect for c in found.candidates))}
     return DiscoveryView(
         title=title,
         cell=found.cell.name,
@@ -179,11 +180,15 @@ def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id
         dependence=tuple(content["dependence"]),
         experiments=tuple(content["experiments"]),
         titles=titles,
-        notes=(f"{found.verdict.word}: {found.verdict.reason}.", *found.notes),
+        notes=tuple(content["notes"]),
         versions={name: version(name) for name in ("aesi", "numpy", "scipy")},
         mlflow_run_id=mlflow_run_id,
         seconds=found.seconds,
     )
+
+
+def _title(effect: str) -> str:
+    return " ".join(ABBREVIATIONS.get(word, word) for word in effect.split("_"))
 
 
 def _effect_view(found: Discovery, name: str) -> EffectView:
@@ -203,7 +208,7 @@ def _effect_view(found: Discovery, name: str) -> EffectView:
     )
     return EffectView(
         id=name,
-        title=name.replace("_", " "),
+        title=_title(name),
         kind=effect.kind,
         equation=effect.equation,
         validity=effect.validity,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     from aesi.physics import ActiveEffect
 
+SayNotes = Callable[[Iterable[str]], None]
+
 
 def simulate_file(
     cell: Path,
@@ -31,13 +33,15 @@ def simulate_file(
     hold: Hold = "linear",
     columns: Mapping[str, str | None] | None = None,
     sign: Sign = "discharge-positive",
+    say_notes: SayNotes | None = None,
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     soc0 : None takes it from the first voltage of the file, where it has one, else from the saved model.
+    say_notes : is given what the reader dropped or mapped, one sentence each.
     """
-    profile = read_current(current, columns, sign)
+    profile = _read(current, columns, sign, say_notes)
     saved = HybridModel.load(cell) if cell.is_dir() else None
     declared = saved.cell if saved else Cell.from_bpx(cell)
     active = (*(saved.effects if saved else ()), *_activated(effects, effect_files))
@@ -69,12 +73,13 @@ def predict_file(
     soc0: float | None = None,
     columns: Mapping[str, str | None] | None = None,
     sign: Sign = "discharge-positive",
+    say_notes: SayNotes | None = None,
 ) -> int:
     """Predict the voltage of the profile in `current`, write it with its band to `out`; the number of rows.
 
-    measured : one step ahead from the file's voltage; otherwise a free run.
+    measured : one step ahead from the file's voltage; otherwise a free run.  say_notes : as in `simulate_file`.
     """
-    profile = read_current(current, columns, sign)
+    profile = _read(current, columns, sign, say_notes)
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
     hybrid = HybridModel.load(model)
@@ -96,6 +101,15 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     import pandas as pd
 
     _write(path, pd.DataFrame(columns))
+
+
+def _read(
+    current: Path, columns: Mapping[str, str | None] | None, sign: Sign, say_notes: SayNotes | None
+) -> CurrentProfile:
+    profile = read_current(current, columns, sign)
+    if say_notes is not None:
+        say_notes(profile.notes)
+    return profile
 
 
 def _start(hybrid: HybridModel, profile: CurrentProfile, soc0: float | None) -> float | None:

@@ -1,4 +1,4 @@
-"""The tables of the paper, from plain rows to Markdown, LaTeX and CSV.
+"""The tables of the paper, from plain rows: what stands in which.
 
 A row is an entry of `models` in a run's summary.json. Every value is optional and shows as a dash where it is
 absent; beyond the published schema a row may carry
@@ -18,28 +18,16 @@ Captions name the regime, because figures of the two regimes must never be read 
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
+
+from aesi.pipeline.table_formats import ABSENT, Table, to_csv, to_latex, to_markdown
 
 Row = Mapping[str, Any]
 Format = Literal["md", "tex", "csv"]
 
-ABSENT = "–"
 MILLIVOLT_PER_VOLT = 1e3
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table ready to be set: `key` names it in LaTeX labels, `rows` hold formatted cells, name first."""
-
-    key: str
-    caption: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
 
 
 def free_run_table(models: Sequence[Row]) -> Table:
@@ -164,43 +152,6 @@ def render(models: Sequence[Row], format: Format = "md") -> str:
     return "\n".join(write(table) for table in all_tables(models))
 
 
-def to_markdown(table: Table) -> str:
-    """Caption, then a pipe table with the numbers aligned to the right."""
-    rule = ["---"] + ["---:"] * (len(table.header) - 1)
-    lines = [_pipe(table.header), "|" + "|".join(rule) + "|", *(_pipe(row) for row in table.rows)]
-    return f"{table.caption}\n\n" + "\n".join(lines) + "\n"
-
-
-def to_latex(table: Table) -> str:
-    """A floating table in the style of booktabs; needs that package and a UTF-8 engine or inputenc."""
-    body = [_ampersand(table.header), r"\midrule", *(_ampersand(row) for row in table.rows)]
-    return "\n".join(
-        [
-            r"\begin{table}[htbp]",
-            r"\centering",
-            rf"\caption{{{_tex(table.caption)}}}",
-            rf"\label{{tab:{table.key}}}",
-            rf"\begin{{tabular}}{{l{'r' * (len(table.header) - 1)}}}",
-            r"\toprule",
-            *body,
-            r"\bottomrule",
-            r"\end{tabular}",
-            r"\end{table}",
-            "",
-        ]
-    )
-
-
-def to_csv(table: Table) -> str:
-    """The caption as a comment line, then comma-separated cells; absent values are empty."""
-    out = io.StringIO()
-    out.write(f"# {table.caption}\n")
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(table.header)
-    writer.writerows([["" if cell == ABSENT else cell for cell in row] for row in table.rows])
-    return out.getvalue()
-
-
 Column = tuple[str, Callable[[Row], str]]
 
 
@@ -267,30 +218,3 @@ def _formatted(value: float | None, digits: int) -> str:
     if value is None or math.isnan(value):
         return ABSENT
     return f"{value:.{digits}f}"
-
-
-def _pipe(cells: Sequence[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", r"\|") for cell in cells) + " |"
-
-
-def _ampersand(cells: Sequence[str]) -> str:
-    return " & ".join(_tex(cell) for cell in cells) + r" \\"
-
-
-_TEX = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    ABSENT: "--",
-}
-
-
-def _tex(text: str) -> str:
-    return "".join(_TEX.get(character, character) for character in text)

@@ -35,6 +35,7 @@ def simulate(
         hold=hold,
         columns=options.columns(column),
         sign=sign,
+        say_notes=options.say_notes,
     )
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
     typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)
@@ -62,6 +63,7 @@ def predict(
         soc0=soc0,
         columns=options.columns(column),
         sign=sign,
+        say_notes=options.say_notes,
     )
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
@@ -134,7 +136,5 @@ def discover(
         seed,
         effect_file or [],
     )
-    for measurement in (*case.measurements, *case.tests):
-        for note in measurement.notes:
-            typer.echo(f"{measurement.name}: {note}", err=True)
+    options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
     flow(case, out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -49,14 +50,18 @@ def columns(pairs: list[str] | None) -> dict[str, str | None]:
 def measurements(
     paths: list[Path], pairs: list[str] | None, sign: Literal["discharge-positive", "charge-positive"]
 ) -> tuple[Measurement, ...]:
-    """The files as measurements; what the reader dropped or mapped is said on stderr."""
+    """The files as measurements."""
     from aesi.data import read_measurement
 
-    found = tuple(read_measurement(path, columns=columns(pairs), sign=sign) for path in paths)
-    for measurement in found:
-        for note in measurement.notes:
-            typer.echo(f"{measurement.name}: {note}", err=True)
-    return found
+    return tuple(read_measurement(path, columns=columns(pairs), sign=sign) for path in paths)
+
+
+def say_notes(notes: Iterable[str]) -> None:
+    """What a reader dropped, mapped or averaged, on stderr."""
+    from aesi.pipeline.notes import together
+
+    for note in together(notes):
+        typer.echo(note, err=True)
 
 
 def effect_values(text: str) -> tuple[str, dict[str, float]]:

@@ -15,6 +15,8 @@ def discovery_report(views, tmp_path_factory):
     return write_discovery_report(tmp_path_factory.mktemp("d") / "report.html", views.discovery_view(20_000))
 
 
+PAPER_PX = 720
+"""The text of a page of A4 at 96 dots an inch, less its margins."""
 SHOWN = "[...document.querySelectorAll('.plot')].filter(d => !d.closest('details:not([open])'))"
 
 
@@ -67,6 +69,18 @@ def test_printing_opens_and_draws_everything(page, run_report):
     page.open(run_report)
     assert page.pdf().startswith(b"%PDF")
     assert page.evaluate("[...document.querySelectorAll('.plot')].every(d => d.querySelector('.main-svg'))")
+
+
+@pytest.mark.parametrize("report", ["run_report", "discovery_report"])
+def test_no_table_is_wider_than_the_paper(page, request, report):
+    page.open(request.getfixturevalue(report), width=PAPER_PX)
+    page.evaluate("document.querySelectorAll('details').forEach(d => d.open = true)")
+    page.call("Emulation.setEmulatedMedia", media="print")
+    try:
+        wide = "[...document.querySelectorAll('table')].filter(t => t.getBoundingClientRect().right > innerWidth)"
+        assert page.evaluate(f"{wide}.map(t => t.textContent.trim().slice(0, 80))") == []
+    finally:
+        page.call("Emulation.setEmulatedMedia", media="")
 
 
 @pytest.mark.slow

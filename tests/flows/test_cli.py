@@ -81,6 +81,21 @@ def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
     assert table["soc"][0] == pytest.approx(0.6, abs=1e-3)
 
 
+def test_a_profile_with_other_headers_is_told_only_of_columns_that_it_has(call, cell, tmp_path):
+    path = tmp_path / "bad.csv"
+    path.write_text("Time [s],I [A]\n0,0\n1,1\n")
+    code, _, err = call("simulate", "--cell", cell, "--current", path, "--out", tmp_path / "o.csv")
+    assert code == 2
+    assert err.endswith("It has: 'Time [s]', 'I [A]'.\n")
+
+
+def test_what_the_reader_did_to_a_profile_is_said(call, cell, current, tmp_path):
+    arguments = ("simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o.csv", "--soc0", 0.6)
+    code, _, err = call(*arguments, "--sign", "charge-positive")
+    assert code == 0, err
+    assert f"{current.name}: The current was declared positive on charge; its sign was turned." in err
+
+
 def test_an_effect_of_the_catalogue_can_be_added(call, cell, current, tmp_path):
     arguments = ("simulate", "--cell", cell, "--current", current, "--soc0", 0.6, "--out")
     call(*arguments, tmp_path / "a.csv")

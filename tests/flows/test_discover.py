@@ -27,7 +27,9 @@ def case(monkeypatch):
     current[:60] = 0.0
     effect = CATALOGUE["series_resistance"].activate(resistance_ohm=2e-4)
     voltage = simulate(Cell.from_bpx(CELL), time, current, 0.9, (effect,)).voltage_v
-    data = Measurement(time, current, voltage + 1e-3 * rng.normal(size=1800), name="drive")
+    data = Measurement(
+        time, current, voltage + 1e-3 * rng.normal(size=1800), name="drive", notes=("drive: thinned.",)
+    )
     return Case(CELL, (data,), soc0=0.9)
 
 
@@ -41,7 +43,10 @@ def test_everything_is_written_and_tracked(tracked, case):
     assert content["schema"] == "aesi.discovery/1"
     assert content["effects"] == ["series_resistance"]
     assert content["after"]["test"]["rmse_mv"] < content["before"]["test"]["rmse_mv"]
-    assert "series_resistance" in (out / "report.html").read_text()
+    assert content["notes"][0] == "drive: thinned."
+    report = (out / "report.html").read_text()
+    assert "series_resistance" in report
+    assert "<li>drive: thinned.</li>" in report
     model = HybridModel.load(out / "model")
     data = case.measurements[0]
     voltage = model.predict(data.time_s, data.current_a, soc0=model.soc0).voltage_v

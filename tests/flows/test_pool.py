@@ -2,12 +2,13 @@
 
 import os
 import signal
+import sys
 import time
 
 import numpy as np
 import pytest
 
-from aesi.errors import FitError
+from aesi.errors import FitError, InputError
 from aesi.records import Failed
 from flows.pool import LocalPool
 
@@ -114,3 +115,11 @@ def test_the_processes_of_a_killed_parent_end(tmp_path):
     gone, alive = psutil.wait_procs(children, timeout=10)
     assert not alive
     assert len(gone) == 2
+
+
+def test_without_dask_it_says_what_to_install(monkeypatch):
+    from flows.dask_pool import DaskPool
+
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'dask\[distributed\]'"):
+        DaskPool("{}", "", None, workers=1, timeout_s=1.0)

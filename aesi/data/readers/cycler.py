@@ -1,7 +1,7 @@
 """Files as cyclers write them (BioLogic .mpt, Neware .nda and .ndax), through the Battery Data Alliance's reader.
 
 The package `batterydf` knows the makes, their units and their versions; it hands over a table in the battery
-data format. It is an extra: `pip install 'aesi[cyclers]'`. Other exports are CSV and need no more than a mapping
+data format. It is an extra (`cyclers`). Other exports are CSV and need no more than a mapping
 of their columns.
 """
 
@@ -46,7 +46,7 @@ def _normalised(path: Path) -> Any:
         import bdf
     except ImportError:
         raise DataError(
-            f"{path.name} is a cycler's own file; install its reader (pip install 'aesi[cyclers]'), "
+            f"{path.name} is a cycler's own file; install its reader (pip install batterydf), "
             "or export the test as CSV."
         ) from None
     try:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.pipeline.report.style import SECONDS_PER_HOUR
 from aesi.pipeline.report.views import DiscoveryView, Row, RunView
 
 SAME_SHARE = 0.98
 """An error after that is not below this share of the recalibrated one is no better than a refit."""
 LARGE_SHARE = 0.5
 """An explainable rest above this share of the remaining error is worth a sentence."""
+NEARLY = 0.98
+"""A one-step error above this share of persistence's is called no better than it."""
+CERTAIN = 0.99
+"""A confidence above it is not told to the per cent: the noise model behind it is itself a model."""
 
 
 def run_finding(view: RunView) -> str:
@@ -42,7 +50,7 @@ def persistence_finding(model: Row) -> str:
     ours, echo = (_figure(model, "one_step", key) for key in ("test_rmse_mv", "persistence_rmse_mv"))
     if ours is None or echo is None:
         return ""
-    verdict = "better than" if ours < echo else "no better than"
+    verdict = "better than" if ours < NEARLY * echo else "no better than"
     return (
         f"One step ahead, with the measured voltage given, it errs by {ours:.2f} mV, {verdict} repeating "
         f"the last error (persistence, {echo:.2f} mV): one-step figures flatter, the free run is the "
@@ -77,7 +85,7 @@ def interval_finding(model: Row) -> str:
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such."""
     verdict, effects = view.discovery["verdict"], view.discovery["effects"]
-    sure = f" ({100 * view.discovery['confidence']:.0f} % confidence)"
+    sure = f" ({confidence(view.discovery)})"
     if verdict == "none":
         return f"Nothing is missing from the declared model of {view.cell} that these data could show{sure}."
     if verdict == "unknown":
@@ -86,6 +94,50 @@ def discovery_finding(view: DiscoveryView) -> str:
             return f"The declared model of {view.cell} misses something real {rest}{sure}."
         return f"{_named(view, effects)}; and something real is left {rest}{sure}."
     return f"{_named(view, effects)}{sure}."
+
+
+def confidence(discovery: Mapping[str, Any]) -> str:
+    """The confidence of a verdict, never as certainty."""
+    value = discovery["confidence"]
+    return f"over {100 * CERTAIN:.0f} % confidence" if value > CERTAIN else f"{100 * value:.0f} % confidence"
+
+
+def reason_finding(discovery: Mapping[str, Any]) -> str:
+    """What the verdict rests on: the error left beyond the noise against what any such model may leave."""
+    left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
+    amount = f"{left:.2f} mV of voltage error are left beyond the noise of the sensors"
+    if discovery["verdict"] == "none":
+        return (
+            f"Why: on the data looked at, {amount}. Up to {allowed:.2f} mV are what the noise and the accuracy of any "
+            "such model leave open, so these data give no reason to change it."
+        )
+    if discovery["verdict"] == "found":
+        return f"Why: with the finding added {amount}; up to {allowed:.2f} mV count as explained."
+    if left > allowed:
+        found = "with what was found added, " if discovery["effects"] else ""
+        return (
+            f"Why: {found}{amount} on the data looked at, and no more than {allowed:.2f} mV would count as explained. "
+            "The list of hypotheses says what came nearest, and why it was not accepted; data of another kind (a slow "
+            "discharge, pulses with rests, another temperature) would narrow it down."
+        )
+    return f"Why: {discovery['reason']}."
+
+
+def span_finding(view: DiscoveryView) -> str:
+    """What the data cover, so that nobody reads the verdict as one about more."""
+    if not view.traces:
+        return ""
+    hours = sum(float(t.time_s[-1] - t.time_s[0]) for t in view.traces) / SECONDS_PER_HOUR
+    current, soc = (_range(getattr(t, name) for t in view.traces) for name in ("current_a", "soc"))
+    return (
+        f"The data span {hours:.1f} h, {100 * soc[0]:.0f} to {100 * soc[1]:.0f} % state of charge and currents from "
+        f"{current[0]:.3g} to {current[1]:.3g} A (discharge positive); nothing is said beyond them."
+    )
+
+
+def _range(columns: Iterable[Array]) -> tuple[float, float]:
+    parts = list(columns)
+    return min(float(np.nanmin(part)) for part in parts), max(float(np.nanmax(part)) for part in parts)
 
 
 def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
@@ -150,10 +202,18 @@ def rest_finding(discovery: Mapping[str, Any]) -> str:
     """What a data-driven correction could still explain."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")
     text = f"A flexible correction learnt on what is left could still explain {rest:.1f} mV"
-    if after:
-        share = "much" if rest > LARGE_SHARE * after else "little"
-        text += f" of {after:.1f} mV: {share} structure is left for physics to name"
-    return text + "."
+    if not after:
+        return text + "."
+    text += f" of {after:.1f} mV: "
+    if rest > LARGE_SHARE * after:
+        return text + "much structure is left for physics to name."
+    if discovery["structured_mv"] > discovery["tolerance_mv"]:
+        return (
+            text
+            + "what is left is more than noise, but follows none of the model's variables in a way that carries "
+            "over to unseen data. That points to an instrument, or to a state that the model does not have."
+        )
+    return text + "little structure is left for physics to name."
 
 
 def listed(names: Sequence[str]) -> str:

@@ -62,7 +62,16 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         discovery=view.discovery,
         states=STATES,
         finding=words.discovery_finding(view),
-        sentences=[s for s in (words.look_alike_finding(view), words.discovery_consequence(view)) if s],
+        sentences=[
+            sentence
+            for sentence in (
+                words.look_alike_finding(view),
+                words.discovery_consequence(view),
+                words.reason_finding(view.discovery),
+                words.span_finding(view),
+            )
+            if sentence
+        ],
         rest=words.rest_finding(view.discovery),
         candidates=sorted(view.discovery["candidates"], key=lambda row: -row["score"]),
     )
@@ -108,9 +117,9 @@ def _over_the_range(traces: Sequence[DiscoveryTrace], states: Mapping[str, str])
         "against_current": maps.dependence_figure(current, errors, states, "current, A (discharge > 0)"),
         "against_soc": maps.dependence_figure(100 * soc, errors, states, "SOC, %"),
         "map_before": maps.map_figure(
-            current, soc, errors[ends[0]], states[ends[0]].capitalize(), False, limit
+            current, soc, errors[ends[0]], f"Mean error, {states[ends[0]]}", False, limit
         ),
         "map_after": maps.map_figure(
-            current, soc, errors[ends[1]], states[ends[1]].capitalize(), False, limit
+            current, soc, errors[ends[1]], f"Mean error, {states[ends[1]]}", False, limit
         ),
     }

@@ -20,13 +20,9 @@ RAW = "Time [s],I[A],U[V]\n" + "".join(
 
 @pytest.fixture(autouse=True)
 def nowhere(tmp_path, monkeypatch):
-    """No data set on disk, an empty cache, a working directory without neighbours."""
+    """No folder of data is named, and the cache is empty."""
     monkeypatch.delenv("AESI_DATA", raising=False)
     monkeypatch.setenv("AESI_CACHE", str(tmp_path / "cache"))
-    home = tmp_path / "here" / "project"
-    home.mkdir(parents=True)
-    monkeypatch.chdir(home)
-    return tmp_path
 
 
 @pytest.fixture
@@ -107,11 +103,15 @@ def test_a_copy_on_disk_goes_first(tmp_path, monkeypatch, below):
     assert any(str(folder) in line for line in catalogue.listing())
 
 
-def test_a_neighbouring_folder_is_found(tmp_path):
-    folder = tmp_path / "here" / "shared" / "data" / "measured" / "lg_m50t_w8"
-    folder.mkdir(parents=True)
-    (folder / "udds.csv").write_text("x")
-    assert catalogue.locate("lg_m50t_w8", "udds.csv").resolve() == folder / "udds.csv"
+def test_only_a_folder_that_is_named_is_looked_into(tmp_path, monkeypatch):
+    beside = tmp_path / "data" / "measured" / "lg_m50t_w8"
+    beside.mkdir(parents=True)
+    (beside / "udds.csv").write_text("x")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(DataError, match="cannot be fetched"):
+        catalogue.get("lg_m50t_w8")
+    monkeypatch.setenv("AESI_DATA", "data")
+    assert catalogue.locate("lg_m50t_w8", "udds.csv").resolve() == beside / "udds.csv"
 
 
 def test_a_folder_with_files_missing_does_not_count(tmp_path, monkeypatch, server):

@@ -33,7 +33,7 @@ def test_a_biologic_file_comes_out_in_amperes_discharge_positive(mpt):
 
 def test_without_the_reader_it_says_what_to_install(mpt, monkeypatch):
     monkeypatch.setitem(sys.modules, "bdf", None)
-    with pytest.raises(DataError, match=r"aesi\[cyclers\]"):
+    with pytest.raises(DataError, match="pip install batterydf"):
         read_measurement(mpt)
 
 

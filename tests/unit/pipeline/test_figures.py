@@ -97,6 +97,22 @@ def test_records_stand_end_to_end_without_overlap(views):
     assert placed[0].x[-1] <= placed[1].x[0]
 
 
+def test_the_name_of_a_record_too_short_for_it_is_left_out(views):
+    long, short = (
+        views.discovery_trace(name, "test", n, np.random.default_rng(0))
+        for name, n in (("a", 900), ("a_long_name", 30))
+    )
+    fig = records.residual_figure((long, short, long), {"before": "as declared"})
+    assert [note.text for note in fig.layout.annotations] == ["a", "a"]
+
+
+def test_losses_within_one_decade_still_have_ticks():
+    near = [{"oob": x, "valid": 2 * x, "terms": 5} for x in (0.16, 0.25)]
+    far = [*near, {"oob": 16.0, "valid": 40.0, "terms": 9}]
+    assert ensemble.front_figure(near).layout.xaxis.dtick is None  # powers of ten alone would show none
+    assert ensemble.front_figure(far).layout.xaxis.dtick == 1
+
+
 def test_long_tests_are_shown_in_hours(views):
     trace = views.trace("t", "test", 500, np.random.default_rng(0))
     placed, unit = timeline.end_to_end([replace(trace, time_s=trace.time_s * 1000)])

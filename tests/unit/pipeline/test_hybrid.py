@@ -11,6 +11,7 @@ from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.hybrid import HybridModel
 from aesi.pipeline.load import load
+from aesi.pipeline.model_folder import SCHEMA
 
 
 @pytest.fixture(scope="module")
@@ -98,13 +99,17 @@ def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
         again.predict(data.time_s, data.current_a)
 
 
-@pytest.mark.parametrize("damage", ["missing", "schema", "arrays", "part"])
+@pytest.mark.parametrize("damage", ["missing", "schema", "list", "no parts", "arrays", "part"])
 def test_a_damaged_folder_is_named(model, tmp_path, damage):
     folder = model.save(tmp_path / "model")
     if damage == "missing":
         (folder / "model.json").unlink()
     elif damage == "schema":
         (folder / "model.json").write_text(json.dumps({"schema": "another/9"}))
+    elif damage == "list":
+        (folder / "model.json").write_text("[]")
+    elif damage == "no parts":
+        (folder / "model.json").write_text(json.dumps({"schema": SCHEMA}))
     elif damage == "arrays":
         (folder / "arrays.npz").write_bytes(b"PK not a zip")
     else:

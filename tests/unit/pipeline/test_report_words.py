@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from aesi.pipeline.report import words
@@ -103,6 +104,49 @@ def test_a_refit_that_does_as_well_is_said_to(views):
     assert "refit" not in words.discovery_consequence(view).split(";")[1]
     same = {**view.discovery, "recalibrated": {"test": {"rmse_mv": 1.1}}}
     assert "can stand in for the finding" in words.discovery_consequence(replace(view, discovery=same))
+
+
+@pytest.mark.parametrize(
+    ("verdict", "phrases"),
+    [
+        (
+            "none",
+            ("0.30 mV of voltage error are left beyond the noise", "Up to 0.80 mV", "no reason to change"),
+        ),
+        ("found", ("with the finding added 0.30 mV", "up to 0.80 mV count as explained")),
+        ("unknown", ("4.00 mV of voltage error", "no more than 0.80 mV", "a slow discharge")),
+    ],
+)
+def test_the_verdict_says_what_it_rests_on(views, verdict, phrases):
+    text = words.reason_finding(views.discovery_view(200, verdict=verdict).discovery)
+    assert [phrase for phrase in phrases if phrase not in text] == []
+
+
+def test_a_rest_that_several_hypotheses_explain_names_the_best(views):
+    discovery = {**views.discovery_view(200, verdict="unknown").discovery, "structured_mv": 0.3}
+    assert words.reason_finding(discovery) == "Why: as the tracer words it."
+
+
+def test_a_rest_that_follows_nothing_is_not_called_little(views):
+    unknown = views.discovery_view(200, verdict="unknown").discovery
+    assert "follows none of the model's variables" in words.rest_finding(unknown)
+    assert "much structure" in words.rest_finding({**unknown, "explainable_mv": 0.9})
+    assert "little structure" in words.rest_finding(views.discovery_view(200).discovery)
+
+
+def test_no_verdict_is_called_certain():
+    assert words.confidence({"confidence": 1.0}) == "over 99 % confidence"
+    assert words.confidence({"confidence": 0.97}) == "97 % confidence"
+
+
+def test_the_range_that_the_data_cover_is_told(views):
+    view = views.discovery_view(3601)
+    t = view.traces[0]
+    soc, current_a = np.linspace(0.9, 0.2, 3601), np.linspace(-5.0, 12.5, 3601)
+    text = words.span_finding(replace(view, traces=(replace(t, soc=soc, current_a=current_a),)))
+    assert "span 1.0 h, 20 to 90 % state of charge" in text
+    assert "from -5 to 12.5 A" in text
+    assert words.span_finding(replace(view, traces=())) == ""
 
 
 def test_look_alikes_stand_next_to_the_verdict(views):

@@ -5,7 +5,7 @@ import io
 
 import pytest
 
-from aesi.pipeline import tables
+from aesi.pipeline import table_formats, tables
 
 ESPM = {
     "name": "ESPM",
@@ -81,12 +81,12 @@ def test_columns_without_any_value_are_left_out():
 def test_absent_and_nan_values_show_as_a_dash():
     models = [ESPM, {"name": "broken", "free_run": {"test_mser_pct": float("nan")}}]
     row = row_of(tables.free_run_table(models), "broken")
-    assert row["MSER test, %"] == tables.ABSENT
-    assert row["RMSE test, mV"] == tables.ABSENT
+    assert row["MSER test, %"] == table_formats.ABSENT
+    assert row["RMSE test, mV"] == table_formats.ABSENT
 
 
 def test_markdown_is_a_pipe_table_of_constant_width():
-    lines = tables.to_markdown(tables.free_run_table(MODELS)).splitlines()
+    lines = table_formats.to_markdown(tables.free_run_table(MODELS)).splitlines()
     assert lines[0].startswith("Table 1.")
     pipes = [line for line in lines if line.startswith("|")]
     assert len(pipes) == 2 + len(MODELS)
@@ -94,7 +94,7 @@ def test_markdown_is_a_pipe_table_of_constant_width():
 
 
 def test_latex_escapes_what_latex_would_eat():
-    text = tables.to_latex(tables.free_run_table([dict(ESPM, name="50% & a_b#1")]))
+    text = table_formats.to_latex(tables.free_run_table([dict(ESPM, name="50% & a_b#1")]))
     assert r"50\% \& a\_b\#1" in text
     assert r"\toprule" in text
     assert text.count(r"\begin{") == text.count(r"\end{")
@@ -104,7 +104,7 @@ def test_latex_escapes_what_latex_would_eat():
 
 def test_csv_reads_back_and_leaves_absent_values_empty():
     models = [ESPM, {"name": "a, b", "free_run": {"test_mser_pct": 1.0}}]
-    text = tables.to_csv(tables.free_run_table(models))
+    text = table_formats.to_csv(tables.free_run_table(models))
     comment, rest = text.split("\n", 1)
     assert comment.startswith("# Table 1.")
     rows = list(csv.DictReader(io.StringIO(rest)))

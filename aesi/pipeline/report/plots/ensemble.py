@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 MOST_TERMS = 30
 """Bars beyond this many are too thin to read; the rest is in coefficients.json."""
+POWERS_FROM = 30.0
+"""From this ratio of the largest to the smallest loss on, an axis shows enough powers of ten to be read by."""
 
 
 def front_figure(candidates: Sequence[Row]) -> Figure:
@@ -53,14 +55,14 @@ def front_figure(candidates: Sequence[Row]) -> Figure:
             _legend_entry(fig, name, symbol)
     bar = {"title": {"text": "terms"}, "thickness": 12}
     fig.update_layout(coloraxis={"colorscale": style.SEQUENTIAL, "colorbar": bar})
-    powers = {
-        "type": "log",
-        "dtick": 1,
-        "exponentformat": "power",
-        "minor": {"dtick": "D1", "ticks": "outside"},
-    }
-    fig.update_xaxes(title_text="out-of-bag loss, MSE over that of the physics", **powers)
-    fig.update_yaxes(title_text="validation loss, MSE over that of the physics", **powers)
+    fig.update_xaxes(
+        title_text="out-of-bag loss, MSE over that of the physics",
+        **_log_axis([c["oob"] for c in candidates]),
+    )
+    fig.update_yaxes(
+        title_text="validation loss, MSE over that of the physics",
+        **_log_axis([c["valid"] for c in candidates]),
+    )
     return fig
 
 
@@ -170,6 +172,15 @@ def _legend_entry(fig: Figure, name: str, symbol: str) -> None:
     """A symbol in one grey, because a legend cannot show a colour that varies by point."""
     marker = {"symbol": symbol, "size": 9, "color": style.GREY, "line": {"width": 1, "color": style.GREY}}
     fig.add_scatter(x=[None], y=[None], mode="markers", name=name, marker=marker)
+
+
+def _log_axis(values: Sequence[float]) -> dict[str, Any]:
+    """Powers of ten where the axis spans several; within one decade plotly's own ticks, or there would be none."""
+    known = np.array([value for value in values if value is not None and 0 < value < np.inf])
+    if known.size == 0 or known.max() < POWERS_FROM * known.min():
+        return {"type": "log"}
+    minor = {"dtick": "D1", "ticks": "outside"}
+    return {"type": "log", "dtick": 1, "exponentformat": "power", "minor": minor}
 
 
 def _tall(bars: int) -> int:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 OUTSIDE = "outside the trained range"
+SHARE_A_LETTER = 0.008
+"""Width of a letter of a record's name, as a share of the axis of a wide page."""
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,10 @@ def mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
     for item in placed[:-1]:
         fig.add_vline(x=float(item.x[-1]), line={"width": 1, "dash": "dot", "color": style.GREY})
     if len(placed) > 1:
+        length = float(placed[-1].x[-1] - placed[0].x[0])
         for item in placed:
+            if float(item.x[-1] - item.x[0]) < SHARE_A_LETTER * len(item.trace.name) * length:
+                continue  # it would run into the next
             fig.add_annotation(
                 x=float(item.x[0]),
                 y=1,

@@ -1,0 +1,101 @@
+"""A saved model as a folder of data: nothing in it is executed when it is read.
+
+model.json holds the schema, the names of the parts and the caller's own values; <part>.json one part each
+(cell.bpx, effects, correction, intervals, bands); arrays.npz the plain arrays that the JSON refers to by name.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aesi.errors import InputError
+from aesi.numerics.typing import Array
+
+SCHEMA = "aesi.model/1"
+HEAD = "model.json"
+ARRAYS = "arrays.npz"
+ARRAY_KEY = "array:"
+"""Prefix of a string that stands for an array of arrays.npz."""
+
+
+def write_model(folder: Path, head: Mapping[str, Any], parts: Mapping[str, Any]) -> None:
+    """Write the parts (JSON values and numpy arrays, nested) and the head to a folder, made where missing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    arrays: dict[str, Array] = {}
+    for name, content in parts.items():
+        _write_json(part_file(folder, name), _without_arrays(content, name, arrays))
+    np.savez_compressed(folder / ARRAYS, allow_pickle=False, **arrays)
+    _write_json(folder / HEAD, {"schema": SCHEMA, "parts": sorted(parts), **head})
+
+
+def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Inverse of `write_model`: head and parts.
+
+    Raises InputError naming the file that is missing or not as it was written.
+    """
+    head = _read_json(folder / HEAD, "a model folder is written by `aesi run` or `aesi discover`")
+    schema = head.get("schema") if isinstance(head, dict) else None
+    if schema != SCHEMA:
+        raise InputError(f"{folder / HEAD} has schema {schema!r}; this version reads {SCHEMA!r}.")
+    arrays = _read_arrays(folder / ARRAYS)
+    try:
+        return head, {
+            name: _with_arrays(_read_json(part_file(folder, name)), arrays) for name in head["parts"]
+        }
+    except (KeyError, TypeError) as error:
+        raise InputError(f"{folder} is not a whole model: {error} is missing; save it again.") from None
+
+
+def part_file(folder: Path, name: str) -> Path:
+    """Where a part is kept."""
+    return folder / f"{name}.json"
+
+
+def _without_arrays(value: Any, path: str, arrays: dict[str, Array]) -> Any:
+    """The value with every numpy array moved to `arrays` and a reference left in its place."""
+    if isinstance(value, np.ndarray):
+        arrays[path] = value
+        return ARRAY_KEY + path
+    if isinstance(value, Mapping):
+        return {key: _without_arrays(item, f"{path}.{key}", arrays) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_arrays(item, f"{path}.{index}", arrays) for index, item in enumerate(value)]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _with_arrays(value: Any, arrays: Mapping[str, Array]) -> Any:
+    """Inverse of `_without_arrays`."""
+    if isinstance(value, str) and value.startswith(ARRAY_KEY):
+        return arrays[value.removeprefix(ARRAY_KEY)]
+    if isinstance(value, dict):
+        return {key: _with_arrays(item, arrays) for key, item in value.items()}
+    if isinstance(value, list):
+        return [_with_arrays(item, arrays) for item in value]
+    return value
+
+
+def _write_json(path: Path, content: Any) -> None:
+    path.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+
+
+def _read_json(path: Path, hint: str = "save the model again") -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; {hint}.") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read ({error}); {hint}.") from None
+
+
+def _read_arrays(path: Path) -> dict[str, Array]:
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"{path} cannot be read ({error}); save the model again.") from None

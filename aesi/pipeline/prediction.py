@@ -1,0 +1,65 @@
+"""What a hybrid model says about a record: the voltage, its band, and the physics it rests on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from aesi.numerics.typing import Array, BoolArray
+from aesi.records import ErrorSeries
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A predicted voltage with its band, a value a sample.
+
+    voltage_v, lower_v, upper_v : (n,) V; the bounds are NaN where the model carries no calibrated band.
+    physics_v : (n,) V, the ESPM with its effects alone.  soc : (n,).
+    outside : (n,) True where an input lies outside the range the correction was trained on: the band is not
+    calibrated there.
+    """
+
+    time_s: Array
+    voltage_v: Array
+    lower_v: Array
+    upper_v: Array
+    physics_v: Array
+    soc: Array
+    outside: BoolArray
+    nominal: float | None = None
+
+    def to_frame(self) -> pd.DataFrame:
+        """The prediction as a table, one row a sample."""
+        import pandas as pd
+
+        names = ("time_s", "voltage_v", "lower_v", "upper_v", "physics_v", "soc", "outside")
+        return pd.DataFrame({name: getattr(self, name) for name in names})
+
+    @classmethod
+    def of(
+        cls,
+        series: ErrorSeries,
+        error_v: Array,
+        low_v: Array,
+        high_v: Array,
+        outside: BoolArray,
+        alpha: float | None,
+    ) -> Prediction:
+        """The physics of `series` with an error added to it; low_v, high_v : (n,) V, the band about the sum.
+
+        alpha : share of misses of the band; None where there is none.
+        """
+        voltage = series.model_v + error_v
+        return cls(
+            time_s=series.time_s,
+            voltage_v=voltage,
+            lower_v=voltage + low_v,
+            upper_v=voltage + high_v,
+            physics_v=series.model_v,
+            soc=series.soc,
+            outside=outside,
+            nominal=None if alpha is None else 1.0 - alpha,
+        )
