@@ -18,6 +18,8 @@ from aesi.errors import DataError
 
 FOLDER_VARIABLE = "AESI_DATA"
 """Names a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""
+SHARED = Path("shared") / "data"
+"""A group's copies, in the working folder or in one above it."""
 SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".bpx.json", ".json")
 
 ABOUT_ENERGY = (
@@ -195,8 +197,11 @@ def _own_folder(name: str) -> Path:
 def _folder(name: str) -> Path | None:
     """The first folder on this machine that holds the set."""
     own = os.environ.get(FOLDER_VARIABLE)
-    given = [Path(own).expanduser() / below / name for below in ("", "measured")] if own else []
-    for place in (*given, _own_folder(name)):
+    given = [Path(own).expanduser()] if own else []
+    here = Path.cwd()
+    shared = [above / SHARED for above in (here, *here.parents)]
+    copies = [folder / below / name for folder in (*given, *shared) for below in ("", "measured")]
+    for place in (*copies, _own_folder(name)):
         if place.is_dir() and _complete(name, place):
             return place
     return None

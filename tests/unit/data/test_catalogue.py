@@ -23,6 +23,7 @@ def nowhere(tmp_path, monkeypatch):
     """No folder of data is named, and the cache is empty."""
     monkeypatch.delenv("AESI_DATA", raising=False)
     monkeypatch.setenv("AESI_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture
@@ -144,3 +145,13 @@ def test_a_set_is_copied_where_asked(tmp_path, server):
     catalogue.get("about_energy_nmc")
     out = catalogue.get("about_energy_nmc", tmp_path / "out")
     assert sorted(p.name for p in out.iterdir()) == ["cell.bpx.json", "drive.csv"]
+
+
+def test_a_shared_folder_above_the_working_one_is_looked_into(tmp_path, monkeypatch):
+    folder = tmp_path / "shared" / "data" / "measured" / "lg_m50t_w8"
+    folder.mkdir(parents=True)
+    (folder / "udds.csv").write_text(RAW)
+    project = tmp_path / "group" / "project"
+    project.mkdir(parents=True)
+    monkeypatch.chdir(project)
+    assert catalogue.locate("lg_m50t_w8", "udds") == folder / "udds.csv"
