@@ -23,8 +23,6 @@ from flows.outbox import Item
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
 KIND = "aesi.kind"
-TRAINING = {"mlflow.experimentKind": "custom_model_development"}
-"""So that MLflow's UI opens on runs, charts and models, and not on what it has for language models."""
 REACH_S = 5.0
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
 PAGE = 1000
@@ -70,8 +68,7 @@ class Store:
                     self.client.restore_experiment(found.experiment_id)
                 return str(found.experiment_id)
             folder = environment.workspace() / "mlartifacts" / name
-            place = folder.as_uri() if self._local else None
-            return str(self.client.create_experiment(name, place, TRAINING))
+            return str(self.client.create_experiment(name, folder.as_uri() if self._local else None))
 
     def find_experiment(self, name: str) -> str | None:
         """Id of the experiment of that name, or None."""
