@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from math import log10
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,14 @@ from flows.provenance import versions
 from flows.tracking import Tracker, flat
 
 MILLIVOLT_PER_VOLT = 1e3
+HEADLINES = ("free_run", "one_step", "intervals")
+"""What MLflow's charts show first: it draws a section a prefix, in the order of the alphabet."""
+WITH_UNIT = {
+    "k_step": "test_rmse_mv_by_horizon_s",
+    "k_step_persistence": "persistence_rmse_mv_by_horizon_s",
+    "bands_by_horizon": "bands_by_horizon_s",
+}
+"""Names for sections whose entries are horizons."""
 
 
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded) -> None:
@@ -57,13 +66,15 @@ class CandidateTracker:
         params = {
             "number": number,
             "lambda1": genome.lambda1,
+            "lambda1_log10": round(log10(genome.lambda1), 4),  # MLflow's own plots have no logarithmic axis
             "lambda2": genome.lambda2,
+            "lambda2_log10": round(log10(genome.lambda2), 4),
             "tau": genome.tau,
             "p_c": genome.p_c,
             "d": genome.d,
             "feedback": genome.feedback,
             "library_terms": int(genome.active(self._problem.library).sum()),
-            "library_hash": genome.digest,
+            "library_hash": genome.digest(self._problem.library),
             **self._shared,
         }
         self._tracker.nested(
@@ -74,6 +85,7 @@ class CandidateTracker:
             metrics={} if isinstance(outcome, Failed) else _metrics(outcome),
             files={} if isinstance(outcome, Failed) else {"coefficients.json": coefficients(outcome)},
             failed=outcome.reason if isinstance(outcome, Failed) else None,
+            seconds=0.0 if isinstance(outcome, Failed) else outcome.seconds,
         )
 
 
@@ -126,11 +138,12 @@ def _inclusion(model: SparseModel) -> dict[str, float]:
 
 
 def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
-    """The numbers of a table row as metrics: free_run/test_mser_pct and so on."""
+    """The numbers of a table row as metrics: free_run/test_mser_pct and so on, what is no headline below tables/."""
     result: dict[str, float] = {}
     for name, value in row.items():
         if isinstance(value, Mapping):
-            result |= _numbers(value, f"{prefix}{name}/")
+            below = prefix or ("" if name in HEADLINES else "tables/")
+            result |= _numbers(value, f"{below}{WITH_UNIT.get(name, name)}/")
         elif isinstance(value, int | float) and not isinstance(value, bool):
             result[f"{prefix}{name}"] = float(value)
     return result

@@ -109,7 +109,7 @@ class Tracker:
         failed: str | None = None,
         seconds: float = 0.0,
     ) -> None:
-        """A nested run; one that is tracked already (in a resumed run) is not tracked again."""
+        """A nested run with JSON files; one that is tracked already (in a resumed run) is not tracked again."""
         if label in self._tracked:
             return
         self._tracked.add(label)
@@ -125,7 +125,7 @@ class Tracker:
                 "tags": tags,
                 "params": _texts(params),
                 "metrics": _numbers(metrics),
-                "files": dict(files or {}),
+                "files": {name: json.dumps(content) for name, content in (files or {}).items()},
                 "status": "FAILED" if failed else "FINISHED",
                 "start_ms": end - int(1000 * seconds),
                 "end_ms": end,

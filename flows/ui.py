@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
 import sys
 
 from aesi.errors import InputError
 from flows.mlflow_store import Store, default_uri
+
+TRAINING = "#/experiments?workflowType=machine_learning"
+"""MLflow opens on what it has for language models, where runs are hard to find."""
+# The jobs that MLflow would run beside the server are for language models, and take eight processes.
+QUIETLY = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_LOGGING_LEVEL": "ERROR"}
 
 
 def serve(port: int, host: str, uri: str | None) -> None:
@@ -22,13 +26,10 @@ def serve(port: int, host: str, uri: str | None) -> None:
     Store(uri)  # makes or migrates the tables, so that an empty workspace shows an empty UI
     command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri]
     command += ["--host", host, "--port", str(port), "--workers", "1"]
-    print(f"MLflow shows the runs at http://{host}:{port} (Ctrl-C ends it)", flush=True)
-    process = subprocess.Popen(command, env=os.environ | {"MLFLOW_LOGGING_LEVEL": "ERROR"})
-    try:
-        process.wait()
-    except KeyboardInterrupt:
-        process.terminate()
-        process.wait(timeout=20)
+    print(f"MLflow shows the runs at http://{host}:{port}/{TRAINING} (Ctrl-C ends it)", flush=True)
+    os.execve(
+        sys.executable, command, os.environ | QUIETLY
+    )  # so that whatever ends this process ends the server
 
 
 def _free(host: str, port: int) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -26,20 +27,26 @@ class Scored:
     """A candidate with the one-step intervals of its AESI I.
 
     coverage_pct, width_v : share of validation samples covered, and mean width in V; None where the residuals
-    cannot be calibrated (`note` says why).
+    cannot be calibrated (`note` says why).  seconds : what it took, by the clock.
     """
 
     candidate: Candidate
     coverage_pct: float | None = None
     width_v: float | None = None
     note: str = ""
+    seconds: float = 0.0
 
 
 def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> Scored | Failed:
     """Evaluate a genome, calibrate its intervals on honest residuals, and judge them on validation data."""
+    started = time.perf_counter()
     outcome = evaluate(problem, genome, weights(config))
     if isinstance(outcome, Failed):
         return outcome
+    return replace(_with_intervals(outcome, problem, config), seconds=time.perf_counter() - started)
+
+
+def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConfig) -> Scored:
     calibration, judged = _roles(problem, outcome)
     conformal = config.conformal
     try:

@@ -72,10 +72,10 @@ class Genome:
         """(m,) the terms that enter the regression: chosen, and admitted by p_c, d and feedback."""
         return self.mask(len(library)) & library.admitted(self.p_c, self.d, self.feedback)
 
-    @property
-    def digest(self) -> str:
-        """Hash of the chosen terms, 16 hexadecimal digits."""
-        return hashlib.sha256(self.terms.encode()).hexdigest()[:16]
+    def digest(self, library: Library) -> str:
+        """Hash of the names of the active terms, 16 hexadecimal digits: alike for alike terms of any library."""
+        names = sorted(library.take(np.flatnonzero(self.active(library))).names)
+        return hashlib.sha256("\n".join(names).encode()).hexdigest()[:16]
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON values."""

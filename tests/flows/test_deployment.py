@@ -67,8 +67,7 @@ def test_the_deployments_name_flows_and_their_parameters():
     deployments = yaml.safe_load((ROOT / "prefect.yaml").read_text())["deployments"]
     assert deployments
     for deployment in deployments:
-        path, name = deployment["entrypoint"].split(":")
-        flow = getattr(importlib.import_module(path.removesuffix(".py").replace("/", ".")), name)
+        module, _, name = deployment["entrypoint"].rpartition(".")
+        flow = getattr(importlib.import_module(module), name)
         assert set(deployment["parameters"]) <= set(inspect.signature(flow.fn).parameters)
         assert (ROOT / deployment["parameters"]["path"]).is_file()
-        assert (ROOT / path).is_file()

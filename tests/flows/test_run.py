@@ -93,6 +93,9 @@ def test_everything_is_tracked(finished):
             content = json.loads(Path(path).read_text())
             assert set(content) == {"bagging", "stability", "inclusion"}
             assert set(content["bagging"]) <= set(content["inclusion"])
+            assert child.info.end_time > child.info.start_time
+    headlines = {name.split("/")[0] for name in parent.data.metrics} - {"system", "terms", "seconds"}
+    assert headlines == {"free_run", "one_step", "intervals", "tables"}
     of_candidates = {name for child in candidates(children).values() for name in child.data.metrics}
     assert not [name for name in of_candidates if "test" in name]  # only the chosen model meets the test set
 
@@ -117,6 +120,25 @@ def test_the_model_is_served_by_mlflow_and_is_the_saved_one(finished):
     table = pd.DataFrame({"time_s": time_s, "current_a": np.full(30, 20.0)})
     ours = aesi.HybridModel.load(folder / "model").predict(time_s, table["current_a"].to_numpy(), soc0=0.7)
     assert np.array_equal(served.predict(table, params={"soc0": 0.7})["voltage_v"], ours.voltage_v)
+
+
+@pytest.mark.slow
+def test_the_model_answers_mlflows_own_command(finished, tmp_path):
+    import os
+    import subprocess
+    import sys
+
+    time_s = [float(t) for t in range(10)]
+    rows = {"time_s": time_s, "current_a": [20.0] * 10}
+    (tmp_path / "rows.csv").write_text(pd.DataFrame(rows).to_csv(index=False))
+    command = [sys.executable, "-m", "mlflow", "models", "predict", "--model-uri", "models:/smoke/1"]
+    command += ["--env-manager", "local", "--content-type", "csv", "--input-path", str(tmp_path / "rows.csv")]
+    uri = {"MLFLOW_TRACKING_URI": f"sqlite:///{finished}/mlflow.db"}
+    done = subprocess.run(command, env=os.environ | uri, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout.strip().splitlines()[-1])["predictions"]
+    assert len(answer) == 10
+    assert all(row["lower_v"] < row["voltage_v"] < row["upper_v"] for row in answer)
 
 
 def test_tables_come_from_the_store_alone(finished, tmp_path, monkeypatch):

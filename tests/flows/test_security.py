@@ -3,7 +3,9 @@
 import json
 import os
 import socket
+import time
 
+import psutil
 import pytest
 
 from flows import environment
@@ -84,3 +86,29 @@ def test_the_ui_listens_on_loopback_by_default():
     from flows.commands.experiment import ui
 
     assert inspect.signature(ui).parameters["host"].default == "127.0.0.1"
+
+
+@pytest.mark.slow
+def test_the_ui_listens_on_loopback_and_ends_with_its_command(aesi, tracked):
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    process = aesi("ui", "--port", port)
+    found, deadline = [], time.monotonic() + 60
+    while not found:
+        assert process.poll() is None, process.communicate()[1]
+        assert time.monotonic() < deadline
+        time.sleep(0.2)
+        found = listeners(port)
+    assert {address.ip for address in found} == {"127.0.0.1"}
+    process.terminate()
+    process.communicate(timeout=30)
+    assert not listeners(port)
+
+
+def listeners(port):
+    return [
+        one.laddr
+        for one in psutil.net_connections("tcp")
+        if one.status == "LISTEN" and one.laddr.port == port
+    ]

@@ -6,7 +6,7 @@ from numpy.polynomial import chebyshev
 
 from aesi.errors import InputError
 from aesi.records import INPUT_NAMES
-from aesi.sparse import Library
+from aesi.sparse import Genome, Library
 from aesi.sparse.basis import FUNCTIONS, MAX_ORDER, clipped_values, slopes, values
 
 
@@ -78,3 +78,11 @@ def test_a_repeated_name_is_refused():
         Library.build(("I", "I"))
     with pytest.raises(InputError, match="p_c = 6"):
         Library.build(("I",), p_c=6)
+
+
+def test_the_hash_of_a_genome_is_that_of_the_terms_it_admits():
+    small = Library.build(INPUT_NAMES, p_c=2, d=2)
+    whole = Library.build(INPUT_NAMES)
+    with_feedback, without = (Genome.whole(whole, 1.0, 1.0, p_c=2, d=2, feedback=f) for f in (True, False))
+    assert with_feedback.digest(whole) != without.digest(whole)
+    assert with_feedback.digest(whole) == Genome.whole(small, 1.0, 1.0).digest(small)
