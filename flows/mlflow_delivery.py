@@ -7,7 +7,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from flows.mlflow_rows import database_of, insert_run
 from flows.mlflow_store import NUMBER, PARENT
 from flows.outbox import Item
 
@@ -18,19 +17,11 @@ if TYPE_CHECKING:
 
 
 def _send_run(store: Store, item: Item, again: bool) -> None:
-    """A finished nested run: parameters, metrics, files; the first time by the shortest way there is."""
-    tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
-    database = None if again else database_of(store)
-    if database is None:
-        _send_by_client(store, item, tags, again)
-    else:
-        _write_files(store, insert_run(database, item, tags), item["files"])
-
-
-def _send_by_client(store: Store, item: Item, tags: dict[str, str], again: bool) -> None:
+    """A finished nested run: parameters, metrics, files."""
     from mlflow.entities import Metric, Param, RunTag
 
     info = _sent_before(store, item) if again else None
+    tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
     if info is None:
         info = store.client.create_run(
             item["experiment_id"], start_time=item["start_ms"], run_name=item["name"], tags=tags
@@ -48,23 +39,13 @@ def _send_by_client(store: Store, item: Item, tags: dict[str, str], again: bool)
 def _write_files(store: Store, artifact_uri: str, files: Mapping[str, str]) -> None:
     """Text artifacts, to where the run is known to keep them: the client would ask the store once a file."""
     from mlflow.store.artifact.artifact_repository_registry import get_artifact_repository
-    from mlflow.store.artifact.local_artifact_repo import LocalArtifactRepository
 
     if not files:
         return
-    repository = get_artifact_repository(artifact_uri, store.uri)
-    if isinstance(repository, LocalArtifactRepository):
-        _write_texts(Path(repository.artifact_dir), files)
-        return
     with TemporaryDirectory(prefix="aesi-") as folder:
-        _write_texts(Path(folder), files)
-        repository.log_artifacts(folder)
-
-
-def _write_texts(folder: Path, files: Mapping[str, str]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in files.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        for name, text in files.items():
+            (Path(folder) / name).write_text(text, encoding="utf-8")
+        get_artifact_repository(artifact_uri, store.uri).log_artifacts(folder)
 
 
 def _send_batch(store: Store, item: Item, again: bool) -> None:
