@@ -33,6 +33,21 @@ def test_a_cell_as_declared_lacks_nothing(cell, few, make):
     assert found.explained_after.total_v < 0.5e-3
 
 
+def test_what_hides_in_the_state_of_charge_is_found_by_what_it_strains(cell, few, make):
+    effect = CATALOGUE["lithium_inventory_loss"]
+    data = make((effect.activate(loss=0.0266),), soc0=0.8981)  # its rest voltage is all but that at 0.9
+    gains = {}
+
+    def progress(hypothesis, scored, admission):
+        gains[hypothesis] = (admission.gain_v, admission.admitted)
+
+    found = discover(cell, [data], soc0=0.9, effects={**few, effect.id: effect}, progress=progress)
+    assert found.verdict.effects == ("lithium_inventory_loss",)
+    gain_v, admitted = gains["lithium_inventory_loss"]
+    assert admitted
+    assert gain_v < 0.35e-3
+
+
 def test_a_wave_that_no_effect_makes_is_unknown(cell, few, make):
     data = make()
     wave = 8e-3 * np.sign(np.sin(data.time_s / 90.0 + np.sin(data.time_s / 310.0)))

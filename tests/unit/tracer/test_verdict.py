@@ -8,7 +8,7 @@ import pytest
 from aesi.tracer.fit import fit_hypothesis
 from aesi.tracer.problem import Problem
 from aesi.tracer.records import prepare_all
-from aesi.tracer.search import Admission, Archive, Scored, Search
+from aesi.tracer.search import Admission, Archive, Scored, Search, only_by_freedom
 from aesi.tracer.verdict import CONFIDENT, judge
 
 NOISE_V = 1e-3
@@ -122,3 +122,23 @@ def test_beside_unknown_only_the_clear_one_of_two_is_named(ranked):
     assert verdict_of(ranked(outcomes), *both).effects == alone
     del outcomes[other]
     assert verdict_of(ranked(outcomes), *both).effects == both
+
+
+def test_evidence_counts_among_those_that_explain_unseen_data_about_as_well(ranked):
+    fast, whole = ("series_resistance",), ("solid_diffusivity",)
+    search = ranked({fast: (500.0, 7e-3), whole: (300.0, 4e-3)})
+    ahead, better = (search.scored[frozenset(h)] for h in (fast, whole))
+    assert search.far_behind(ahead, better)
+    assert not search.far_behind(better, ahead)
+    verdict = verdict_of(ranked({fast: (500.0, 7e-3), whole: (300.0, 1.05e-3)}), *whole)
+    assert (verdict.word, verdict.effects) == ("found", whole)
+
+
+def test_a_flexible_curve_needs_more_than_solvers_differ_by(ranked):
+    search = ranked({("series_resistance",): (300.0, 1.3e-3), ("ocp_shape",): (400.0, 1.1e-3)})
+    plain, curve = (search.scored[frozenset((h,))] for h in ("series_resistance", "ocp_shape"))
+    curve = replace(curve, fit=replace(curve.fit, knobs=(*curve.fit.knobs, *curve.fit.knobs[:3])))
+    assert not only_by_freedom(plain, curve, search.material_v)
+    search.polarisation_v = 60e-3
+    assert search.material_v == pytest.approx(np.hypot(0.35 * search.noise_v, 0.012 * 60e-3))
+    assert only_by_freedom(plain, curve, search.material_v)
