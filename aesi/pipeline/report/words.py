@@ -130,8 +130,8 @@ def span_finding(view: DiscoveryView) -> str:
     hours = sum(float(t.time_s[-1] - t.time_s[0]) for t in view.traces) / SECONDS_PER_HOUR
     current, soc = (_range(getattr(t, name) for t in view.traces) for name in ("current_a", "soc"))
     return (
-        f"The data span {hours:.1f} h, {round(100 * soc[0])} to {round(100 * soc[1])} % state of charge and currents from "
-        f"{current[0]:.3g} to {current[1]:.3g} A (discharge positive); nothing is said beyond them."
+        f"The data span {hours:.1f} h, {round(100 * soc[0])} to {round(100 * soc[1])} % state of charge and currents "
+        f"from {current[0]:.3g} to {current[1]:.3g} A (discharge positive); nothing is said beyond them."
     )
 
 
