@@ -17,6 +17,10 @@ EXPLAINED_SHARE = 0.08
 """What may be left beyond white noise and still count as explained: this share of the noise, what solvers differ by,
 and this share of what there was to explain, added as squares."""
 
+UNSEEN_SHARE = 0.85
+"""With effects added, at most this share of that may be left on data that the fit has not seen: combinations that only
+just get there are as a rule the wrong ones."""
+
 LOOK_ALIKE_NATS = 8.0
 LOOK_ALIKE_SHARE = 0.2
 GROUP_SIZE = 3
@@ -72,6 +76,9 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     base, chosen = steps[0], steps[-1]
     before, left = beyond(base, noise_v), beyond(chosen, noise_v)
     allowed = tolerance_v(noise_v, polarisation_v, before if len(chosen.hypothesis) else 0.0)
+    if chosen.hypothesis:
+        unseen = float(np.sqrt(max(chosen.held_out_rmse_v**2 - noise_v**2, 0.0)))
+        left, allowed = max(left, unseen), UNSEEN_SHARE * allowed
     if left > allowed:
         return _unknown(search, steps, before, left, allowed, noise_v)
     if not chosen.hypothesis:
