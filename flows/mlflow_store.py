@@ -7,6 +7,7 @@ passes, and sends an item twice without doubling it.
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import time
 import urllib.error
@@ -44,6 +45,8 @@ class Store:
     """
 
     def __init__(self, uri: str | None = None) -> None:
+        # A database that fails reaches the caller as an exception, and need not be told twice, with a traceback.
+        logging.getLogger("mlflow.store.db.utils").setLevel(logging.CRITICAL)
         self.uri = uri or default_uri()
         self._local = self.uri.startswith("sqlite:///")
         if self.uri.startswith(("http://", "https://")):
