@@ -30,6 +30,39 @@ OWN_CLUSTER = {
 candidates: Dask's default gives it back after each array, and taking it again costs a third of a candidate."""
 
 
+def connect(address: str | None, workers: int) -> tuple[Any, Any]:
+    """A client of the scheduler at an address, or of a new cluster of processes on this machine, and that cluster.
+
+    Raises InputError without Dask, AesiError where the scheduler does not answer.
+    """
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise InputError(
+            f"the runner dask needs Dask, which is not installed ({error}): pip install 'dask[distributed]', "
+            "or use the runner local."
+        ) from None
+    cluster = None
+    if address is None:
+        with dask.config.set(OWN_CLUSTER):
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                host="127.0.0.1",
+                silence_logs=40,
+            )
+    try:
+        return Client(cluster or address, timeout=CONNECT_S, set_as_default=False), cluster
+    except (OSError, TimeoutError, ValueError) as error:
+        raise AesiError(
+            f"the Dask scheduler {address} does not answer ({error}); start it with `dask scheduler`, or "
+            "leave out --address for a cluster on this machine."
+        ) from None
+
+
 class DaskPool:
     """See `flows.pool.Pool`.
 
@@ -37,33 +70,8 @@ class DaskPool:
     """
 
     def __init__(self, content: str, base: str, address: str | None, workers: int, timeout_s: float) -> None:
-        try:
-            import dask
-            from distributed import Client, LocalCluster
-        except ImportError as error:
-            raise InputError(
-                f"the runner dask needs Dask, which is not installed ({error}): pip install 'dask[distributed]', "
-                "or use the runner local."
-            ) from None
         self._content, self._base, self._timeout_s = content, base, timeout_s
-        self._cluster = None
-        if address is None:
-            with dask.config.set(OWN_CLUSTER):
-                self._cluster = LocalCluster(
-                    n_workers=workers,
-                    threads_per_worker=1,
-                    processes=True,
-                    dashboard_address=None,
-                    host="127.0.0.1",
-                    silence_logs=40,
-                )
-        try:
-            self._client = Client(self._cluster or address, timeout=CONNECT_S, set_as_default=False)
-        except (OSError, TimeoutError, ValueError) as error:
-            raise AesiError(
-                f"the Dask scheduler {address} does not answer ({error}); start it with `dask scheduler`, or "
-                "leave out --address for a cluster on this machine."
-            ) from None
+        self._client, self._cluster = connect(address, workers)
         self._futures: dict[Any, tuple[Any, float]] = {}
         self._finished: Queue[Any] = Queue()
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.data.blind import BlindCase, cells_in, generate, plan, small_plan
+from aesi.data.blind import BlindCase, CaseSpec, cells_in, generate, plan, small_plan
 from aesi.errors import AesiError
 from aesi.physics import Cell
 from aesi.pipeline.discover import to_json
@@ -42,16 +42,24 @@ def run(
     recipe's name.
     every : take each n-th case.  small : the six cases that a test can afford.
     """
-    files = cells_in(Path(cells))
-    specs = [
-        s for s in (small_plan(seed) if small else plan(seed)) if only is None or only in "+".join(s.recipes)
-    ]
     rows = []
-    for spec in specs[::every][:cases]:
-        row = _judged(generate(spec, files))
-        rows.append(row)
-        yield row
-    yield summary(rows)
+    for spec in chosen(cases, only, small, seed, every):
+        rows.append(judged(spec, cells))
+        yield rows[-1]
+    yield {"seed": seed, **summary(rows)}
+
+
+def chosen(
+    cases: int | None = None, only: str | None = None, small: bool = False, seed: int = 0, every: int = 1
+) -> list[CaseSpec]:
+    """The cases that the options of `run` ask for."""
+    specs = small_plan(seed) if small else plan(seed)
+    return [s for s in specs if only is None or only in "+".join(s.recipes)][::every][:cases]
+
+
+def judged(spec: CaseSpec, cells: str) -> dict[str, Any]:
+    """One case made and judged; cells as in `run`."""
+    return _judged(generate(spec, cells_in(Path(cells))))
 
 
 def _judged(case: BlindCase) -> dict[str, Any]:

@@ -122,10 +122,21 @@ def _table(rows: list[dict[str, Any]]) -> str:
     """Few values stand below each other; several lines of one benchmark become rows."""
     keys = list(dict.fromkeys(key for row in rows for key in row if key != "bench"))
     if len(rows) == 1:
-        body = [f"| {key} | {_cell(rows[0][key])} |" for key in keys]
-        return "\n".join(["| figure | value |", "|---|---:|", *body, ""])
+        (row,) = rows
+        body = [f"| {key} | {_cell(row[key])} |" for key in keys if key != "confusion"]
+        table = ["| figure | value |", "|---|---:|", *body, ""]
+        return "\n".join([*table, *_confusion(row["confusion"])] if "confusion" in row else table)
     body = ["| " + " | ".join(_cell(row.get(key)) for key in keys) + " |" for row in rows]
     return "\n".join(["| " + " | ".join(keys) + " |", "|" + "---|" * len(keys), *body, ""])
+
+
+def _confusion(matrix: dict[str, dict[str, int]]) -> list[str]:
+    """What was in the data against what was said; a wrong answer may be one that is declared indistinguishable."""
+    rows = []
+    for label, said in matrix.items():
+        answers = [f"{answer} ({count})" for answer, count in sorted(said.items(), key=lambda one: -one[1])]
+        rows.append(f"| {label} | {', '.join(answers)} |")
+    return ["| in the data | answers (cases) |", "|---|---|", *rows, ""]
 
 
 def _cell(value: Any) -> str:

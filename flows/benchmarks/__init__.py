@@ -10,6 +10,7 @@ from typing import Any
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 
 BENCHMARKS = OF_THE_PACKAGE | {
+    "blind": "flows.benchmarks.blind",
     "tracking": "flows.benchmarks.tracking",
     "scale": "flows.benchmarks.scale",
 }

@@ -1,6 +1,7 @@
 """The benchmarks of the platform, small: they measure what they say, and leave nothing behind."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +16,7 @@ from flows.benchmarks.history import (
     worth_keeping,
     write_history,
 )
+from flows.mlflow_store import KIND, Store
 
 
 def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
@@ -28,8 +30,6 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
 
 @pytest.mark.slow
 def test_two_dask_workers_share_the_work_evenly(workspace):
-    from pathlib import Path
-
     smoke = Path(__file__).resolve().parents[2] / "experiments" / "smoke.yaml"
     (line,) = benchmarks.run(
         "scale", experiment=str(smoke), candidates=16, overrides=("search.resamples=100",)
@@ -42,6 +42,44 @@ def test_tracking_adds_less_than_a_tenth_to_a_candidate_of_the_papers_size():
     # Threads that wait for a busy machine's cores and caches cost processor time too: the best of three counts.
     found = [next(iter(benchmarks.run("tracking", candidates=6)))["overhead_pct"] for _ in range(3)]
     assert min(found) < 10, found
+
+
+def judged(spec, cells):
+    return {
+        "case": spec.name,
+        "cell": spec.cell,
+        "label": "none",
+        "verdict": "none",
+        "effects": [],
+        "confidence": 0.9,
+        "right": True,
+        "ours_s": 1.0,
+    }
+
+
+def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch):
+    monkeypatch.setattr("flows.benchmarks.blind.judged", judged)
+    *rows, last = benchmarks.run("blind", small=True, cases=3)
+    assert [row["case"] for row in rows] == ["b000", "b001", "b002"]
+    assert last["summary"]
+    store = Store()
+    (parent,) = store.runs(store.find_experiment("blind"), f"tags.`{KIND}` = 'run'")
+    assert parent.data.metrics["none_right_pct"] == 100.0
+    assert set(store.children(parent.info.experiment_id, parent.info.run_id)) == {
+        "case:b000",
+        "case:b001",
+        "case:b002",
+    }
+    path = store.client.download_artifacts(parent.info.run_id, "confusion.json")
+    assert json.loads(Path(path).read_text()) == {"none": {"none": 3}} == last["confusion"]
+
+
+@pytest.mark.slow
+def test_blind_cases_spread_over_dask_workers(tracked):
+    cells = Path(__file__).resolve().parents[2] / "experiments" / "cells"
+    *rows, last = benchmarks.run("blind", cells=str(cells), small=True, cases=2, workers=2)
+    assert sorted(row["label"] for row in rows) == ["none", "self_heating"]
+    assert last["cases"] == 2
 
 
 SPEED = {"bench": "espm", "case": "drive", "ratio": 200.0, "rmse_mv": 0.05, "ours_s": 0.1}
