@@ -6,6 +6,5 @@ BENCHMARKS = {
     "design": "aesi.bench.design",
     "spci": "aesi.bench.spci",
     "bands": "aesi.bench.bands",
-    "blind": "aesi.bench.blind",
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""

@@ -1,6 +1,6 @@
 """Does the tracer name what is missing? Labelled cases that PyBaMM made, the label kept from the tracer.
 
-One line a case, then a summary with the confusion matrix and the rates that count: right effects (or declared
+A row a case, and a summary with the confusion matrix and the rates that count: right effects (or declared
 indistinguishable from them), honest silence on cells that lack nothing, `unknown` where no effect of the
 catalogue is at
 work, the error left over and how well the parameters are met.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -28,37 +28,19 @@ NOTHING = "reaction_nonuniformity"
 """What the order reduction leaves out counts as nothing missing on a cell that is as declared."""
 
 
-def run(
-    cells: str = "experiments/cells",
-    cases: int | None = None,
-    only: str | None = None,
-    small: bool = False,
-    seed: int = 0,
-    every: int = 1,
-) -> Iterator[dict[str, Any]]:
-    """One dict a case as it is judged, and a last one with `summary`: true.
-
-    cells : folder of the two declared cell files.  cases : how many (None: all).  only : substring of a
-    recipe's name.
-    every : take each n-th case.  small : the six cases that a test can afford.
-    """
-    rows = []
-    for spec in chosen(cases, only, small, seed, every):
-        rows.append(judged(spec, cells))
-        yield rows[-1]
-    yield {"seed": seed, **summary(rows)}
-
-
 def chosen(
     cases: int | None = None, only: str | None = None, small: bool = False, seed: int = 0, every: int = 1
 ) -> list[CaseSpec]:
-    """The cases that the options of `run` ask for."""
+    """Cases of the plan, or of the small one that a test can afford.
+
+    cases : how many (None: all).  only : substring of a recipe's name.  every : take each n-th case.
+    """
     specs = small_plan(seed) if small else plan(seed)
     return [s for s in specs if only is None or only in "+".join(s.recipes)][::every][:cases]
 
 
 def judged(spec: CaseSpec, cells: str) -> dict[str, Any]:
-    """One case made and judged; cells as in `run`."""
+    """One case made and judged; cells : folder of the two declared cell files."""
     return _judged(generate(spec, cells_in(Path(cells))))
 
 

@@ -29,8 +29,8 @@ def run(
 ) -> Iterator[dict[str, Any]]:
     """One dict a case as it is judged, and a last one with `summary`: true.
 
-    workers : processes on this machine.  address : of a Dask scheduler, whose workers must see `cells`.  The others
-    are those of `aesi.bench.blind.run`.
+    cells : folder of the two declared cell files.  cases, only, small, seed, every : which cases, see `chosen`.
+    workers : processes on this machine.  address : of a Dask scheduler, whose workers must see `cells`.
     """
     from flows import environment
     from flows.console import Console
