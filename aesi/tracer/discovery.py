@@ -161,7 +161,7 @@ def _look_again(
     steps, verdict = _searched(search, max_effects, progress, second_look.BREADTH, noise_v)
     nats = second_look.nats_of_potential(problem, steps[0].fit)
     moved = {second_look.OCP: nats} if nats >= EVIDENCE_NATS else {}
-    left = [beyond(scored, noise_v) for scored in (first.steps[0], steps[0], steps[-1])]
+    left = [beyond(scored.fit.rmse_v, noise_v) for scored in (first.steps[0], steps[0], steps[-1])]
     verdict = second_look.reworded(verdict, steps[-1].hypothesis, moved, left)
     return _Looked(search, steps, verdict, steps[-1], steps[0].fit, moved)
 

@@ -74,11 +74,11 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     V.
     """
     base, chosen = steps[0], steps[-1]
-    before, left = beyond(base, noise_v), beyond(chosen, noise_v)
+    before, left = beyond(base.fit.rmse_v, noise_v), beyond(chosen.fit.rmse_v, noise_v)
     allowed = tolerance_v(noise_v, polarisation_v, before if len(chosen.hypothesis) else 0.0)
     if chosen.hypothesis:
-        unseen = float(np.sqrt(max(chosen.held_out_rmse_v**2 - noise_v**2, 0.0)))
-        left, allowed = max(left, unseen), UNSEEN_SHARE * allowed
+        left = max(left, beyond(chosen.held_out_rmse_v, noise_v))
+        allowed *= UNSEEN_SHARE
     if left > allowed:
         return _unknown(search, steps, before, left, allowed, noise_v)
     if not chosen.hypothesis:
@@ -95,9 +95,9 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     return Verdict("found", chosen.hypothesis, groups, confidence, left, allowed, reason)
 
 
-def beyond(scored: Scored, noise_v: float) -> float:
-    """Root mean square of what a hypothesis leaves beyond white noise, V."""
-    return float(np.sqrt(max(scored.fit.rmse_v**2 - noise_v**2, 0.0)))
+def beyond(rmse_v: float, noise_v: float) -> float:
+    """Root mean square of what is left beyond white noise, V."""
+    return float(np.sqrt(max(rmse_v**2 - noise_v**2, 0.0)))
 
 
 def _unknown(
@@ -137,7 +137,7 @@ def _partial(
     twins = {g[0]: set(g) for g in look_alikes(search, chosen)}
     clear = tuple(n for n in chosen.hypothesis if _clear(search, chosen, twins.get(n, {n})))
     named = search.fit(clear) if clear else None
-    if named is None or beyond(named, noise_v) ** 2 > (1.0 - SUFFICIENT_SHARE) * before**2:
+    if named is None or beyond(named.fit.rmse_v, noise_v) ** 2 > (1.0 - SUFFICIENT_SHARE) * before**2:
         return (), ()
     return clear, look_alikes(search, named)
 
