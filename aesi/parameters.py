@@ -22,7 +22,8 @@ class Parameter:
     (None where it has none). `log` asks for a search on a logarithmic scale. `expected` is the standard deviation
     of its distance from neutral (or from the default; of the logarithm where `log`) where small ones are likelier
     than large ones, None where all within bounds are alike. `linear` says that the voltage is all but linear in it,
-    so that a fit need not take its slope anew at every step.
+    so that a fit need not take its slope anew at every step. `low_is_limit` says that the lower bound stands for
+    nought, which a logarithmic scale does not reach: to end there is a value like others.
     """
 
     default: float
@@ -34,6 +35,7 @@ class Parameter:
     description: str = ""
     expected: float | None = None
     linear: bool = False
+    low_is_limit: bool = False
 
     def __post_init__(self) -> None:
         low, high = self.bounds

@@ -14,7 +14,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Hold, Measurement, Run
-from aesi.tracer import second_look
+from aesi.tracer import rough_look, second_look
 from aesi.tracer.candidates import Candidate, ranking
 from aesi.tracer.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.explain import Explained, explain
@@ -33,7 +33,7 @@ from aesi.tracer.search import (
     select,
 )
 from aesi.tracer.tell_apart import experiment
-from aesi.tracer.verdict import Verdict, beyond, judge, tolerance_v
+from aesi.tracer.verdict import UNSEEN_SHARE, Verdict, beyond, judge, tolerance_v
 
 NUMERICS = "numerical_error"
 NUMERICS_SHARE = 0.1
@@ -116,6 +116,8 @@ def discover(
     looked = _look(problem, max_effects, seed, archive, progress, breadth)
     if another and looked.verdict.word == "unknown":
         looked = _look_again(looked, max_effects, seed, archive, progress)
+    elif looked.verdict.word == "unknown" and not looked.verdict.effects:
+        looked = _look_roughly(looked, seed, archive, progress)
     return _told(looked, tested, time.perf_counter() - began)
 
 
@@ -166,14 +168,37 @@ def _look_again(
     return _Looked(search, steps, verdict, steps[-1], steps[0].fit, moved)
 
 
+def _look_roughly(first: _Looked, seed: int, archive: Path | None, progress: Progress | None) -> _Looked:
+    """The first search's outcome, with the effect named that takes up most of a large residual, where there is one."""
+    if not rough_look.is_due(first.search):
+        return first
+    problem = rough_look.weighed(first.search)
+    search = Search(
+        problem,
+        np.random.default_rng(seed),
+        Archive(archive, context_of(problem)),
+        first.search.polarisation_v,
+        _reporter(progress),
+    )
+    rough = rough_look.most_of_it(search)
+    if rough is None:
+        return first
+    verdict = rough_look.named(first.verdict, rough)
+    return _Looked(search, [rough.base, rough.best], verdict, rough.best, first.recalibrated)
+
+
+def _reporter(progress: Progress | None) -> Callable[[Scored, Admission | None], None]:
+    if progress is None:
+        return lambda scored, admission: None
+    return lambda scored, admission: progress("+".join(scored.hypothesis), scored, admission)
+
+
 def _searched(
     search: Search, max_effects: int, progress: Progress | None, breadth: Breadth, noise_v: float
 ) -> tuple[list[Scored], Verdict]:
     problem = search.problem
-    if progress is not None:
-        search.report = lambda scored, admission: progress("+".join(scored.hypothesis), scored, admission)
-    enough = lambda base, current: _explained_enough(problem, base, current)  # noqa: E731
-    steps = select(search, max_effects, enough, breadth)
+    search.report = _reporter(progress)
+    steps = select(search, max_effects, lambda base, one: _grade(problem, noise_v, base, one), breadth)
     if steps is None:
         raise DataError(
             f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
@@ -214,12 +239,13 @@ def _with_noise_of_residual(problem: Problem) -> Problem:
     return replace(problem, records=tuple(records))
 
 
-def _explained_enough(problem: Problem, base: Scored, current: Scored) -> bool:
-    """Is what is left within what a model may miss?"""
+def _grade(problem: Problem, noise_v: float, base: Scored, current: Scored) -> int:
+    """How far what is left is within what a model may miss: see `select`."""
     before = base.structured_v if current.hypothesis else 0.0
-    return current.structured_v <= tolerance_v(
-        _noise_v(problem), polarisation_v(problem, current.fit), before
-    )
+    allowed = tolerance_v(noise_v, polarisation_v(problem, current.fit), before)
+    if current.structured_v > allowed:
+        return 0
+    return 2 if beyond(current.held_out_rmse_v, noise_v) <= UNSEEN_SHARE * allowed else 1
 
 
 def _noise_v(problem: Problem) -> float:

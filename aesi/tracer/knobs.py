@@ -34,7 +34,7 @@ class Knob:
     `start` is where it is when nothing is wrong, or the typical value where an effect has no such point.
     `amplitude` is False for parameters that only shape an effect (a rate, a time constant).
     `expected` is the standard deviation of a free knob's distance from `start`, in `unit`; None where it is flat.
-    `linear` says that its slope may be kept through a descent.
+    `linear` says that its slope may be kept through a descent, `low_is_limit` that the lower bound stands for nought.
     """
 
     owner: str
@@ -49,6 +49,7 @@ class Knob:
     sd: float | None = None
     expected: float | None = None
     linear: bool = False
+    low_is_limit: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -96,7 +97,8 @@ class Knob:
         low, high = self.working_bounds
         x = self.to_working(value)
         near = BOUND_MARGIN * (high - low)
-        return (x - low < near and abs(low) > near) or (high - x < near and abs(high) > near)
+        below = x - low < near and abs(low) > near and not self.low_is_limit
+        return below or (high - x < near and abs(high) > near)
 
 
 def free_knobs(effect: str, parameters: Mapping[str, Parameter]) -> list[Knob]:
@@ -112,7 +114,7 @@ def _free(effect: str, name: str, p: Parameter) -> Knob:
     start = float(neutral) if inside and neutral is not None else p.default
     return Knob(
         effect, name, p.unit, low, high, log, start, p.default,
-        amplitude=neutral is not None, expected=p.expected, linear=p.linear,
+        amplitude=neutral is not None, expected=p.expected, linear=p.linear, low_is_limit=p.low_is_limit,
     )  # fmt: skip
 
 

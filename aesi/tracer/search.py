@@ -243,26 +243,30 @@ class Search:
         return [*vectors, *(placed_in(knobs, known, start) for start in starts(knobs))]
 
     def _promising(self, parent: Scored, names: list[str]) -> list[str]:
-        """Effects by how much of the parent's whitened residual they can take up: with their sensitivities where they
-        ended alone, and with what they do to the parent where their fit would start."""
-        fit = parent.fit
-        gains = {}
-        base, _ = self.problem.whiten(np.column_stack([fit.residual_v, fit.jacobian]), fit.noise)
+        """Effects by how much of the parent's residual they can take up: with their sensitivities where they ended
+        alone, and with what they do to the parent where their fit would start.
+
+        By turns the best in nats, under the parent's noise model, and the best in volts: that model has taken what is
+        slow in the residual for noise, and an effect that is missing may be slow.
+        """
+        does = {}
         for name in names:
             alone = self.scored.get(frozenset((name,)))
-            does = self._responses(parent, name)
+            columns = self._responses(parent, name)
             if alone is not None:
-                does += [alone.fit.jacobian[:, j] for j, k in enumerate(alone.fit.knobs) if k.owner == name]
-            if not does:
-                continue
-            extra, _ = self.problem.whiten(np.column_stack(does), fit.noise)
-            columns = np.column_stack([base[:, 1:], extra])
-            scale = np.linalg.norm(columns, axis=0) + 1e-300
-            solution = np.linalg.lstsq(columns / scale, base[:, 0], rcond=1e-8)[0]
-            gains[name] = float(
-                np.sum(base[:, 0] ** 2) - np.sum((base[:, 0] - columns / scale @ solution) ** 2)
-            )
-        return sorted(gains, key=lambda n: -gains[n])
+                columns += [
+                    alone.fit.jacobian[:, j] for j, k in enumerate(alone.fit.knobs) if k.owner == name
+                ]
+            if columns:
+                does[name] = np.column_stack(columns)
+        residual = np.column_stack([parent.fit.residual_v, parent.fit.jacobian])
+
+        def whitened(table: Array) -> Array:
+            return self.problem.whiten(table, parent.fit.noise)[0]
+
+        in_nats = _by_gain(whitened(residual), {name: whitened(table) for name, table in does.items()})
+        in_volts = _by_gain(residual, does)
+        return list(dict.fromkeys(name for pair in zip(in_nats, in_volts, strict=True) for name in pair))
 
     def _responses(self, parent: Scored, name: str) -> list[Array]:
         """(n,) V each: what the effect does to the parent's voltage at each start that can be simulated."""
@@ -315,13 +319,13 @@ class Search:
 def select(
     search: Search,
     max_effects: int,
-    enough: Callable[[Scored, Scored], bool],
+    grade: Callable[[Scored, Scored], int],
     breadth: Breadth | None = None,
 ) -> list[Scored] | None:
     """Add effects one at a time while that is admitted and the rest is not explained well enough.
 
-    enough : (empty hypothesis, current one) -> True where what is left is within what a model may miss; such a
-    hypothesis goes before one that has more evidence but leaves structure.
+    grade : (empty hypothesis, another one) -> 0 where it leaves more than a model may miss, 2 where it does not, with a
+    margin and on unseen data, and 1 between.  A higher grade goes before more evidence.
 
     Returns the chosen hypothesis after each addition, the empty one first; None where not even that one can
     be
@@ -334,21 +338,36 @@ def select(
     steps, front = [base], search.grow(base, breadth.singles)
     for size in range(1, max_effects + 1):
         needed = [s for s in front if _all_needed(search, s)]
-        sufficient = [s for s in needed if enough(base, s)]
-        wanted = sufficient or needed
+        grades = {id(s): grade(base, s) for s in needed}
+        top = max(grades.values(), default=0)
+        wanted = [s for s in needed if grades[id(s)] == top]
         near = [s for s in wanted if not any(search.far_behind(s, other) for other in wanted)]
         best = max(near, key=lambda s: s.evidence, default=None)
-        plainer = [s for s in sufficient if best and only_by_freedom(s, best, search.material_v)]
+        plainer = [s for s in wanted if top and best and only_by_freedom(s, best, search.material_v)]
         best = max(plainer, key=lambda s: s.evidence, default=best)
         if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
             steps.append(best)
         left = (1.0 - breadth.least_share) * base.structured_v**2
         hopeless = (size > 1 and len(steps[-1].hypothesis) < size) or steps[-1].structured_v ** 2 > left
-        if size == max_effects or hopeless or enough(base, steps[-1]):
+        if size == max_effects or hopeless or grade(base, steps[-1]):
             break
         abreast, grown = breadth.lost if len(steps) == 1 else (breadth.abreast, breadth.grown)
         front = _grown(search, _abreast(front, steps[-1], abreast), grown)
     return steps
+
+
+def _by_gain(residual: Array, does: Mapping[str, Array]) -> list[str]:
+    """Names by what their columns take off a residual beside the columns that it has, most first.
+
+    residual : (n, 1 + m), the residual and the sensitivities that may move with it.  does : name -> (n, k).
+    """
+    gains = {}
+    for name, extra in does.items():
+        columns = np.column_stack([residual[:, 1:], extra])
+        columns /= np.linalg.norm(columns, axis=0) + 1e-300
+        step = np.linalg.lstsq(columns, residual[:, 0], rcond=1e-8)[0]
+        gains[name] = -float(np.sum((residual[:, 0] - columns @ step) ** 2))
+    return sorted(gains, key=lambda name: -gains[name])
 
 
 def _grown(search: Search, parents: list[Scored], limit: int) -> list[Scored]:

@@ -179,7 +179,7 @@ def look_alikes(search: Search, chosen: Scored) -> tuple[tuple[str, ...], ...]:
 
 
 def _alike(search: Search, chosen: Scored, other: Scored, rest: frozenset[str]) -> bool:
-    if other.fit.at_bounds:
+    if other.fit.at_bounds or search.far_behind(other, chosen):
         return False
     parent = search.scored.get(rest)
     if parent is None:

@@ -20,6 +20,7 @@ PARAMETERS = {
         log=True,
         neutral=1.0,
         source="accuracy classes up to 5 %, and gross errors of scale",
+        expected=0.05,
         description="reading over true current, g",
     )
 }

@@ -24,7 +24,8 @@ PARAMETERS = {
         "W/K",
         bounds=(1e-3, 100.0),
         log=True,
-        source="1 mW/K (a small cell in foam) to 100 W/K (a cold plate)",
+        source="1 mW/K (a small cell in foam, all but adiabatic) to 100 W/K (a cold plate)",
+        low_is_limit=True,
         description="conductance from cell to surroundings, G",
     ),
     "heat_capacity_factor": Parameter(

@@ -41,6 +41,14 @@ def test_bounds_that_mean_something_and_neutral_points_are_no_bounds():
     assert not state.at_bound(1.0)
 
 
+def test_a_lower_bound_that_stands_for_nought_is_none():
+    limit = Parameter(20.0, "1", (1.0, 500.0), "test", log=True, low_is_limit=True)
+    rate, open_below = free_knobs("e", {"r": RATE, "l": limit})
+    assert rate.at_bound(1.0)
+    assert not open_below.at_bound(1.0)
+    assert open_below.at_bound(500.0)
+
+
 def test_shapes_have_several_starts_and_amplitudes_one():
     assert len(starts(free_knobs("e", {"s": SIZE}))) == 1
     assert len(starts(free_knobs("e", {"s": SIZE, "r": RATE}))) == 3

@@ -73,6 +73,14 @@ def test_a_rival_that_is_a_look_alike_costs_no_confidence(ranked):
     assert verdict.confidence > CONFIDENT
 
 
+def test_what_leaves_far_more_is_no_look_alike_whatever_its_evidence(ranked):
+    verdict = verdict_of(
+        ranked({("series_resistance",): (300.0, 1.2e-3), ("ocv_hysteresis",): (298.0, 4e-3)}),
+        "series_resistance",
+    )
+    assert verdict.groups == ()
+
+
 PARTIAL = {("series_resistance",): (300.0, 4e-3)}
 
 
