@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, Field, ValidationError, field_validator
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from aesi.errors import ConfigError
 from aesi.pipeline.sections import (
@@ -33,6 +33,8 @@ from aesi.pipeline.sections import (
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
+
+NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 
 ModelName = Literal["ESPM", "AESI I", "AESI II", "SINDy-C", "ridge", "gradient boosting"]
 
@@ -54,6 +56,12 @@ class ExperimentConfig(Section):
     runner: RunnerConfig = RunnerConfig()
     discover: DiscoverConfig | None = None
     base: Path = Field(default_factory=Path.cwd, exclude=True)
+
+    @model_validator(mode="after")
+    def _has_something_to_do(self) -> ExperimentConfig:
+        if not self.data.has_roles and self.discover is None:
+            raise ValueError(f"data: {NO_ROLES}")
+        return self
 
     @field_validator("name")
     @classmethod

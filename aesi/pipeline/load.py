@@ -18,7 +18,7 @@ from aesi.data import read_measurement
 from aesi.data.resample import to_even
 from aesi.errors import ConfigError, DataError
 from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.sections import DataConfig, RepeatsConfig
 from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run, Split
 from aesi.sparse import with_inputs
@@ -56,6 +56,8 @@ def load(config: ExperimentConfig) -> Loaded:
     Raises ConfigError or DataError naming the file and what to do; with a `fallback` section, data that cannot be
     had are replaced by it and a note says so.
     """
+    if not config.data.has_roles:
+        raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")
     try:
         return _load(config)
     except DataError as error:

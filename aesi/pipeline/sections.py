@@ -81,12 +81,14 @@ class DataConfig(Section):
         if self.kind == "virtual":
             if self.repeats or self.record or self.train or self.valid or self.test:
                 raise ValueError("kind: virtual brings its own records; leave out record, repeats and roles")
-        elif self.repeats:
-            if not self.record:
-                raise ValueError("`repeats` needs `record`, the record to cut")
-        elif not (self.train and self.test):
-            raise ValueError("give `train` and `test` records, or one `record` with `repeats`")
+        elif self.repeats and not self.record:
+            raise ValueError("`repeats` needs `record`, the record to cut")
         return self
+
+    @property
+    def has_roles(self) -> bool:
+        """Whether there is something to train on and something to test on."""
+        return self.kind == "virtual" or self.repeats is not None or bool(self.train and self.test)
 
 
 class CellConfig(Section):

@@ -159,3 +159,10 @@ def test_the_generator_does_not_load_the_finder():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_an_effect_that_does_not_show_at_its_most_is_driven_harder(short_duty, cells):
+    weak = CaseSpec("c", "nmc", ("negative_diffusivity",), target_mv=4.0, rate=0.5, soc0=0.6, seed=1)
+    strong = CaseSpec("c", "nmc", ("series_resistance",), target_mv=4.0, rate=0.5, soc0=0.6, seed=1)
+    assert generate(weak, cells_in(cells)).spec.rate == 1.25 * weak.rate
+    assert generate(strong, cells_in(cells)).spec.rate == strong.rate

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from aesi.errors import ConfigError
 from aesi.pipeline.config import ExperimentConfig, parse_experiment, read_experiment
+from aesi.pipeline.load import load
 
 ROOT = Path(__file__).resolve().parents[3]
 CONTENT = {"name": "x", "data": {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}}
@@ -151,3 +152,15 @@ def test_any_content_gives_a_config_or_a_config_error(content):
         parse_experiment({**CONTENT, **mapping})
     except ConfigError:
         return
+
+
+def test_an_experiment_that_only_closes_the_loop_needs_no_roles():
+    content = {
+        "name": "cold",
+        "data": {"kind": "files"},
+        "cell": {"bpx": "cell.json"},
+        "discover": {"fit": ["a.csv"]},
+    }
+    config = parse_experiment(content)
+    with pytest.raises(ConfigError, match="for `aesi discover` alone"):
+        load(config)
