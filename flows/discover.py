@@ -186,9 +186,9 @@ def _track_result(
 def _say(console: Console, content: dict[str, Any], out: Path, started: float) -> None:
     from aesi.pipeline.report.words import confidence, reason_finding
 
-    nothing = "nothing to add" if content["verdict"] == "none" else "no effect of the catalogue explains it"
-    effects = ", ".join(content["effects"]) or nothing
-    console.say(f"{content['verdict']}: {effects} ({confidence(content)})")
+    rest = {"none": "nothing to add", "unknown": "something that no effect of the catalogue explains"}
+    said = [*content["effects"], *([rest[content["verdict"]]] if content["verdict"] in rest else [])]
+    console.say(f"{content['verdict']} ({confidence(content)}): {', '.join(said)}")
     console.say(f"  {reason_finding(content)}")
     for group in content["indistinguishable"]:
         console.say(f"  these data cannot tell apart: {', '.join(group)}")

@@ -325,7 +325,8 @@ def select(
     """Add effects one at a time while that is admitted and the rest is not explained well enough.
 
     grade : (empty hypothesis, another one) -> 0 where it leaves more than a model may miss, 2 where it does not, with a
-    margin and on unseen data, and 1 between.  A higher grade goes before more evidence.
+    margin and on unseen data, and 1 between.  A higher grade goes before more evidence; effects are added until it is
+    2, and none where the empty hypothesis has 1.
 
     Returns the chosen hypothesis after each addition, the empty one first; None where not even that one can
     be
@@ -349,7 +350,8 @@ def select(
             steps.append(best)
         left = (1.0 - breadth.least_share) * base.structured_v**2
         hopeless = (size > 1 and len(steps[-1].hypothesis) < size) or steps[-1].structured_v ** 2 > left
-        if size == max_effects or hopeless or grade(base, steps[-1]):
+        done = grade(base, steps[-1]) >= (2 if steps[-1].hypothesis else 1)
+        if size == max_effects or hopeless or done:
             break
         abreast, grown = breadth.lost if len(steps) == 1 else (breadth.abreast, breadth.grown)
         front = _grown(search, _abreast(front, steps[-1], abreast), grown)
