@@ -21,6 +21,7 @@ from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
 from aesi.tracer.outcome import Errors, Part, State
+from aesi.tracer.yardstick import POINTS_TO, Pointer
 
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
@@ -112,7 +113,7 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         "reason": verdict.reason,
         **{state: {part: _errors(found, state, part) for part in ("fit", "test")} for state in STATES},
         "noise_floor_mv": MV * found.noise_floor_v,
-        "explainable_mv": MV * found.explained_after.total_v,
+        "explainable_mv": MV * found.after.yardstick.explained_v,
         "structured_mv": MV * verdict.structured_v,
         "tolerance_mv": MV * verdict.tolerance_v,
         "candidates": [
@@ -132,6 +133,7 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         ],
         "files": _file_rows(found),
         "dependence": _dependence(found),
+        "points_to": _pointers(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
         "notes": list(together((*read, *found.notes))),
         "seconds": round(found.seconds, 2),
@@ -158,8 +160,23 @@ def _file_rows(found: Discovery) -> list[dict[str, Any]]:
 
 
 def _dependence(found: Discovery) -> list[dict[str, Any]]:
-    before, after = found.explained_before.shares, found.explained_after.shares
+    before, after = found.before.shares, found.after.shares
     return [{"variable": name, "before": before[name], "after": after.get(name, 0.0)} for name in before]
+
+
+def _pointers(found: Discovery) -> list[dict[str, Any]]:
+    before, after = found.before.yardstick.pointers, found.after.yardstick.pointers
+    none = Pointer(0.0)
+    return [
+        {
+            "says": text,
+            "before": before.get(text, none).share,
+            "after": after.get(text, none).share,
+            "terms": list(before.get(text, none).terms),
+            "terms_after": list(after.get(text, none).terms),
+        }
+        for text in POINTS_TO
+    ]
 
 
 def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = "") -> DiscoveryView:
@@ -178,6 +195,7 @@ def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id
         effects=tuple(_effect_view(found, name) for name in found.verdict.effects),
         files=tuple(content["files"]),
         dependence=tuple(content["dependence"]),
+        points_to=tuple(content["points_to"]),
         experiments=tuple(content["experiments"]),
         titles=titles,
         notes=tuple(content["notes"]),

@@ -17,7 +17,7 @@ from aesi.records import Hold, Measurement, Run
 from aesi.tracer import rough_look, second_look
 from aesi.tracer.candidates import Candidate, ranking
 from aesi.tracer.checks import check_measurement, check_record, check_same_cell
-from aesi.tracer.explain import Explained, explain
+from aesi.tracer.explain import explain
 from aesi.tracer.fit import Fit, fit_hypothesis
 from aesi.tracer.outcome import FileOutcome, States, outcomes, polarisation_v, simulated, test_rmse_v
 from aesi.tracer.problem import TOLERANCES, Problem
@@ -34,6 +34,7 @@ from aesi.tracer.search import (
 )
 from aesi.tracer.tell_apart import experiment
 from aesi.tracer.verdict import UNSEEN_SHARE, Verdict, beyond, judge, tolerance_v
+from aesi.tracer.yardstick import Yardstick, measure
 
 NUMERICS = "numerical_error"
 NUMERICS_SHARE = 0.1
@@ -45,15 +46,23 @@ Progress = Callable[[str, Scored, Admission | None], None]
 
 
 @dataclass(frozen=True, eq=False)
+class Left:
+    """What a residual depends on (share of its variance by family of variables), and what a sparse correction could
+    explain of it."""
+
+    shares: Mapping[str, float]
+    yardstick: Yardstick
+
+
+@dataclass(frozen=True, eq=False)
 class Discovery:
     """The outcome of one case.
 
     model_effects : what `after` simulates with: the effects found, and the tolerated parameters where they
     settled.
     soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
-    part.  explained_before/after : what the
-    residual
-    depends on.  experiments : group of look-alikes -> what would tell them apart.
+    part.  before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
+    tell them apart.
     """
 
     cell: Cell
@@ -61,8 +70,8 @@ class Discovery:
     candidates: tuple[Candidate, ...]
     files: tuple[FileOutcome, ...]
     noise_floor_v: float
-    explained_before: Explained
-    explained_after: Explained
+    before: Left
+    after: Left
     model_effects: tuple[ActiveEffect, ...]
     soc0: float
     hold: Hold
@@ -273,8 +282,8 @@ def _told(looked: _Looked, tested: Sequence[Record], seconds: float) -> Discover
         ),
         files=outcomes(problem, fits, tested, search.rng),
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in problem.records]))),
-        explained_before=_explained(problem, None),
-        explained_after=_explained(problem, chosen.fit),
+        before=_left(problem, None),
+        after=_left(problem, chosen.fit),
         model_effects=model_effects,
         soc0=soc0,
         hold=problem.records[0].hold,
@@ -286,7 +295,7 @@ def _told(looked: _Looked, tested: Sequence[Record], seconds: float) -> Discover
     )
 
 
-def _explained(problem: Problem, fit: Fit | None) -> Explained:
+def _left(problem: Problem, fit: Fit | None) -> Left:
     runs, residuals = [], []
     for index, record in enumerate(problem.records):
         run = simulated(problem, fit, record, index, thin=True)
@@ -294,4 +303,4 @@ def _explained(problem: Problem, fit: Fit | None) -> Explained:
         series = {name: column[keep] for name, column in run.series.items()}
         runs.append(Run(run.time_s[keep], run.current_a[keep], run.voltage_v[keep], series))
         residuals.append((record.thin.voltage_v - run.voltage_v)[keep])
-    return explain(runs, residuals)
+    return Left(explain(runs, residuals), measure(runs, residuals))

@@ -1,10 +1,8 @@
-"""What a residual depends on, and how much of it a flexible model of the states could still explain
-unseen."""
+"""What a residual depends on: how much of it each variable of the model explains unseen."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,19 +15,6 @@ BLOCKS_PER_FOLD = 5
 RIDGES = (1e-4, 1e-2, 1.0, 1e2, 1e4)
 SATURATION = 0.5
 """Share of the current's RMS at which the saturating feature bends."""
-
-
-@dataclass(frozen=True)
-class Explained:
-    """Out of sample: how much of a residual its possible causes explain.
-
-    total_v : V, root mean square that all features together explain.  shares : family -> share of the
-    variance that
-    the family explains alone, 0 to 1.
-    """
-
-    total_v: float
-    shares: Mapping[str, float]
 
 
 def features(run: Run) -> dict[str, Array]:
@@ -68,21 +53,18 @@ def _filtered(time_s: Array, signal: Array, tau_s: float) -> Array:
     return lfilter([1.0 - keep], [1.0, -keep], signal)
 
 
-def explain(runs: Sequence[Run], residuals: Sequence[Array]) -> Explained:
-    """Explained by ridge regression on features of the states, judged on blocks that it was not fitted on.
+def explain(runs: Sequence[Run], residuals: Sequence[Array]) -> dict[str, float]:
+    """Family of variables -> share of the residual's variance that it explains alone, 0 to 1.
 
+    By ridge regression, judged on blocks that it was not fitted on.
     runs, residuals : one a record, (n,) V measured - model.
     """
     families = [features(r) for r in runs]
-    names = list(families[0])
-    target = np.concatenate([e - 0.0 for e in residuals])
+    target = np.concatenate(residuals)
     folds = np.concatenate([_folds(len(e)) for e in residuals])
-    tables = {n: _standard(np.concatenate([f[n] for f in families])) for n in names}
-    whole = np.column_stack(list(tables.values()))
     variance = float(np.mean((target - target.mean()) ** 2)) + 1e-30
-    shares = {n: max(0.0, 1.0 - _unseen(tables[n], target, folds) / variance) for n in names}
-    left = _unseen(whole, target, folds)
-    return Explained(float(np.sqrt(max(np.mean(target**2) - left, 0.0))), shares)
+    tables = {name: _standard(np.concatenate([f[name] for f in families])) for name in families[0]}
+    return {name: max(0.0, 1.0 - _unseen(table, target, folds) / variance) for name, table in tables.items()}
 
 
 def _standard(table: Array) -> Array:

@@ -137,6 +137,8 @@ class DiscoveryView:
     files : rows with name, part, before_mv, recalibrated_mv, after_mv (RMSE) and, where known, gain_mv and
     gain_low_mv, gain_high_mv (recalibrated minus after, with its block-bootstrap interval).
     dependence : rows with variable, before, after: the share of the residual's variance that it explains.
+    points_to : rows with says, before, after (the share of the mean square that such terms explain), terms,
+    terms_after.
     experiments : rows with effects and experiment: what would tell the indistinguishable apart.
     """
 
@@ -147,6 +149,7 @@ class DiscoveryView:
     effects: tuple[EffectView, ...] = ()
     files: tuple[Row, ...] = ()
     dependence: tuple[Row, ...] = ()
+    points_to: tuple[Row, ...] = ()
     experiments: tuple[Row, ...] = ()
     titles: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()

