@@ -1,8 +1,8 @@
 """Measured records made ready for fits: noise, initial state of charge, the part that may be looked at.
 
-Fits run on a thinned copy (averages over symmetric windows, of current and voltage alike, so that charge and
-the
-linear part of the response are kept); reported errors are always those of the record as measured.
+Fits run on a thinned copy: averages over symmetric windows, of current and voltage alike, so that charge and the
+linear part of the response are kept; of tests at steady currents with pulses and rests, rows that are dense after each
+step. Reported errors are always those of the record as measured.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.errors import DataError, SimulationError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell, initial_soc
 from aesi.records import Hold, Measurement
 
@@ -24,6 +24,9 @@ FIT_SAMPLES = 12_000
 STEADY_SAMPLES = 600
 STEADY_C_RATE = 0.01
 STEADY_SHARE = 0.01
+FIRST_STEP_S = 0.5
+STEP_GROWTH = 0.25
+"""Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
 SLOW_SAMPLING_S = 5.0
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
@@ -113,13 +116,18 @@ def prepare(
     gaps = np.diff(data.time_s)
     hold: Hold = "backward" if float(gaps.max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
     duration = float(data.time_s[-1] - data.time_s[0])
-    thin = thinned(data, max(step_s, duration / STEADY_SAMPLES) if _steady(cell, data) else step_s)
-    thin_hold: Hold = hold if thin is data else "linear"
+    steps = _current_steps(cell, data)
+    steady = float(np.mean(steps)) < STEADY_SHARE
+    thin, rows = condensed(data, steps, duration / STEADY_SAMPLES) if steady else (thinned(data, step_s), None)
+    thin_hold: Hold = hold if thin is data else "backward" if steady else "linear"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     start, sd, notes = _initial_state(cell, data, soc0)
-    noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
-    noise_full = noise if thin is data else noise_floor_v(data.voltage_v, data.current_a)
+    noise_full = noise_floor_v(data.voltage_v, data.current_a)
+    if rows is None:
+        noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
+    else:  # what lies between rows that far apart is no noise
+        noise = max(noise_full * float(np.sqrt(np.mean(1.0 / rows))), SMALLEST_NOISE_V)
     rest = rest_voltage_v(cell, data) if at_rest(cell, data) else None
     given = soc0 is not None and start == soc0
     return Record(
@@ -127,10 +135,9 @@ def prepare(
     )
 
 
-def _steady(cell: Cell, data: Measurement) -> bool:
-    """True for constant-current tests, whose voltage needs few samples to be described."""
-    changes = np.abs(np.diff(data.current_a)) > STEADY_C_RATE * cell.nominal_capacity_ah
-    return float(np.mean(changes)) < STEADY_SHARE
+def _current_steps(cell: Cell, data: Measurement) -> BoolArray:
+    """(n - 1,) True where the current of a row is another than that of the row before."""
+    return np.abs(np.diff(data.current_a)) > STEADY_C_RATE * cell.nominal_capacity_ah
 
 
 def prepare_test(cell: Cell, data: Measurement, seen: Sequence[Measurement], soc0: float | None) -> Record:
@@ -205,6 +212,47 @@ def thinned(data: Measurement, step_s: float) -> Measurement:
         if temperature is None or first.temperature_degc is None
         else np.concatenate([first.temperature_degc, temperature]),
     )
+
+
+def condensed(data: Measurement, steps: BoolArray, longest_s: float) -> tuple[Measurement, Array]:
+    """A record of steady currents and rests with few rows where little happens, and how many each stands for.
+
+    steps : (n - 1,) True where the current changes.  longest_s : the most that a row may stand for.
+    Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
+    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for; the current is what
+    moves the charge of the record, as its logger held it ("backward").
+    """
+    t = data.time_s
+    n = len(t)
+    first = np.concatenate([[True], steps])
+    began = np.maximum.accumulate(np.where(first, np.arange(n), 0))
+    since = t - t[np.maximum(began - 1, 0)]
+    even = max(longest_s / STEP_GROWTH - FIRST_STEP_S, 0.0)
+    place = np.log1p(np.minimum(since, even) / FIRST_STEP_S) / STEP_GROWTH
+    place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
+    opens = first | np.concatenate([[True], np.diff(place) != 0.0])
+    opens[[1, -1]] = True
+    opens[1:] |= first[:-1]  # the first row of a current by itself, and the last: between them the steps are exact
+    opens[:-1] |= first[1:]
+    starts = np.flatnonzero(opens)
+    rows = np.diff(np.append(starts, n)).astype(float)
+    if len(starts) == n:
+        return data, rows
+
+    def averaged(column: Array) -> Array:
+        return np.add.reduceat(column, starts) / rows
+
+    time = averaged(t)
+    charge = np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(t))])
+    current = np.diff(np.interp(time, t, charge)) / np.diff(time)
+    thin = replace(
+        data,
+        time_s=time,
+        current_a=np.concatenate([data.current_a[:1], current]),
+        voltage_v=averaged(data.voltage_v),
+        temperature_degc=None if data.temperature_degc is None else averaged(data.temperature_degc),
+    )
+    return thin, rows
 
 
 def _nearly_full_or_empty(cell: Cell, voltage_v: float) -> float | None:
