@@ -33,6 +33,8 @@ CONTINUATION_STEPS = 3.0
 OTHER_STATE = 0.05
 BEYOND_FULL_V = 0.05
 REST_C_RATE = 1.0 / 50.0
+RELAXED_V = 0.004
+"""A voltage that moves more than this over the rest at the start is not yet that of a rest."""
 NEAR_REST_C_RATE = 1.0 / 8.0
 SOC_TOLERANCE = 0.0005
 SOC_TOLERANCE_FROM_VOLTAGE = 0.004
@@ -118,7 +120,9 @@ def prepare(
     duration = float(data.time_s[-1] - data.time_s[0])
     steps = _current_steps(cell, data)
     steady = float(np.mean(steps)) < STEADY_SHARE
-    thin, rows = condensed(data, steps, duration / STEADY_SAMPLES) if steady else (thinned(data, step_s), None)
+    thin, rows = (
+        condensed(data, steps, duration / STEADY_SAMPLES) if steady else (thinned(data, step_s), None)
+    )
     thin_hold: Hold = hold if thin is data else "backward" if steady else "linear"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
@@ -232,7 +236,9 @@ def condensed(data: Measurement, steps: BoolArray, longest_s: float) -> tuple[Me
     place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
     opens = first | np.concatenate([[True], np.diff(place) != 0.0])
     opens[[1, -1]] = True
-    opens[1:] |= first[:-1]  # the first row of a current by itself, and the last: between them the steps are exact
+    opens[1:] |= first[
+        :-1
+    ]  # the first row of a current by itself, and the last: between them the steps are exact
     opens[:-1] |= first[1:]
     starts = np.flatnonzero(opens)
     rows = np.diff(np.append(starts, n)).astype(float)
@@ -269,11 +275,22 @@ def at_rest(cell: Cell, data: Measurement) -> bool:
 
 
 def rest_voltage_v(cell: Cell, data: Measurement) -> float:
-    """Mean voltage of the samples before the current starts, at most sixty."""
+    """Mean voltage of the samples before the current starts, at most sixty; where it still moves, of the last."""
+    calm = _calm_v(cell, data)
+    return float(calm.mean()) if abs(_moved_v(calm)) < RELAXED_V else float(calm[-(len(calm) // 4) :].mean())
+
+
+def _calm_v(cell: Cell, data: Measurement) -> Array:
     limit = max(abs(float(data.current_a[0])), REST_C_RATE * cell.nominal_capacity_ah)
     calm = np.abs(data.current_a[:60]) <= limit
     n = len(calm) if calm.all() else max(1, int(np.argmin(calm)))
-    return float(np.mean(data.voltage_v[:n]))
+    return data.voltage_v[:n]
+
+
+def _moved_v(calm_v: Array) -> float:
+    """From the first quarter of a rest to its last; nought where the samples are too few to tell it from noise."""
+    part = len(calm_v) // 4
+    return float(calm_v[-part:].mean() - calm_v[:part].mean()) if part > 3 else 0.0
 
 
 def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[float, float, tuple[str, ...]]:
@@ -302,6 +319,13 @@ def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[f
             f"{100 * soc0:.1f} % given; the voltage is believed."
         )
     if resting:
+        moved = _moved_v(_calm_v(cell, data))
+        if soc0 is None and abs(moved) > RELAXED_V:
+            notes.append(
+                f"{data.name}: the voltage still moves ({1e3 * moved:+.0f} mV) before the current starts, so that the "
+                f"{100 * inferred:.1f} % state of charge from it is doubtful; give --soc0 if it is known."
+            )
+            return inferred, SOC_TOLERANCE_UNDER_LOAD, tuple(notes)
         return inferred, SOC_TOLERANCE_FROM_VOLTAGE, tuple(notes)
     notes.append(f"{data.name}: no rest at the start; its initial state of charge is fitted within 6 %.")
     return inferred, SOC_TOLERANCE_UNDER_LOAD, tuple(notes)
