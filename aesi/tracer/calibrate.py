@@ -186,6 +186,8 @@ def _best(problem: Calibrating, rng: np.random.Generator) -> tuple[Calibrating, 
         if np.isfinite(cost) and (best is None or cost < best[0]):
             best = cost, weighted, x
             first = np.where(rates, first, x)
+        if cost < len(problem.measured):
+            break  # what is left is what the model is expected to miss
     if best is None:
         raise FitError(
             "no start of the calibration can be simulated; start from a cell of the same chemistry."
@@ -275,12 +277,12 @@ def _undetermined(fitter: Fitter, jacobian: Array) -> tuple[str, ...]:
         return ()
     width = (fitter.high - fitter.low)[free]
     _, sizes, vectors = np.linalg.svd(jacobian[:, free] * width / MODEL_ERROR_V, full_matrices=False)
-    sentences = []
+    sentences: dict[frozenset[str], str] = {}
     for size, vector in zip(sizes, vectors, strict=True):
         uncertainty = 1.0 / max(float(size), 1e-12)
         if uncertainty < LOOSE_SHARE / np.sqrt(12.0):
             continue
         heavy = [j for j in np.argsort(-np.abs(vector)) if abs(vector[j]) > 0.3]
         names = [f"{fitter.knobs[free[j]].owner}.{fitter.knobs[free[j]].name}" for j in heavy]
-        sentences.append(f"the data do not determine {' with '.join(names)}")
-    return tuple(sentences)
+        sentences.setdefault(frozenset(names), f"the data do not determine {' with '.join(names)}")
+    return tuple(sentences.values())

@@ -1,8 +1,8 @@
 """Measured records made ready for fits: noise, initial state of charge, the part that may be looked at.
 
 Fits run on a thinned copy: averages over symmetric windows, of current and voltage alike, so that charge and the
-linear part of the response are kept; of tests at steady currents with pulses and rests, rows that are dense after each
-step. Reported errors are always those of the record as measured.
+linear part of the response are kept; of tests at steady currents with pulses and rests, and of records with uneven
+times, rows that are dense after each step. Reported errors are always those of the record as measured.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ FIT_SAMPLES = 12_000
 STEADY_SAMPLES = 600
 STEADY_C_RATE = 0.01
 STEADY_SHARE = 0.01
+UNEVEN_SHARE = 0.01
+"""Of the samples: averages over equal numbers of rows need equal times between them."""
 FIRST_STEP_S = 0.5
 STEP_GROWTH = 0.25
 """Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
@@ -119,11 +121,13 @@ def prepare(
     hold: Hold = "backward" if float(gaps.max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
     duration = float(data.time_s[-1] - data.time_s[0])
     steps = _current_steps(cell, data)
-    steady = float(np.mean(steps)) < STEADY_SHARE
-    thin, rows = (
-        condensed(data, steps, duration / STEADY_SAMPLES) if steady else (thinned(data, step_s), None)
-    )
-    thin_hold: Hold = hold if thin is data else "backward" if steady else "linear"
+    typical = float(np.median(gaps))
+    uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
+    if uneven or float(np.mean(steps)) < STEADY_SHARE:
+        thin, rows = condensed(data, steps, duration / STEADY_SAMPLES)
+    else:
+        thin, rows = thinned(data, step_s), None
+    thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     start, sd, notes = _initial_state(cell, data, soc0)
