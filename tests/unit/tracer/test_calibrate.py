@@ -12,7 +12,8 @@ from aesi.pipeline.calibrate import to_json, to_text
 from aesi.records import Measurement
 from aesi.tracer.calibrate import calibrate
 from aesi.tracer.cell_start import one_branch, sized, with_activation
-from aesi.tracer.cycler_zero import ZERO
+from aesi.tracer.cycler_zero import ZERO, zeros_noted
+from aesi.tracer.records import prepare
 
 
 def discharge(cell, soc0=1.0):
@@ -104,8 +105,9 @@ def test_a_zero_of_the_cycler_in_the_slow_test_is_not_capacity(cell):
     read = replace(slow, current_a=slow.current_a + offset * (slow.current_a > 0))
     found = calibrate(cell, [read, pulsed(cell)])
     assert found.cell.capacity_ah == pytest.approx(cell.capacity_ah, rel=0.01)
-    told = replace(slow, current_a=slow.current_a + 5 * offset * (slow.current_a > 0))
-    assert any("too high" in note for note in calibrate(cell, [told, pulsed(cell)]).notes)
+    record = prepare(cell, read, 1.0, 0.0)
+    assert "4.0 % of it" in zeros_noted([record], {"0": 0.04 * 0.2 * cell.nominal_capacity_ah})[0]
+    assert zeros_noted([record], {"0": offset}) == ()
     still = Record(slow.time_s, np.zeros(len(slow)), None)
     assert not ZERO.on_record(still, offset_a=0.1).current_a.any(), "no current flows at rest"
 
