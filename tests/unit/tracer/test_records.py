@@ -7,6 +7,7 @@ import pytest
 
 from aesi.errors import DataError
 from aesi.records import Measurement
+from aesi.tracer.checks import check_record
 from aesi.tracer.records import noise_floor_v, prepare, prepare_test, rest_voltage_v, thinned
 
 
@@ -45,6 +46,7 @@ def test_pulses_logged_unevenly_keep_their_charge_and_their_height(cell):
     charge = np.cumsum(thin.current_a[1:] * np.diff(thin.time_s))
     assert charge[-1] == pytest.approx(8 * 600.0)
     assert set(np.round(thin.current_a, 9)) == {0.0, 60.0}
+    check_record(cell, replace(record, soc0=0.11))  # 5 Ah of 30, which straight lines would make 22
     on = thin.time_s[thin.current_a > 0]
     assert np.count_nonzero(on < 1.05) >= 4, "rows are dense after a step"
     assert on[0] == pytest.approx(0.1)
