@@ -76,11 +76,8 @@ class ZeroProblem(Problem):
         for i, record in enumerate(self.records):
             offset = knobs[i].to_value(float(x[i]))
             alone = replace(self, records=(record,), fixed=(*self.fixed, ZERO.activate(offset_a=offset)))
-            renamed = [
-                replace(knobs[n + i], name="0"),
-                *knobs[2 * n :],
-            ]  # its own state of charge, and what all share
-            seen = Problem.predict(alone, renamed, x[np.r_[n + i, 2 * n : len(x)]])
+            own_state = replace(knobs[n + i], name="0")
+            seen = Problem.predict(alone, [own_state, *knobs[2 * n :]], x[np.r_[n + i, 2 * n : len(x)]])
             if seen is None:
                 return None
             out += seen
@@ -96,7 +93,7 @@ def zeros_noted(records: Sequence[Record], offsets_a: Mapping[str, float]) -> tu
         share = zero / float(np.median(np.abs(current[flowing(current)])))
         if abs(share) > NOTED_ZERO:
             sentences.append(
-                f"{record.name}: its charge agrees with the others' if its current reads {1e3 * zero:.2g} mA too high "
-                f"({100 * share:.1f} % of it); that is taken out."
+                f"{record.name}: its charge fits if its current reads {1e3 * abs(zero):.2g} mA too "
+                f"{'high' if zero > 0 else 'low'} ({100 * abs(share):.1f} % of it); that is taken out."
             )
     return tuple(sentences)
