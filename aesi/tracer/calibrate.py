@@ -11,21 +11,26 @@ import numpy as np
 from aesi.errors import FitError
 from aesi.numerics.coloured import ColouredNoise
 from aesi.numerics.typing import Array
+from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
-from aesi.physics.constants import SECONDS_PER_HOUR
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.espm import model_with
 from aesi.records import Measurement
 from aesi.tracer.candidates import Estimate
+from aesi.tracer.cell_start import one_branch, sized, with_activation
 from aesi.tracer.checks import check_measurement, check_record
+from aesi.tracer.cycler_zero import ZERO, ZERO_ERROR, ZeroProblem, zeros_noted
 from aesi.tracer.fit import Fitter, summarise
 from aesi.tracer.knobs import SOC0
-from aesi.tracer.ocp_correction import EFFECT as OCP_CORRECTION
+from aesi.tracer.ocp_correction import correction
 from aesi.tracer.problem import Problem
 from aesi.tracer.records import Record, prepare_all
 
 MODEL_ERROR_V = 3e-3
 """What a calibrated single-particle model is expected to miss: the weight of a sample."""
+_PLACES = np.linspace(1.0, 0.0, 23)
+OCP_CORRECTION = correction((_PLACES - 0.7 * np.sin(2.0 * np.pi * _PLACES) / (2.0 * np.pi)).tolist())
+"""Its knots are denser at both ends, where a potential bends most."""
 OCP_TOLERANCE_V = 0.05
 SOC_TOLERANCE = 0.01
 """Of a state of charge from a rest voltage, where the open-circuit potential itself is in doubt; one that was given is
@@ -33,19 +38,39 @@ believed."""
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
 RESISTANCE = "series_resistance"
 RATES = ("solid_diffusivity", "charge_transfer_kinetics", "electrolyte_transport", RESISTANCE)
-TYPICAL_SOLID_EA_J_MOL = 30e3
-TYPICAL_RATE_EA_J_MOL = 35e3
-TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
-"""Where the file declares none: a cell answers to temperature, and data at one temperature cannot say how much.
-Diffusion and rates as in the parametrisation of O'Regan et al., Electrochim. Acta 425 (2022) 140700, rounded; the
-electrolyte as in the BPX example cell."""
-STEPS = 10
+OWN = (*BALANCE, *RATES)
+STEPS = 4
+ROUNDS = 20
+ENOUGH = 0.003
+"""A round of steps that gains less than this share of what is left is the last."""
+OUTLIER_V = 0.015
+"""Beyond this an error counts by its size and no longer by its square: start parameters that run a record empty, a
+pulse near the end of a discharge, or a row in the middle of a step must not outweigh all the rest."""
 STARTS = 3
 SPREAD = 0.35
 """Random starts move each rate by this many e-folds."""
-FULL_WINDOW_V = 0.15
+CHARGED_V = 0.03
+"""A record that starts this close below the upper voltage starts from a full charge."""
 LOOSE_SHARE = 0.5
 """A combination whose uncertainty is more than this share of the admissible range is called undetermined."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrating(ZeroProblem):
+    """The case of a calibration, in which rows may count for less.
+
+    weights : (n,) of the rows, None where all are alike.
+    """
+
+    weights: Array | None = None
+
+    def weighted(self, table: Array) -> Array:
+        """Rows (n, m) as the fit counts them."""
+        return table if self.weights is None else table * self.weights[:, None]
+
+    def whiten(self, table: Array, noise: Sequence[ColouredNoise]) -> tuple[Array, float]:
+        """As of any problem, of weighted rows."""
+        return super().whiten(self.weighted(table), noise)
 
 
 @dataclass(frozen=True)
@@ -88,102 +113,57 @@ def calibrate(
     for data in measurements:
         check_measurement(cell, data)
     start, notes = sized(cell, measurements)
+    kept = [one_branch(start, data) for data in measurements]
+    measurements = [data for data, _ in kept]
+    notes = (*notes, *(note for _, more in kept for note in more))
     start, more = with_activation(start)
     notes = (*notes, *more)
     records = tuple(with_model_error(r) for r in prepare_all(start, measurements, soc0, 0.0))
     for record in records:
         check_record(start, record)
-    effects = {OCP_CORRECTION.id: OCP_CORRECTION} | {n: CATALOGUE[n] for n in (*BALANCE, *RATES)}
-    problem = Problem(start, records, effects, tolerances={OCP_CORRECTION.id: OCP_TOLERANCE_V})
-    fitter = Fitter(problem, (*BALANCE, *RATES))
-    noise = [ColouredNoise(MODEL_ERROR_V, 1e-9, 100.0)] * len(records)
-    x = _best(fitter, noise, np.random.default_rng(seed))
+    effects = {OCP_CORRECTION.id: OCP_CORRECTION} | {n: CATALOGUE[n] for n in OWN}
+    reach = max(float(np.max(np.abs(m.current_a))) for m in measurements)
+    problem = Calibrating(
+        start,
+        records,
+        effects,
+        tolerances={OCP_CORRECTION.id: OCP_TOLERANCE_V},
+        current_sd_a=ZERO_ERROR * reach,
+    )
+    problem, x = _best(problem, np.random.default_rng(seed))
+    fitter = Fitter(problem, OWN)
     residual = fitter.residual(x)
     jacobian = None if residual is None else fitter.jacobian(x, residual)
     if residual is None or jacobian is None:
         raise FitError(
             f"{cell.name}: the fit left what can be simulated; start from a cell of the same chemistry."
         )
-    fit = summarise(fitter, x, residual, jacobian, noise)
-    values = {owner: given for owner, given in fit.values.items() if owner != SOC0}
-    inflation = float(np.sqrt(np.mean(residual**2))) / MODEL_ERROR_V
+    fit = summarise(fitter, x, residual, jacobian, white(problem))
+    values = {owner: given for owner, given in fit.values.items() if owner not in (SOC0, ZERO.id)}
+    found = _rewound(problem, settled(problem, values), fit.values[SOC0])
+    if start.nominal_capacity_ah != cell.nominal_capacity_ah:
+        found = replace(found, nominal_capacity_ah=found.capacity_ah)
+    counted = problem.weighted(np.column_stack([residual, fit.jacobian]))
+    inflation = float(np.sqrt(np.mean(counted[:, 0] ** 2))) / MODEL_ERROR_V
     parameters = {}
     for index, knob in enumerate(fit.knobs):
-        if knob.owner in RATES + BALANCE:
-            low, high = fit.interval(index, 1.96 * max(inflation, 1.0) * _redundancy(residual))
+        if knob.owner in OWN:
+            low, high = fit.interval(index, 1.96 * max(inflation, 1.0) * _redundancy(counted[:, 0]))
             parameters[f"{knob.owner}.{knob.name}"] = Estimate(
                 knob.to_value(float(x[index])), low, high, knob.unit
             )
     rms = [float(np.sqrt(np.mean(residual[rows] ** 2))) for rows in problem.slices]
     old = [_declared_error_v(cell, problem, record) for record in records]
     return Calibration(
-        cell=settled(problem, values),
+        cell=found,
         declared=cell,
         parameters=parameters,
-        undetermined=_undetermined(fitter, fit.jacobian),
+        undetermined=_undetermined(fitter, counted[:, 1:]),
         at_bounds=fit.at_bounds,
         files=tuple(FileError(r.name, b, a) for r, b, a in zip(records, old, rms, strict=True)),
-        notes=(*notes, *(n for r in records for n in r.notes)),
+        notes=(*notes, *(n for r in records for n in r.notes), *zeros_noted(records, fit.values[ZERO.id])),
         seconds=time.perf_counter() - began,
     )
-
-
-def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[str, ...]]:
-    """The cell with its area scaled to the charge of a full discharge among the measurements, if there is one."""
-    charges = [_full_discharge_ah(cell, m) for m in measurements]
-    known = max((q for q in charges if q is not None), default=None)
-    if known is None:
-        return cell, (
-            f"no full discharge among the data: the capacity of {cell.capacity_ah:.3g} Ah is believed.",
-        )
-    factor = known / cell.capacity_ah
-    note = f"capacity {known:.3f} Ah by a full discharge, {cell.capacity_ah:.3f} Ah declared"
-    scaled = replace(cell, electrode_area_m2=cell.electrode_area_m2 * factor, nominal_capacity_ah=known)
-    return scaled, (f"{note}; the electrode area is scaled by {factor:.3f}.",)
-
-
-def with_activation(cell: Cell) -> tuple[Cell, tuple[str, ...]]:
-    """The cell with typical activation energies where it declares none, and a sentence that names them."""
-    filled = []
-    changed = cell
-    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
-        changes = {}
-        if not electrode.diffusivity_ea_j_mol:
-            changes["diffusivity_ea_j_mol"] = TYPICAL_SOLID_EA_J_MOL
-        if not electrode.rate_ea_j_mol:
-            changes["rate_ea_j_mol"] = TYPICAL_RATE_EA_J_MOL
-        if changes:
-            with_side = changed.with_negative if side == "negative" else changed.with_positive
-            changed = with_side(**changes)
-            filled += [
-                f"{side} {name.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for name, v in changes.items()
-            ]
-    electrolyte = {
-        name: TYPICAL_ELECTROLYTE_EA_J_MOL
-        for name in ("conductivity_ea_j_mol", "diffusivity_ea_j_mol")
-        if not getattr(cell.electrolyte, name)
-    }
-    if electrolyte:
-        changed = changed.with_electrolyte(**electrolyte)
-        filled += [
-            f"electrolyte {n.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for n, v in electrolyte.items()
-        ]
-    if not filled:
-        return cell, ()
-    return changed, (
-        f"no activation energy is declared for these, typical ones are taken: {', '.join(filled)}.",
-    )
-
-
-def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
-    """Charge from full to empty, or None where the record does not go from one to the other."""
-    if data.voltage_v[0] < cell.upper_voltage_v - FULL_WINDOW_V:
-        return None
-    end = int(np.argmin(data.voltage_v))
-    if data.voltage_v[end] > cell.lower_voltage_v + 2 * FULL_WINDOW_V:
-        return None
-    steps = data.current_a[1 : end + 1] * np.diff(data.time_s[: end + 1])
-    return float(steps.sum()) / SECONDS_PER_HOUR
 
 
 def with_model_error(record: Record) -> Record:
@@ -193,33 +173,55 @@ def with_model_error(record: Record) -> Record:
     return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=soc0_sd)
 
 
-def _best(fitter: Fitter, noise: list[ColouredNoise], rng: np.random.Generator) -> Array:
-    """The best of several descents: balance and potential first, then everything."""
+def _best(problem: Calibrating, rng: np.random.Generator) -> tuple[Calibrating, Array]:
+    """The best of several descents, and the problem with the weights at its end."""
+    fitter = Fitter(problem, OWN)
     first = np.zeros(len(fitter.knobs))
     rates = np.array([k.owner in RATES for k in fitter.knobs])
-    best: tuple[float, Array] | None = None
+    reach = np.array([SPREAD / k.scale if k.log and k.owner in RATES else 0.0 for k in fitter.knobs])
+    best: tuple[float, Calibrating, Array] | None = None
     for attempt in range(STARTS):
-        x = first.copy()
-        if attempt:
-            x[rates] += (
-                rng.normal(0.0, SPREAD, int(rates.sum()))
-                / np.array([k.scale for k in fitter.knobs if k.owner in RATES])
-                * np.array([1.0 if k.log else 0.0 for k in fitter.knobs if k.owner in RATES])
-            )
-        x = np.clip(x, fitter.low, fitter.high)
-        x = fitter.descend(x, noise, STEPS if attempt == 0 else STEPS // 2)
-        e = fitter.residual(x)
-        if e is None:
-            continue
-        cost = float(np.sum(e**2)) / MODEL_ERROR_V**2 + float(np.sum((fitter.prior * x) ** 2))
-        if best is None or cost < best[0]:
-            best = cost, x
+        moved = first + (reach * rng.normal(size=len(reach)) if attempt else 0.0)
+        cost, weighted, x = _descended(problem, np.clip(moved, fitter.low, fitter.high))
+        if np.isfinite(cost) and (best is None or cost < best[0]):
+            best = cost, weighted, x
             first = np.where(rates, first, x)
+        if cost < len(problem.measured):
+            break  # what is left is what the model is expected to miss
     if best is None:
         raise FitError(
             "no start of the calibration can be simulated; start from a cell of the same chemistry."
         )
-    return fitter.descend(best[1], noise, STEPS)
+    return best[1:]
+
+
+def _descended(problem: Calibrating, x: Array) -> tuple[float, Calibrating, Array]:
+    """Cost, weights and place after rounds of least squares, each with the weights of where it starts."""
+    fitter, best = Fitter(problem, OWN), np.inf
+    for _ in range(ROUNDS):
+        e = fitter.residual(x)
+        if e is None:
+            break
+        problem = replace(problem, weights=(1.0 + (e / OUTLIER_V) ** 2) ** -0.25)
+        fitter = Fitter(problem, OWN)
+        x = fitter.descend(x, white(problem), STEPS)
+        e = fitter.residual(x)
+        cost = np.inf if e is None else _cost(e, fitter.prior * x)
+        if not best - cost > ENOUGH * cost:
+            return min(cost, best), problem, x
+        best = cost
+    return best, problem, x
+
+
+def white(problem: Problem) -> list[ColouredNoise]:
+    """Every sample at the weight of the model's error."""
+    return [ColouredNoise(MODEL_ERROR_V, 1e-9, 100.0)] * len(problem.records)
+
+
+def _cost(e: Array, prior: Array) -> float:
+    """What a round with these weights lowers: quadratic in small errors, linear in large ones."""
+    loss = 2.0 * OUTLIER_V**2 * (np.sqrt(1.0 + (e / OUTLIER_V) ** 2) - 1.0)
+    return float(np.sum(loss)) / MODEL_ERROR_V**2 + float(np.sum(prior**2))
 
 
 def _declared_error_v(cell: Cell, problem: Problem, record: Record) -> float:
@@ -244,6 +246,30 @@ def settled(problem: Problem, values: Mapping[str, Mapping[str, float]]) -> Cell
     return replace(cell, contact_resistance_ohm=cell.contact_resistance_ohm + resistance)
 
 
+def _rewound(problem: Problem, cell: Cell, soc0: Mapping[str, float]) -> Cell:
+    """The cell with full where its charged records rested, and empty at the rest voltage declared for it.
+
+    A potential and a scale of the charge that moved with it leave no state of charge where it was.
+    """
+    charged = [
+        same_rest(problem.cell, cell, soc0[str(i)])
+        for i, record in enumerate(problem.records)
+        if record.data.voltage_v[0] > cell.upper_voltage_v - CHARGED_V and not record.soc0_given
+    ]
+    declared = problem.cell.rest_voltage_v(np.array([0.0, 1.0]))
+    full = float(np.mean(charged)) if charged else _state_at(cell, float(declared[1]))
+    n_1, p_1 = cell.stoichiometries(full)
+    n_0, p_0 = cell.stoichiometries(_state_at(cell, float(declared[0])))
+    cell = cell.with_negative(theta_min=n_0, theta_max=n_1).with_positive(theta_min=p_1, theta_max=p_0)
+    return cell
+
+
+def _state_at(cell: Cell, voltage_v: float) -> float:
+    """State of charge, by the cell's present windows, at which it rests at a voltage, or the nearer end."""
+    soc = np.linspace(*aged_range(cell), 2001)
+    return float(np.interp(voltage_v, np.maximum.accumulate(cell.rest_voltage_v(soc)), soc))
+
+
 def _undetermined(fitter: Fitter, jacobian: Array) -> tuple[str, ...]:
     """Directions of the free parameters along which the data hardly curve, from the singular vectors."""
     free = np.flatnonzero(fitter.prior == 0)
@@ -251,12 +277,12 @@ def _undetermined(fitter: Fitter, jacobian: Array) -> tuple[str, ...]:
         return ()
     width = (fitter.high - fitter.low)[free]
     _, sizes, vectors = np.linalg.svd(jacobian[:, free] * width / MODEL_ERROR_V, full_matrices=False)
-    sentences = []
+    sentences: dict[frozenset[str], str] = {}
     for size, vector in zip(sizes, vectors, strict=True):
         uncertainty = 1.0 / max(float(size), 1e-12)
         if uncertainty < LOOSE_SHARE / np.sqrt(12.0):
             continue
         heavy = [j for j in np.argsort(-np.abs(vector)) if abs(vector[j]) > 0.3]
         names = [f"{fitter.knobs[free[j]].owner}.{fitter.knobs[free[j]].name}" for j in heavy]
-        sentences.append(f"the data do not determine {' with '.join(names)}")
-    return tuple(sentences)
+        sentences.setdefault(frozenset(names), f"the data do not determine {' with '.join(names)}")
+    return tuple(sentences.values())

@@ -53,7 +53,7 @@ def check_record(cell: Cell, record: Record) -> None:
             f"{record.name}: the current never exceeds {rate:.2g} C, so the cell does not respond and nothing can be "
             "decided; give data with load steps."
         )
-    charge = record.soc0 - _discharged_ah(record.data) / cell.capacity_ah
+    charge = record.soc0 - _discharged_ah(record) / cell.capacity_ah
     wrong = (charge < -SOC_MARGIN) | (charge > 1.0 + SOC_MARGIN)
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -65,9 +65,11 @@ def check_record(cell: Cell, record: Record) -> None:
         )
 
 
-def _discharged_ah(data: Measurement) -> Array:
-    steps = 0.5 * (data.current_a[1:] + data.current_a[:-1]) * np.diff(data.time_s)
-    return np.concatenate([[0.0], np.cumsum(steps)]) / SECONDS_PER_HOUR
+def _discharged_ah(record: Record) -> Array:
+    """(n,) as the record's current is held: a pulse before a row minutes later is no triangle."""
+    current = record.data.current_a
+    mean = current[1:] if record.hold == "backward" else 0.5 * (current[1:] + current[:-1])
+    return np.concatenate([[0.0], np.cumsum(mean * np.diff(record.data.time_s))]) / SECONDS_PER_HOUR
 
 
 def check_same_cell(name: str, residual_v: Array, cell: Cell) -> None:

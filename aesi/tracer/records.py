@@ -1,8 +1,8 @@
 """Measured records made ready for fits: noise, initial state of charge, the part that may be looked at.
 
-Fits run on a thinned copy (averages over symmetric windows, of current and voltage alike, so that charge and
-the
-linear part of the response are kept); reported errors are always those of the record as measured.
+Fits run on a thinned copy: averages over symmetric windows, of current and voltage alike, so that charge and the
+linear part of the response are kept; of tests at steady currents with pulses and rests, and of records with uneven
+times, rows that are dense after each step. Reported errors are always those of the record as measured.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.errors import DataError, SimulationError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell, initial_soc
 from aesi.records import Hold, Measurement
 
@@ -24,12 +24,19 @@ FIT_SAMPLES = 12_000
 STEADY_SAMPLES = 600
 STEADY_C_RATE = 0.01
 STEADY_SHARE = 0.01
+UNEVEN_SHARE = 0.01
+"""Of the samples: averages over equal numbers of rows need equal times between them."""
+FIRST_STEP_S = 0.5
+STEP_GROWTH = 0.25
+"""Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
 SLOW_SAMPLING_S = 5.0
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 OTHER_STATE = 0.05
 BEYOND_FULL_V = 0.05
 REST_C_RATE = 1.0 / 50.0
+RELAXED_V = 0.004
+"""A voltage that moves more than this over the rest at the start is not yet that of a rest."""
 NEAR_REST_C_RATE = 1.0 / 8.0
 SOC_TOLERANCE = 0.0005
 SOC_TOLERANCE_FROM_VOLTAGE = 0.004
@@ -113,13 +120,22 @@ def prepare(
     gaps = np.diff(data.time_s)
     hold: Hold = "backward" if float(gaps.max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
     duration = float(data.time_s[-1] - data.time_s[0])
-    thin = thinned(data, max(step_s, duration / STEADY_SAMPLES) if _steady(cell, data) else step_s)
-    thin_hold: Hold = hold if thin is data else "linear"
+    steps = _current_steps(cell, data)
+    typical = float(np.median(gaps))
+    uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
+    if uneven or float(np.mean(steps)) < STEADY_SHARE:
+        thin, rows = condensed(data, steps, duration / STEADY_SAMPLES)
+    else:
+        thin, rows = thinned(data, step_s), None
+    thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     start, sd, notes = _initial_state(cell, data, soc0)
-    noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
-    noise_full = noise if thin is data else noise_floor_v(data.voltage_v, data.current_a)
+    noise_full = noise_floor_v(data.voltage_v, data.current_a)
+    if rows is None:
+        noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
+    else:  # what lies between rows that far apart is no noise
+        noise = max(noise_full * float(np.sqrt(np.mean(1.0 / rows))), SMALLEST_NOISE_V)
     rest = rest_voltage_v(cell, data) if at_rest(cell, data) else None
     given = soc0 is not None and start == soc0
     return Record(
@@ -127,10 +143,9 @@ def prepare(
     )
 
 
-def _steady(cell: Cell, data: Measurement) -> bool:
-    """True for constant-current tests, whose voltage needs few samples to be described."""
-    changes = np.abs(np.diff(data.current_a)) > STEADY_C_RATE * cell.nominal_capacity_ah
-    return float(np.mean(changes)) < STEADY_SHARE
+def _current_steps(cell: Cell, data: Measurement) -> BoolArray:
+    """(n - 1,) True where the current of a row is another than that of the row before."""
+    return np.abs(np.diff(data.current_a)) > STEADY_C_RATE * cell.nominal_capacity_ah
 
 
 def prepare_test(cell: Cell, data: Measurement, seen: Sequence[Measurement], soc0: float | None) -> Record:
@@ -207,6 +222,49 @@ def thinned(data: Measurement, step_s: float) -> Measurement:
     )
 
 
+def condensed(data: Measurement, steps: BoolArray, longest_s: float) -> tuple[Measurement, Array]:
+    """A record of steady currents and rests with few rows where little happens, and how many each stands for.
+
+    steps : (n - 1,) True where the current changes.  longest_s : the most that a row may stand for.
+    Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
+    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for; the current is what
+    moves the charge of the record, as its logger held it ("backward").
+    """
+    t = data.time_s
+    n = len(t)
+    first = np.concatenate([[True], steps])
+    began = np.maximum.accumulate(np.where(first, np.arange(n), 0))
+    since = t - t[np.maximum(began - 1, 0)]
+    even = max(longest_s / STEP_GROWTH - FIRST_STEP_S, 0.0)
+    place = np.log1p(np.minimum(since, even) / FIRST_STEP_S) / STEP_GROWTH
+    place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
+    opens = first | np.concatenate([[True], np.diff(place) != 0.0])
+    opens[[1, -1]] = True
+    opens[1:] |= first[
+        :-1
+    ]  # the first row of a current by itself, and the last: between them the steps are exact
+    opens[:-1] |= first[1:]
+    starts = np.flatnonzero(opens)
+    rows = np.diff(np.append(starts, n)).astype(float)
+    if len(starts) == n:
+        return data, rows
+
+    def averaged(column: Array) -> Array:
+        return np.add.reduceat(column, starts) / rows
+
+    time = averaged(t)
+    charge = np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(t))])
+    current = np.diff(np.interp(time, t, charge)) / np.diff(time)
+    thin = replace(
+        data,
+        time_s=time,
+        current_a=np.concatenate([data.current_a[:1], current]),
+        voltage_v=averaged(data.voltage_v),
+        temperature_degc=None if data.temperature_degc is None else averaged(data.temperature_degc),
+    )
+    return thin, rows
+
+
 def _nearly_full_or_empty(cell: Cell, voltage_v: float) -> float | None:
     """One or nought where a rest voltage lies a little beyond what the cell file reaches, None further out."""
     empty, full = (float(v) for v in cell.rest_voltage_v(np.array([0.0, 1.0])))
@@ -221,11 +279,22 @@ def at_rest(cell: Cell, data: Measurement) -> bool:
 
 
 def rest_voltage_v(cell: Cell, data: Measurement) -> float:
-    """Mean voltage of the samples before the current starts, at most sixty."""
+    """Mean voltage of the samples before the current starts, at most sixty; where it still moves, of the last."""
+    calm = _calm_v(cell, data)
+    return float(calm.mean()) if abs(_moved_v(calm)) < RELAXED_V else float(calm[-(len(calm) // 4) :].mean())
+
+
+def _calm_v(cell: Cell, data: Measurement) -> Array:
     limit = max(abs(float(data.current_a[0])), REST_C_RATE * cell.nominal_capacity_ah)
     calm = np.abs(data.current_a[:60]) <= limit
     n = len(calm) if calm.all() else max(1, int(np.argmin(calm)))
-    return float(np.mean(data.voltage_v[:n]))
+    return data.voltage_v[:n]
+
+
+def _moved_v(calm_v: Array) -> float:
+    """From the first quarter of a rest to its last; nought where the samples are too few to tell it from noise."""
+    part = len(calm_v) // 4
+    return float(calm_v[-part:].mean() - calm_v[:part].mean()) if part > 3 else 0.0
 
 
 def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[float, float, tuple[str, ...]]:
@@ -254,6 +323,13 @@ def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[f
             f"{100 * soc0:.1f} % given; the voltage is believed."
         )
     if resting:
+        moved = _moved_v(_calm_v(cell, data))
+        if soc0 is None and abs(moved) > RELAXED_V:
+            notes.append(
+                f"{data.name}: the voltage still moves ({1e3 * moved:+.0f} mV) before the current starts, so that the "
+                f"{100 * inferred:.1f} % state of charge from it is doubtful; give --soc0 if it is known."
+            )
+            return inferred, SOC_TOLERANCE_UNDER_LOAD, tuple(notes)
         return inferred, SOC_TOLERANCE_FROM_VOLTAGE, tuple(notes)
     notes.append(f"{data.name}: no rest at the start; its initial state of charge is fitted within 6 %.")
     return inferred, SOC_TOLERANCE_UNDER_LOAD, tuple(notes)

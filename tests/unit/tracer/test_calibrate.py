@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from aesi.physics import Cell, simulate
+from aesi.physics.effect import Record
+from aesi.physics.relations import Constant
 from aesi.pipeline.calibrate import to_json, to_text
 from aesi.records import Measurement
-from aesi.tracer.calibrate import calibrate, sized, with_activation
+from aesi.tracer.calibrate import calibrate
+from aesi.tracer.cell_start import one_branch, sized, with_activation
+from aesi.tracer.cycler_zero import ZERO, zeros_noted
+from aesi.tracer.records import prepare
 
 
 def discharge(cell, soc0=1.0):
@@ -63,3 +68,67 @@ def test_activation_energies_are_filled_only_where_none_is_declared(cell):
     assert warm.negative.diffusivity_ea_j_mol == 30e3
     assert warm.positive == cell.positive
     assert "negative diffusivity 30 kJ/mol" in notes[0]
+
+
+def pulsed(cell, factor=6.0):
+    """Pulses at 10 Hz from full to nearly empty, the rests logged once in 30 s."""
+    capacity = cell.nominal_capacity_ah
+    one = np.concatenate([np.arange(0.1, 10.05, 0.1), np.arange(11.0, 40.5), np.arange(60.0, 1801.0, 30.0)])
+    at = np.concatenate([[0.0], *(one + 1800.0 * k for k in range(9))])
+    since = (at - 1e-6) % 1800.0
+    load = np.where(since < 10.0, factor * capacity, np.where(since > 1330.0, 0.74 * capacity, 0.0))
+    load[0] = 0.0
+    voltage = simulate(cell, at, load, 1.0, hold="backward", on_depletion="clip").voltage_v
+    return Measurement(at, load, voltage, name="pulses")
+
+
+def test_a_start_that_runs_empty_on_the_pulses_finds_its_way(cell):
+    """The symptom: 6C pulses ran the start parameters empty, and the fit never left tens of volts."""
+    slow = Constant(4e-15)
+    start = cell.with_negative(diffusivity=slow).with_positive(diffusivity=slow)
+    data = [discharge(cell), pulsed(cell)]
+    run = simulate(start, data[1].time_s, data[1].current_a, 1.0, hold="backward", on_depletion="clip")
+    assert run.series["depleted"].any()
+    found = calibrate(start, data)
+    after = {f.name: f.after_v for f in found.files}
+    assert after["pulses"] < 5e-3
+    assert after["C5"] < 8e-3
+    factor = found.parameters["solid_diffusivity.negative_factor"]
+    assert factor.low < factor.value < factor.high
+    again = simulate(found.cell, data[1].time_s, data[1].current_a, 1.0, hold="backward")
+    assert np.sqrt(np.mean((again.voltage_v - data[1].voltage_v) ** 2)) < 8e-3, "one is where it was full"
+
+
+def test_a_zero_of_the_cycler_in_the_slow_test_is_not_capacity(cell):
+    offset = 1e-3 * cell.nominal_capacity_ah
+    slow = discharge(cell)
+    read = replace(slow, current_a=slow.current_a + offset * (slow.current_a > 0))
+    found = calibrate(cell, [read, pulsed(cell)])
+    assert found.cell.capacity_ah == pytest.approx(cell.capacity_ah, rel=0.01)
+    record = prepare(cell, read, 1.0, 0.0)
+    assert "4.0 % of it" in zeros_noted([record], {"0": 0.04 * 0.2 * cell.nominal_capacity_ah})[0]
+    assert zeros_noted([record], {"0": offset}) == ()
+    still = Record(slow.time_s, np.zeros(len(slow)), None)
+    assert not ZERO.on_record(still, offset_a=0.1).current_a.any(), "no current flows at rest"
+
+
+def test_of_a_discharge_and_a_charge_only_the_discharge_is_fitted(cell):
+    c = cell.nominal_capacity_ah
+    time = np.arange(0.0, 80_000.0, 60.0)
+    down = np.select(
+        [time < 600, time < 35_000, time < 38_000, time < 72_000], [0.0, 0.1 * c, 0.0, -0.1 * c], 0.0
+    )
+    data = Measurement(time, down, np.full(len(time), 3.7), name="both")
+    kept, notes = one_branch(cell, data)
+    assert kept.time_s[0] == 0.0
+    assert kept.time_s[-1] == 37_980.0
+    assert "both" in notes[0]
+    assert "hysteresis" in notes[0]
+    kept, _ = one_branch(cell, replace(data, current_a=-down))
+    assert kept.time_s[0] <= 35_040.0, "the rest before the discharge stays"
+    assert kept.current_a[0] == 0.0
+    assert kept.time_s[-1] == time[-1]
+    charge = data.between(38_000.0, 80_000.0)
+    assert one_branch(cell, charge) == (charge, ()), "where there is nothing else, it is taken"
+    drive = replace(data, current_a=np.where(np.arange(len(time)) % 5 == 0, -0.2 * c, 0.1 * c))
+    assert one_branch(cell, drive) == (drive, ())

@@ -7,7 +7,8 @@ import pytest
 
 from aesi.errors import DataError
 from aesi.records import Measurement
-from aesi.tracer.records import noise_floor_v, prepare, prepare_test, thinned
+from aesi.tracer.checks import check_record
+from aesi.tracer.records import noise_floor_v, prepare, prepare_test, rest_voltage_v, thinned
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):
@@ -24,6 +25,50 @@ def test_thinning_keeps_charge_and_the_first_row(cell, rng):
     whole = np.trapezoid(current, time)
     # windows are centred: the ends differ by half a second of a current that wanders by a tenth an instant
     assert np.trapezoid(thin.current_a, thin.time_s) == pytest.approx(whole, rel=5e-3)
+
+
+def pulses(amplitude_a):
+    """Ten-second pulses at 10 Hz, each followed by ten minutes of rest, logged once a minute."""
+    one = np.concatenate([np.arange(0.1, 10.05, 0.1), np.arange(60.0, 610.0, 60.0)])
+    time = np.concatenate([[0.0], *(one + 600.0 * k for k in range(8))])
+    since = (time[1:] - 1e-6) % 600.0
+    return time, np.concatenate([[0.0], np.where(since < 10.0, amplitude_a, 0.0)])
+
+
+def test_pulses_logged_unevenly_keep_their_charge_and_their_height(cell):
+    time, current = pulses(60.0)
+    record = prepare(cell, measured(cell, time, current), None, 0.0)
+    thin = record.thin
+    assert record.thin_hold == "backward"
+    assert len(thin) < len(time) / 3
+    charge = np.cumsum(thin.current_a[1:] * np.diff(thin.time_s))
+    assert charge[-1] == pytest.approx(8 * 600.0)
+    assert set(np.round(thin.current_a, 9)) == {0.0, 60.0}
+    check_record(cell, replace(record, soc0=0.02))  # straight lines would take out three times as much
+    on = thin.time_s[thin.current_a > 0]
+    assert np.count_nonzero(on < 1.05) >= 4, "rows are dense after a step"
+    assert on[0] == pytest.approx(0.1)
+
+
+def test_a_long_discharge_needs_few_rows(cell):
+    time = np.arange(0.0, 36_000.0)
+    record = prepare(cell, measured(cell, time, np.where(time > 10, 3.0, 0.0)), None, 0.0)
+    assert 500 < len(record.thin) < 800
+    assert np.diff(record.thin.time_s).max() < 100.0
+
+
+def test_a_voltage_that_still_recovers_is_no_rest(cell, rng):
+    time = np.arange(600.0)
+    data = measured(cell, time, np.where(time < 40, 0.0, 5.0))
+    calm = replace(data, voltage_v=data.voltage_v + 1e-3 * rng.normal(size=600))
+    assert not prepare(cell, calm, None, 0.0).notes
+    moving = replace(calm, voltage_v=calm.voltage_v - 0.03 * np.exp(-time / 15.0))
+    record = prepare(cell, moving, None, 0.0)
+    assert "still moves" in record.notes[0]
+    assert "--soc0" in record.notes[0]
+    assert record.soc0_sd > prepare(cell, calm, None, 0.0).soc0_sd
+    assert rest_voltage_v(cell, moving) > float(moving.voltage_v[:40].mean()) + 4e-3
+    assert not prepare(cell, moving, 0.8, 0.0).notes, "a state that is given needs no doubt"
 
 
 def test_noise_floor_is_found_under_a_drive(rng):
