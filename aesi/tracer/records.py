@@ -33,6 +33,8 @@ SLOW_SAMPLING_S = 5.0
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 OTHER_STATE = 0.05
+OTHER_STATE_LOADED = 0.15
+"""A given state of charge further than this from that of a record's voltage belongs to another of the records."""
 BEYOND_FULL_V = 0.05
 REST_C_RATE = 1.0 / 50.0
 RELAXED_V = 0.004
@@ -299,9 +301,10 @@ def _moved_v(calm_v: Array) -> float:
 
 def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[float, float, tuple[str, ...]]:
     resting = at_rest(cell, data)
-    if soc0 is not None and not resting:
+    loaded = abs(float(data.current_a[0])) > NEAR_REST_C_RATE * cell.nominal_capacity_ah
+    if soc0 is not None and loaded:
         return soc0, SOC_TOLERANCE, ()
-    if soc0 is None and abs(float(data.current_a[0])) > NEAR_REST_C_RATE * cell.nominal_capacity_ah:
+    if loaded:
         raise DataError(
             f"{data.name}: the record starts at {data.current_a[0]:.3g} A, not at rest, so its first "
             "voltage does "
@@ -314,12 +317,12 @@ def _initial_state(cell: Cell, data: Measurement, soc0: float | None) -> tuple[f
         if soc0 is None and nearest is None:
             raise DataError(str(error)) from None
         inferred = soc0 if soc0 is not None else float(nearest or 0.0)
-    if soc0 is not None and abs(inferred - soc0) <= OTHER_STATE:
+    if soc0 is not None and abs(inferred - soc0) <= (OTHER_STATE if resting else OTHER_STATE_LOADED):
         return soc0, SOC_TOLERANCE, ()
     notes = []
     if soc0 is not None:
         notes.append(
-            f"{data.name}: rests at {100 * inferred:.1f} % state of charge by its voltage, not at the "
+            f"{data.name}: starts at {100 * inferred:.1f} % state of charge by its voltage, not at the "
             f"{100 * soc0:.1f} % given; the voltage is believed."
         )
     if resting:

@@ -106,6 +106,14 @@ def test_a_given_state_far_from_the_rest_voltage_is_not_believed(cell):
     assert "the voltage is believed" in record.notes[0]
 
 
+def test_a_state_given_for_another_record_is_not_that_of_a_slow_discharge_from_full(cell):
+    slow = np.full(600, 0.05 * cell.nominal_capacity_ah)
+    full = prepare(cell, measured(cell, np.arange(600.0), slow, soc0=0.98), 0.78, 0.0)
+    assert full.soc0 == pytest.approx(0.98, abs=1e-3)
+    assert "believed" in full.notes[0]
+    assert prepare(cell, measured(cell, np.arange(600.0), slow, soc0=0.75), 0.78, 0.0).soc0 == 0.78
+
+
 def test_a_continuation_is_judged_only_after_what_was_seen(cell):
     time = np.arange(900.0)
     whole = measured(cell, time, np.where(time < 30, 0.0, 5.0))
