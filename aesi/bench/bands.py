@@ -1,10 +1,10 @@
 """Are free-run bands as wide as they have to be? Virtual cells by the dozen, one design beside another.
 
 Every cell is fitted with the same genome, and calibrated as an experiment calibrates: by models that did not
-see the piece, and by the validation record where there is one. One line a layout, horizon and design, with
-means over the cells. A single drive has few independent errors, so its coverage scatters: `coverage_sd_pct`
-says by how much, `coverage_se_pct` what that leaves open of the mean over cells (all of which share one schedule).
-`score_ratio` is against the best constant width in hindsight, which knows the test.
+see the piece, and by the validation record where there is one. One line a layout (and for all), horizon and
+design, with means over the cells. A single drive has few independent errors, so its coverage scatters:
+`coverage_sd_pct` says by how much, `coverage_se_pct` what that leaves open of the mean over cells, which share the
+schedules of their layout. `score_ratio` is against the best constant width in hindsight, which knows the test.
 """
 
 from __future__ import annotations
@@ -96,6 +96,7 @@ def run(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
+        everywhere: dict[tuple[str, float], list[Array]] = {}
         for layout in layouts:
             splits = virtual_splits(Cell.from_bpx(cell), layout, cells, seed)
             errors = [e for e in map(_errors, splits) if e is not None]
@@ -107,7 +108,11 @@ def run(
                     figures = np.array(
                         [_judged(e.test, w, horizon) for e, w in zip(errors, widths, strict=True)]
                     )
+                    everywhere.setdefault((name, horizon), []).append(figures)
                     yield _line(layout, name, horizon, seed, figures) | {"fit_s": round(fit_s, 4)}
+        if len(layouts) > 1:
+            for (name, horizon), parts in everywhere.items():
+                yield _line("all", name, horizon, seed, np.concatenate(parts))
 
 
 def _errors(split: Split) -> _Errors | None:

@@ -18,25 +18,23 @@ def lines(request):
 
 
 def figures(lines, method, key):
-    """(layouts, horizons) of one design."""
-    return np.array([line[key] for line in lines if line["method"] == method]).reshape(2, -1)
+    """(layouts, horizons) of one design; the last row is that of all layouts."""
+    return np.array([line[key] for line in lines if line["method"] == method]).reshape(3, -1)
 
 
 def test_coverage_is_near_nominal_on_average_over_cells(lines):
-    coverage = figures(lines, PACKAGE, "coverage_pct").mean(axis=0)
-    # Three standard errors of a mean over the cells of both layouts.
-    slack = 3 * np.sqrt((figures(lines, PACKAGE, "coverage_se_pct") ** 2).sum(axis=0)) / 2
+    coverage = figures(lines, PACKAGE, "coverage_pct")[-1]
+    slack = 3 * figures(lines, PACKAGE, "coverage_se_pct")[-1]
     assert (coverage > 90.0 - slack).all()
     assert (coverage < 91.5 + slack).all()
 
 
 def test_the_band_scores_like_the_best_constant_width_in_hindsight(lines):
-    # Means of logarithms of ratios of scores; 1 is a width that only the test data could tell.
-    ratio = np.exp(np.log(figures(lines, PACKAGE, "score_ratio")).mean(axis=0))
-    assert (ratio < 1.08).all()
+    # 1 is a width that only the test data could tell; 40 cells of two other seeds gave 0.95 to 1.00.
+    assert (figures(lines, PACKAGE, "score_ratio")[-1] < 1.08).all()
 
 
 def test_the_scale_and_the_leverage_pay(lines):
     ours, blind, constant = (figures(lines, name, "interval_score_mv") for name in (PACKAGE, BLIND, CONSTANT))
     assert (ours < 0.95 * constant).all()
-    assert (ours[:, 1:].mean(axis=0) < blind[:, 1:].mean(axis=0)).all()
+    assert (ours[-1, 1:] < blind[-1, 1:]).all()
