@@ -1,9 +1,10 @@
 """Are free-run bands as wide as they have to be? Virtual cells by the dozen, one design beside another.
 
 Every cell is fitted with the same genome, and calibrated as an experiment calibrates: by models that did not
-see the piece, and by the validation record where there is one. One line a layout, horizon and design, with
-means over the cells. A single drive has few independent errors, so its coverage scatters: `coverage_sd_pct`
-says by how much. `score_ratio` is against the best constant width in hindsight, which knows the test.
+see the piece, and by the validation record where there is one. One line a layout (and for all), horizon and
+design, with means over the cells. A single drive has few independent errors, so its coverage scatters:
+`coverage_sd_pct` says by how much, `coverage_se_pct` what that leaves open of the mean over cells, which share the
+schedules of their layout. `score_ratio` is against the best constant width in hindsight, which knows the test.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
-from aesi.pipeline.bands import HonestErrors, Unseen
+from aesi.pipeline.bands import WHOLE, HonestErrors, Unseen
 from aesi.records import Failed, Split
 from aesi.sparse import Genome, Options, Problem, evaluate
-from aesi.sparse.fold_models import fold_models
+from aesi.sparse.fold_models import fold_models, with_leverage
 
 ALPHA = 0.1
 HORIZONS_S = (1.0, 10.0, 60.0)
@@ -53,25 +54,34 @@ def one_width(errors: _Errors) -> HalfWidths:
     }
 
 
-def every_row(errors: _Errors) -> HalfWidths:
-    """The bands of the package, rows counted where the model extrapolates too."""
-    everywhere = [np.ones_like(inside) for inside in errors.calibration.inside]
-    return bands(replace(errors, calibration=replace(errors.calibration, inside=everywhere)))
+def without_leverage(errors: _Errors) -> HalfWidths:
+    """The bands of the package, blind to how far a sample lies from the fitted rows."""
+    nothing: list[Array | None] = [None] * len(errors.calibration.soc)
+    return bands(replace(errors, calibration=replace(errors.calibration, excess=nothing)))
+
+
+def best_width(errors: _Errors) -> HalfWidths:
+    """The best constant width in hindsight: the quantile of the test errors themselves."""
+    return one_width(replace(errors, calibration=errors.test))
 
 
 def bands(errors: _Errors) -> HalfWidths:
     """The bands of the package."""
     found, test = errors.calibration.bands(ALPHA), errors.test
     return {
-        h: [found.at(h, test.dt_s, i, s)[1] for i, s in zip(test.current_a, test.soc, strict=True)]
+        h: [
+            found.at(h, test.dt_s, i, s, x)[1]
+            for i, s, x in zip(test.current_a, test.soc, test.excess, strict=True)
+        ]
         for h in errors.calibration.by_horizon
     }
 
 
 DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
     "one width": one_width,
-    "scaled, every row": every_row,
-    "scaled, inside the trained range": bands,
+    "scaled, without leverage": without_leverage,
+    "scaled": bands,
+    "best width in hindsight": best_width,
 }
 
 
@@ -86,6 +96,7 @@ def run(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):
+        everywhere: dict[tuple[str, float], list[Array]] = {}
         for layout in layouts:
             splits = virtual_splits(Cell.from_bpx(cell), layout, cells, seed)
             errors = [e for e in map(_errors, splits) if e is not None]
@@ -97,7 +108,11 @@ def run(
                     figures = np.array(
                         [_judged(e.test, w, horizon) for e, w in zip(errors, widths, strict=True)]
                     )
+                    everywhere.setdefault((name, horizon), []).append(figures)
                     yield _line(layout, name, horizon, seed, figures) | {"fit_s": round(fit_s, 4)}
+        if len(layouts) > 1:
+            for (name, horizon), parts in everywhere.items():
+                yield _line("all", name, horizon, seed, np.concatenate(parts))
 
 
 def _errors(split: Split) -> _Errors | None:
@@ -106,9 +121,10 @@ def _errors(split: Split) -> _Errors | None:
     chosen = evaluate(problem, Genome.whole(problem.library, RIDGE, THRESHOLD, 0.5, 1, 1))
     if isinstance(chosen, Failed):
         return None
-    pairs: list[Unseen] = [(chosen.bagging, record) for record in problem.split.valid]
+    model = with_leverage(chosen.bagging, problem, chosen.genome.lambda1)
+    pairs: list[Unseen] = [(model, record, WHOLE) for record in problem.split.valid]
     pairs += fold_models(problem, chosen)
-    tested: list[Unseen] = [(chosen.bagging, record) for record in problem.split.test]
+    tested: list[Unseen] = [(model, record, WHOLE) for record in problem.split.test]
     train = problem.split.train
     return _Errors(HonestErrors.of(pairs, train, HORIZONS_S), HonestErrors.of(tested, train, HORIZONS_S))
 
@@ -140,6 +156,7 @@ def _line(layout: str, design: str, horizon: float, seed: int, figures: Array) -
         "seed": seed,
         "coverage_pct": round(100 * float(coverage.mean()), 2),
         "coverage_sd_pct": round(100 * float(coverage.std()), 2),
+        "coverage_se_pct": round(100 * float(coverage.std()) / len(coverage) ** 0.5, 2),
         "width_mv": round(MV * float(width.mean()), 3),
         "interval_score_mv": round(MV * float(score.mean()), 3),
         "worst_bin_coverage_pct": round(100 * float(np.nanmean(worst)), 2),

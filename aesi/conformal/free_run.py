@@ -1,14 +1,20 @@
 """Bands for predictions without measured voltage, by how long ago the last measurement was.
 
 Errors of such predictions depend on each other for minutes, so samples are not what is counted: pieces are.
-Each piece i is scored by |error| / s_i, where the scale s_i follows current and state of charge (`local_scale`)
-and is fitted to the other pieces. The half-width h at a sample answers to all of them (CV+):
+Each piece i is scored by |error| / s_i, where the scale s_i follows current, state of charge and the distance from
+the fitted rows (`local_scale`) and is fitted to the other pieces. The half-width k h at a sample answers to all of
+them (CV+):
 
     sum_i n_i [share of the scores of piece i with s_i score <= h]   =   (1 - alpha) sum_i n_i            (1)
+    k = t(1 - alpha / 2; m - 1) / z(1 - alpha / 2),     m the number of independent pieces                (2)
 
 With one scale for all this is the quantile of |error|. Where the scales differ, a piece that its fellows had not
 foreseen counts with the scale that they gave it, not with one that it has widened itself.
 Barber, Candès, Ramdas & Tibshirani, Ann. Statist. 49 (2021) 486, doi:10.1214/20-AOS1965.
+
+A quantile of few pieces is a quantile of those pieces; the next one is missed more often. (2) widens the band as
+Student's t does for a normal error whose size is known from m pieces. Errors a short time ahead forget each other
+within a piece: every FORGOTTEN horizons of it count as one.
 
 Only rows inside the range that their model was trained on are counted. A model fitted without the first piece
 of a drive extrapolates there; the final model, asked inside its range, does not, and outside of it says so.
@@ -26,6 +32,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from aesi.conformal.band import State
 from aesi.conformal.intervals import Intervals
@@ -34,7 +42,7 @@ from aesi.errors import FitError, InputError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.records import ErrorSeries, FreeRun
 
-SCHEMA = "aesi.free_run_bands/2"
+SCHEMA = "aesi.free_run_bands/3"
 WHOLE_DRIVE = math.inf
 """The horizon of a prediction from the start of a record to its end."""
 N_PIECES = 8
@@ -42,6 +50,8 @@ N_PIECES = 8
 MIN_PIECES = 3
 MIN_ROWS = 30
 """Rows from which a piece counts."""
+FORGOTTEN = 100
+"""Horizons after which errors count as independent; a judgement, `aesi bench bands` shows what it gives."""
 N_LEVELS = 101
 HALVINGS = 14
 """Of the interval that holds the half-width: to a ten-thousandth of it."""
@@ -49,10 +59,10 @@ HALVINGS = 14
 
 @dataclass(frozen=True, eq=False)
 class HorizonBand:
-    """One horizon, by (1).
+    """One horizon, by (1) and (2).
 
     scales : one a piece, fitted to the others.  scores : (n_pieces, n_levels) |error| / scale of each piece,
-    its quantiles at even levels from 0 to 1.  counts : (n_pieces,) rows of each piece.
+    its quantiles at even levels from 0 to 1.  counts : (n_pieces,) rows of each piece.  widening : k.
     by_piece : share of each piece whose score lies within the 1 - alpha quantile of all scores.
     extrapolated : whether rows outside the trained range had to be counted, for want of others.
     """
@@ -62,6 +72,7 @@ class HorizonBand:
     scales: tuple[LocalScale, ...]
     scores: Array
     counts: Array
+    widening: float
     by_piece: tuple[float, ...]
     extrapolated: bool = False
 
@@ -80,7 +91,7 @@ class HorizonBand:
             )
             enough = reached >= (1 - self.alpha) * self.counts.sum()
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        return high
+        return self.widening * high
 
     def to_state(self) -> State:
         """Plain values and numpy arrays only; the whole drive's horizon is None."""
@@ -89,6 +100,7 @@ class HorizonBand:
             "scales": [scale.to_state() for scale in self.scales],
             "scores": self.scores,
             "counts": self.counts,
+            "widening": self.widening,
             "by_piece": list(self.by_piece),
             "extrapolated": self.extrapolated,
         }
@@ -102,6 +114,7 @@ class HorizonBand:
             tuple(LocalScale.from_state(scale) for scale in state["scales"]),
             np.asarray(state["scores"], dtype=float),
             np.asarray(state["counts"], dtype=float),
+            float(state["widening"]),
             tuple(float(share) for share in state["by_piece"]),
             bool(state["extrapolated"]),
         )
@@ -123,6 +136,7 @@ class FreeRunBands:
         soc: Sequence[Array],
         alpha: float = 0.1,
         inside: Sequence[BoolArray] | None = None,
+        excess: Sequence[Array | None] | None = None,
     ) -> FreeRunBands:
         """Calibrate on honest prediction errors: of records, or pieces, that the model was not fitted to.
 
@@ -132,36 +146,43 @@ class FreeRunBands:
         current_a, soc : one (n_i,) array a record, A and 1.
         inside : one (n_i,) array a record, where the model that was asked had been trained on such inputs;
         None for everywhere.
+        excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it cannot tell.
 
         Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
-        columns = [covariates(i, s, dt_s) for i, s in zip(current_a, soc, strict=True)]
+        beyond = excess or [None] * len(soc)
+        columns = [covariates(i, s, dt_s, x) for i, s, x in zip(current_a, soc, beyond, strict=True)]
         usable = inside or [np.ones(len(c), dtype=bool) for c in columns]
         bands = [
-            _calibrate(horizon, errors_by_horizon[horizon], columns, usable, alpha)
+            _calibrate(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s)
             for horizon in sorted(errors_by_horizon)
         ]
         return cls(alpha, tuple(bands))
 
-    def at(self, horizon_s: float, dt_s: float, current_a: Array, soc: Array) -> tuple[Array, Array]:
+    def at(
+        self, horizon_s: float, dt_s: float, current_a: Array, soc: Array, excess: Array | None = None
+    ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time."""
-        return self._around(np.full(len(soc), horizon_s), dt_s, current_a, soc)
+        return self._around(np.full(len(soc), horizon_s), covariates(current_a, soc, dt_s, excess))
 
-    def along(self, dt_s: float, current_a: Array, soc: Array) -> tuple[Array, Array]:
+    def along(
+        self, dt_s: float, current_a: Array, soc: Array, excess: Array | None = None
+    ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
 
         Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
         whole drive.
         """
-        return self._around(dt_s * np.arange(len(soc), dtype=np.float64), dt_s, current_a, soc)
+        elapsed = dt_s * np.arange(len(soc), dtype=np.float64)
+        return self._around(elapsed, covariates(current_a, soc, dt_s, excess))
 
     def intervals(self, series: ErrorSeries, free: FreeRun, horizon_s: float | None = None) -> Intervals:
         """The band along a free run of a record, or of predictions `horizon_s` ahead; `warm` is False outside
         the trained range, where the band is not calibrated."""
-        where = (series.dt_s, series.current_a, series.soc)
+        where = (series.dt_s, series.current_a, series.soc, free.excess)
         low, high = self.along(*where) if horizon_s is None else self.at(horizon_s, *where)
         return Intervals(low, high, ~free.outside)
 
@@ -177,12 +198,13 @@ class FreeRunBands:
     def from_dict(cls, state: State) -> FreeRunBands:
         """Inverse of `to_dict`; arrays may come back as lists. Raises InputError for another schema."""
         if state.get("schema") != SCHEMA:
-            raise InputError(f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}.")
+            raise InputError(
+                f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}; run the experiment again."
+            )
         alpha = float(state["alpha"])
         return cls(alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]))
 
-    def _around(self, elapsed_s: Array, dt_s: float, current_a: Array, soc: Array) -> tuple[Array, Array]:
-        columns = covariates(current_a, soc, dt_s)
+    def _around(self, elapsed_s: Array, columns: Array) -> tuple[Array, Array]:
         halves = np.array([band.half_width(columns) for band in self.horizons])
         half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s)
         return -half, half
@@ -217,6 +239,7 @@ def _calibrate(
     columns: Sequence[Array],
     inside: Sequence[BoolArray],
     alpha: float,
+    dt_s: float,
 ) -> HorizonBand:
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
@@ -235,16 +258,23 @@ def _calibrate(
         raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
     scales = [_scale([other for other in pieces if other is not piece], alpha) for piece in pieces]
     scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
+    counts = np.array([float(score.size) for score in scores])
     everywhere = np.quantile(np.concatenate(scores), 1 - alpha, method="higher")
     return HorizonBand(
         horizon,
         alpha,
         tuple(scales),
         np.array([np.quantile(score, np.linspace(0, 1, N_LEVELS)) for score in scores]),
-        np.array([float(score.size) for score in scores]),
+        counts,
+        _widening(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum(), alpha),
         tuple(float(np.mean(score <= everywhere)) for score in scores),
         extrapolated,
     )
+
+
+def _widening(independent: float, alpha: float) -> float:
+    """k of (2)."""
+    return float(student.ppf(1 - alpha / 2, independent - 1) / norm.ppf(1 - alpha / 2))
 
 
 def _scale(pieces: Sequence[_Piece], alpha: float) -> LocalScale:

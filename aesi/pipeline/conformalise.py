@@ -12,12 +12,12 @@ import numpy as np
 
 from aesi.conformal import METHODS, Calibrated, Method
 from aesi.errors import FitError
-from aesi.pipeline.bands import HonestErrors, Unseen
+from aesi.pipeline.bands import WHOLE, HonestErrors, Unseen
 from aesi.pipeline.candidate import method
 from aesi.pipeline.config import ExperimentConfig
 from aesi.pipeline.fit import Fitted
-from aesi.sparse import Candidate, Problem
-from aesi.sparse.fold_models import fold_models
+from aesi.sparse import Candidate, Problem, SparseModel
+from aesi.sparse.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
 
 SEARCHED = ("AESI I", "AESI II")
@@ -32,17 +32,20 @@ def conformalise(
     that were fitted to nothing also the training records.
     """
     unseen: list[Unseen] = list(fold_models(problem, chosen))
-    return tuple(_conformalised(one, unseen, problem, config) for one in models)
+    lambda1 = chosen.genome.lambda1
+    return tuple(_conformalised(one, unseen, problem, config, lambda1) for one in models)
 
 
 def _conformalised(
-    one: Fitted, unseen: Sequence[Unseen], problem: Problem, config: ExperimentConfig
+    one: Fitted, unseen: Sequence[Unseen], problem: Problem, config: ExperimentConfig, lambda1: float
 ) -> Fitted:
-    pairs: list[Unseen] = [(one.model, series) for series in problem.split.valid]
+    if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
+        one = replace(one, model=with_leverage(one.model, problem, lambda1))
+    pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
     if one.model.name in SEARCHED:
         pairs += unseen
     elif isinstance(one.model, Bare | Persistence):
-        pairs += [(one.model, series) for series in problem.split.train]
+        pairs += [(one.model, series, WHOLE) for series in problem.split.train]
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []
@@ -69,9 +72,9 @@ def _conformalised(
 def _intervals(pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method) -> Calibrated:
     conformal = config.conformal
     return chosen.fit(
-        [(series.error_v - model.one_step(series))[1:] for model, series in pairs],
+        [(series.error_v - model.one_step(series))[rows] for model, series, rows in pairs],
         conformal.alpha,
         conformal.window,
         np.random.default_rng(config.seed),
-        current_a=[series.current_a[1:] for _, series in pairs],
+        current_a=[series.current_a[rows] for _, series, rows in pairs],
     )

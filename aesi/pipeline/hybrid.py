@@ -20,7 +20,7 @@ from aesi.physics import ActiveEffect, Cell, simulate
 from aesi.pipeline.load import error_series, rest_soc
 from aesi.pipeline.model_folder import part_file, read_model, write_model
 from aesi.pipeline.prediction import Prediction
-from aesi.records import ErrorSeries, Hold, Measurement
+from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.sparse import SparseModel
 
 
@@ -134,15 +134,14 @@ class HybridModel:
 
     def _free_run(self, series: ErrorSeries, error0_v: float) -> Prediction:
         n = len(series)
-        error, outside = np.zeros(n), np.zeros(n, dtype=bool)
+        run = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool))
         if self.correction is not None:
             run = self.correction.free_run(series, error0_v)
-            error, outside = run.error_v, run.outside
         low = high = np.full(n, np.nan)
         if self.bands is not None:
-            low, high = self.bands.along(self.dt_s, series.current_a, series.soc)
+            low, high = self.bands.along(self.dt_s, series.current_a, series.soc, run.excess)
         alpha = None if self.bands is None else self.bands.alpha
-        return Prediction.of(series, error, low, high, outside, alpha)
+        return Prediction.of(series, run.error_v, low, high, run.outside, alpha)
 
     def _one_step(self, series: ErrorSeries) -> Prediction:
         n = len(series)

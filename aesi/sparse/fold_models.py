@@ -7,49 +7,63 @@ a long one.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
-from aesi.numerics.blocks import Span, pieces
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.blocks import leave_out_weights, pieces
+from aesi.numerics.typing import IntArray
+from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries
 from aesi.sparse.evaluate import Candidate, sparse_model
+from aesi.sparse.leverage import Leverage
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem, default_fold
+from aesi.sparse.problem import Problem
 from aesi.sparse.stridge import STRidge
 
+N_PIECES = 12
+"""Long enough to drift, short enough that the models without them are nearly the one that is judged."""
 
-def fold_models(problem: Problem, candidate: Candidate) -> Iterator[tuple[SparseModel, ErrorSeries]]:
-    """A model with the candidate's genome that has not seen the piece beside it, for every training piece.
 
-    A piece starts at the sample whose error is given. Folds in which no term survives are left out.
+def fold_models(problem: Problem, candidate: Candidate) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
+    """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
+
+    One for every piece; folds in which no term survives are left out.
     """
     genome = candidate.genome
     active = np.flatnonzero(genome.active(problem.library))
-    cut = tuple(pieces(problem.spans, default_fold(len(problem.target))))
-    fits = _fits(problem, active, cut, STRidge(genome.lambda1, genome.lambda2))
-    for (a, b), coefficients in zip(cut, fits, strict=True):
-        if coefficients.any():
-            model = sparse_model(problem, active, coefficients, candidate.bagging.memory, "left-out piece")
-            yield model, _piece(problem, a, b)
+    solver = STRidge(genome.lambda1, genome.lambda2)
+    n = len(problem.target)
+    cut = pieces(problem.spans, max(1, n // N_PIECES))
+    augmented = np.empty((n, len(active) + 1), order="F")
+    augmented[:, :-1] = problem.theta(active).T
+    augmented[:, -1] = problem.target
+    augmented *= np.sqrt(problem.row_weights)[:, None]
+    q_rows, r = orthonormal(augmented)
+    factors = triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
+    for (a, b), factor in zip(cut, factors, strict=True):
+        coefficients = solver.fit_factor(factor)
+        if not coefficients.any():
+            continue
+        kept = np.flatnonzero(coefficients)
+        seen = np.r_[0:a, b:n]
+        model = replace(
+            sparse_model(problem, active, coefficients, candidate.bagging.memory, "left-out piece"),
+            leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
+        )
+        yield model, *_samples(problem, a, b)
 
 
-def _fits(problem: Problem, active: IntArray, cut: tuple[Span, ...], solver: STRidge) -> Iterator[Array]:
-    """(m,) the fit without each of the pieces."""
-    if cut == problem.folds:
-        columns = np.append(active, len(problem.library))
-        yield from (solver.fit_factor(factor[:, columns]) for factor in problem.fold_factors)
-        return
-    theta = problem.theta(active).T
-    for a, b in cut:
-        weights = problem.row_weights.copy()
-        weights[a:b] = 0.0
-        yield solver.fit(theta, problem.target, weights)
+def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
+    """The model with the leverage of a fit of its terms to all training rows."""
+    number = {term: j for j, term in enumerate(problem.library.terms)}
+    which: IntArray = np.array([number[term] for term in model.library.terms])
+    return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))
 
 
-def _piece(problem: Problem, a: int, b: int) -> ErrorSeries:
-    """Samples a to b of the record that training rows a to b - 1 come from; row k predicts sample k + 1."""
+def _samples(problem: Problem, a: int, b: int) -> tuple[ErrorSeries, slice]:
+    """The record that training rows a to b - 1 come from, and the samples they predict: row k, sample k + 1."""
     for record, (first, last) in zip(problem.split.train, problem.spans, strict=True):
         if first <= a < last:
-            return record.take(slice(a - first, b - first + 1))
+            return record, slice(a - first + 1, b - first + 1)
     raise IndexError(f"row {a} belongs to no training record")

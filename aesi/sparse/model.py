@@ -26,10 +26,11 @@ from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
 from aesi.sparse.inputs import with_inputs
+from aesi.sparse.leverage import Leverage
 from aesi.sparse.library import Library, Term, evaluate_terms
 from aesi.sparse.scaling import Scaling
 
-SCHEMA = "aesi.sparse_model/1"
+SCHEMA = "aesi.sparse_model/2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,7 @@ class SparseModel:
     memory : see above; 0 for a model with terms in e.
     inclusion : (m,) share of the ensemble's members that hold each term.
     low, high : (m,) 5th and 95th percentile of each coefficient over the ensemble's members.
+    leverage : of the fit, where bands of a free run ask for it.
     """
 
     name: str
@@ -52,6 +54,7 @@ class SparseModel:
     inclusion: Array | None = None
     low: Array | None = None
     high: Array | None = None
+    leverage: Leverage | None = None
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -92,7 +95,12 @@ class SparseModel:
             scaled, diverged = free_run.held(free_run.remember(drive[0], self.memory, scaled0))
         error_v = np.append(start, self.scaling.error_to_volts(scaled))
         variables[:, 0] = error_v
-        return FreeRun(error_v, None if diverged < 0 else diverged + 1, self.scaling.is_outside(variables))
+        return FreeRun(
+            error_v,
+            None if diverged < 0 else diverged + 1,
+            self.scaling.is_outside(variables),
+            self._excess(variables),
+        )
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
         """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
@@ -119,7 +127,8 @@ class SparseModel:
         return free_run.gains(drive, self._functions, measured, self._clip)
 
     def to_dict(self) -> dict[str, Any]:
-        """As JSON values; the terms by their factors (variable, function) and, to be read, by name."""
+        """Plain values, and an array in the leverage; the terms by their factors (variable, function) and, to be read,
+        by name."""
         return {
             "schema": SCHEMA,
             "name": self.name,
@@ -130,6 +139,7 @@ class SparseModel:
             "scaling": self.scaling.to_dict(),
             "dt_s": self.dt_s,
             "memory": self.memory,
+            "leverage": None if self.leverage is None else self.leverage.to_dict(),
         } | {
             key: None if values is None else values.tolist()
             for key, values in (("inclusion", self.inclusion), ("low", self.low), ("high", self.high))
@@ -139,7 +149,10 @@ class SparseModel:
     def from_dict(cls, data: dict[str, Any]) -> SparseModel:
         """Inverse of `to_dict`. Raises DataError for anything else."""
         if data.get("schema") != SCHEMA:
-            raise DataError(f"not a sparse model: schema is {data.get('schema')!r}, expected {SCHEMA!r}.")
+            raise DataError(
+                f"not a sparse model of this version: schema is {data.get('schema')!r}, expected {SCHEMA!r}; "
+                "run the experiment again."
+            )
         terms = tuple(Term(tuple((int(v), int(f)) for v, f in factors)) for factors in data["terms"])
         optional = {
             key: None if data[key] is None else np.array(data[key], dtype=float)
@@ -153,6 +166,7 @@ class SparseModel:
             float(data["dt_s"]),
             float(data["memory"]),
             **optional,
+            leverage=Leverage.from_dict(data["leverage"]) if data["leverage"] else None,
         )
 
     @property
@@ -170,6 +184,11 @@ class SparseModel:
                 f"resample the record to {self.dt_s:g} s."
             )
         return np.column_stack([series.error_v, with_inputs(series, self.input_names).inputs])
+
+    def _excess(self, variables: Array) -> Array | None:
+        if self.leverage is None:
+            return None
+        return self.leverage.excess(evaluate_terms(self.library.terms, self.scaling.apply(variables)))
 
     def _drive(self, variables: Array) -> Array:
         """(n_functions, n): for each function of the error, the sum of its terms' input parts."""

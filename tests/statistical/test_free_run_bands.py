@@ -8,7 +8,7 @@ from aesi.bench.bands import run
 pytestmark = pytest.mark.slow
 
 CELLS = 24
-PACKAGE, CONSTANT = "scaled, inside the trained range", "one width"
+PACKAGE, BLIND, CONSTANT = "scaled", "scaled, without leverage", "one width"
 
 
 @pytest.fixture(scope="module")
@@ -17,20 +17,24 @@ def lines(request):
     return list(run(cell=str(cell), cells=CELLS, seed=5))
 
 
-def pick(lines, method):
-    return [line for line in lines if line["method"] == method]
+def figures(lines, method, key):
+    """(layouts, horizons) of one design; the last row is that of all layouts."""
+    return np.array([line[key] for line in lines if line["method"] == method]).reshape(3, -1)
 
 
 def test_coverage_is_near_nominal_on_average_over_cells(lines):
-    for line in pick(lines, PACKAGE):
-        # Three standard errors of a mean over the cells, about 90 to 93 %: what bands calibrated on few pieces
-        # overshoot by, see docs/theory/conformal.md.
-        slack = 3 * line["coverage_sd_pct"] / np.sqrt(line["cells"])
-        assert 90.0 - slack < line["coverage_pct"] < 93.0 + slack, line
+    coverage = figures(lines, PACKAGE, "coverage_pct")[-1]
+    slack = 3 * figures(lines, PACKAGE, "coverage_se_pct")[-1]
+    assert (coverage > 90.0 - slack).all()
+    assert (coverage < 91.5 + slack).all()
 
 
-def test_the_scale_and_the_trained_range_pay(lines):
-    ours = {(line["layout"], line["horizon_s"]): line for line in pick(lines, PACKAGE)}
-    for line in pick(lines, CONSTANT):
-        better = ours[line["layout"], line["horizon_s"]]
-        assert better["interval_score_mv"] < 0.95 * line["interval_score_mv"], line
+def test_the_band_scores_like_the_best_constant_width_in_hindsight(lines):
+    # 1 is a width that only the test data could tell; 40 cells of two other seeds gave 0.95 to 1.00.
+    assert (figures(lines, PACKAGE, "score_ratio")[-1] < 1.08).all()
+
+
+def test_the_scale_and_the_leverage_pay(lines):
+    ours, blind, constant = (figures(lines, name, "interval_score_mv") for name in (PACKAGE, BLIND, CONSTANT))
+    assert (ours < 0.95 * constant).all()
+    assert (ours[-1, 1:] < blind[-1, 1:]).all()

@@ -47,8 +47,8 @@ def test_the_band_is_as_wide_as_the_current_asks_for() -> None:
     error, current, soc = drive(30)
     low, high = bands.at(WHOLE_DRIVE, DT, current, soc)
     rest, busy = current == 0.0, current == 20.0
-    # The error's size is 1 mV at rest and 9 mV at 20 A; its 90 % point 1.64 times that. Shrinkage, and the mean
-    # current of the last minute, which takes part of what belongs to the current, leave less than the nine.
+    # The error's size is 1 mV at rest and 9 mV at 20 A; its 90 % point 1.64 times that. The mean current of the last
+    # minute takes part of what belongs to the current, and leaves less than the nine.
     assert np.mean(high[busy]) > 3 * np.mean(high[rest])
     for where in (rest, busy):
         assert np.mean(((error >= low) & (error <= high))[where]) > 0.75
@@ -75,8 +75,8 @@ def test_survives_json() -> None:
 
 
 def test_bands_of_an_earlier_schema_are_refused() -> None:
-    with pytest.raises(InputError, match=r"free_run_bands/1.*free_run_bands/2"):
-        FreeRunBands.from_dict(fitted().to_dict() | {"schema": "aesi.free_run_bands/1"})
+    with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/3.*run the experiment again"):
+        FreeRunBands.from_dict(fitted().to_dict() | {"schema": "aesi.free_run_bands/2"})
 
 
 def test_a_record_outside_the_trained_range_is_flagged() -> None:
@@ -107,8 +107,32 @@ def test_equal_scales_give_the_quantile_of_all_errors() -> None:
     errors = [rng.permutation(np.linspace(1e-4, 1e-3, 1000)) for _ in range(5)]
     flat = [np.zeros(1000)] * 5
     bands = FreeRunBands.fit({1.0: errors}, DT, flat, flat)
-    # 90 % of numbers evenly spread from 0.1 to 1 mV lie below 0.91 mV.
-    assert bands.at(1.0, DT, flat[0], flat[0])[1][0] == pytest.approx(0.91e-3, rel=0.005)
+    # 90 % of numbers evenly spread from 0.1 to 1 mV lie below 0.91 mV; each record is ten stretches of a hundred
+    # horizons, and Student's t of 49 degrees of freedom is 1.0193 times as wide as the normal at 95 %.
+    assert bands.at(1.0, DT, flat[0], flat[0])[1][0] == pytest.approx(1.0193 * 0.91e-3, rel=0.005)
+
+
+def test_few_pieces_widen_the_band_as_student_t_does() -> None:
+    rng = np.random.default_rng(3)
+    errors = [rng.permutation(np.linspace(1e-4, 1e-3, 1000)) for _ in range(5)]
+    flat = [np.zeros(1000)] * 5
+    bands = FreeRunBands.fit({1.0: errors, WHOLE_DRIVE: errors}, DT, flat, flat)
+    short, whole = (bands.at(h, DT, flat[0], flat[0])[1][0] for h in (1.0, WHOLE_DRIVE))
+    # Each record is cut in two pieces: 1.8331 at 9 degrees of freedom, 1.6766 at 49.
+    assert whole / short == pytest.approx(1.8331 / 1.6766, rel=1e-3)
+
+
+def test_the_band_is_wide_far_from_the_fitted_rows() -> None:
+    rng = np.random.default_rng(4)
+    flat = [np.zeros(1000)] * 6
+    excess = [np.where(np.arange(1000) < 100, 4.0, 0.0)] * 6
+    errors = [1e-3 * (1 + x) * rng.standard_normal(1000) for x in excess]
+    bands = FreeRunBands.fit({WHOLE_DRIVE: errors}, DT, flat, flat, excess=excess)
+    high = bands.at(WHOLE_DRIVE, DT, flat[0], flat[0], excess[0])[1]
+    # Errors five times as large; six pieces of 100 such rows know their 90 % point to about 10 %.
+    assert high[0] / high[-1] == pytest.approx(5.0, rel=0.25)
+    near = bands.along(DT, flat[0], flat[0])[1]
+    np.testing.assert_array_equal(near, np.full(1000, high[-1]))
 
 
 def test_rows_outside_the_trained_range_do_not_count() -> None:
@@ -137,7 +161,10 @@ def test_errors_that_are_all_zero_are_refused() -> None:
 def test_constant_errors_get_a_band_of_their_size() -> None:
     flat = [np.zeros(3000)]
     bands = FreeRunBands.fit({1.0: [np.full(3000, 2e-3)]}, DT, flat, flat)
-    assert bands.at(1.0, DT, flat[0], flat[0])[1] == pytest.approx(np.full(3000, 2e-3), rel=0.02)
+    (band,) = bands.horizons
+    assert bands.at(1.0, DT, flat[0], flat[0])[1] == pytest.approx(
+        np.full(3000, 2e-3 * band.widening), rel=0.02
+    )
 
 
 def test_covariates_of_another_length_are_refused() -> None:

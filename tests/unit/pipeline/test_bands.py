@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE
-from aesi.pipeline.bands import HonestErrors
+from aesi.pipeline.bands import WHOLE, HonestErrors
 from aesi.records import ErrorSeries, FreeRun
 
 N, DT = 400, 1.0
@@ -34,10 +34,20 @@ def drive() -> ErrorSeries:
 
 
 def test_a_piece_at_either_end_was_extrapolated(drive) -> None:
-    pieces = [drive.take(slice(a, a + 101)) for a in (0, 100, 200, 299)]
-    errors = HonestErrors.of([(Held(), piece) for piece in pieces], (drive,), (10.0,))
-    assert [bool(inside.any()) for inside in errors.inside] == [False, True, True, False]
-    assert errors.inside[1].mean() > 0.95
+    pieces = [slice(a, a + 100) for a in (0, 100, 200, 300)]
+    errors = HonestErrors.of([(Held(), drive, piece) for piece in pieces], (drive,), (10.0,))
+    inside = [rows[piece] for rows, piece in zip(errors.inside, pieces, strict=True)]
+    assert [bool(rows.any()) for rows in inside] == [False, True, True, False]
+    assert inside[1].mean() > 0.95
+
+
+def test_only_what_a_model_has_not_seen_counts(drive) -> None:
+    errors = HonestErrors.of([(Held(), drive, slice(100, 200))], (drive,), (10.0,))
+    for (left,) in errors.by_horizon.values():
+        np.testing.assert_array_equal(np.flatnonzero(np.isfinite(left)), np.arange(100, 200))
+    # The measurement 10 s before the piece is there, and a free run enters it with what it has drifted by.
+    assert errors.by_horizon[10.0][0][100] == pytest.approx(1e-4)
+    assert errors.by_horizon[WHOLE_DRIVE][0][100] == pytest.approx(1e-3)
 
 
 def test_another_record_is_inside_where_the_training_went(drive) -> None:
@@ -52,14 +62,14 @@ def test_another_record_is_inside_where_the_training_went(drive) -> None:
         drive.model_v,
         drive.input_names,
     )
-    errors = HonestErrors.of([(Held(), other), (Held(), beyond)], (drive,), ())
+    errors = HonestErrors.of([(Held(), other, WHOLE), (Held(), beyond, WHOLE)], (drive,), ())
     assert errors.inside[0].all()
     assert 0 < errors.inside[1].mean() < 0.7
 
 
 def test_errors_are_those_of_the_horizon(drive) -> None:
-    errors = HonestErrors.of([(Held(), drive)], (drive.take(slice(0, N), "other"),), (10.0,))
+    errors = HonestErrors.of([(Held(), drive, WHOLE)], (drive.take(slice(0, N), "other"),), (10.0,))
     (ahead,) = errors.by_horizon[10.0]
     assert np.isnan(ahead[:10]).all()
     np.testing.assert_allclose(ahead[10:], 1e-4)
-    np.testing.assert_allclose(errors.by_horizon[WHOLE_DRIVE][0], drive.error_v)
+    np.testing.assert_allclose(errors.by_horizon[WHOLE_DRIVE][0][1:], drive.error_v[1:])

@@ -8,8 +8,10 @@ from aesi.errors import DataError
 from aesi.numerics.metrics import mser
 from aesi.records import Failed, Split
 from aesi.sparse import Candidate, FitnessWeights, Genome, Options, Problem, evaluate, fitness
+from aesi.sparse.fold_models import fold_models
 from aesi.sparse.library import Library, Term
 from aesi.sparse.ranking import svd_ranking, svd_scores
+from aesi.sparse.stridge import STRidge
 
 
 def whole(problem, lambda1=1e-3, lambda2=1e-3, **others):
@@ -80,15 +82,33 @@ def test_residuals_are_honest_and_complete(problem, split):
 
 
 def test_long_pieces_are_left_out_for_free_runs_whatever_the_search_judges_on(split):
-    from aesi.sparse.fold_models import fold_models
-
     options = Options(p_c=1, d=2, mixed=False, resamples=5, block=60)
     long, short = (Problem.build(split, replace(options, fold=fold)) for fold in (None, 40))
     assert len(short.folds) > 3 * len(long.folds)
     both = [list(fold_models(p, evaluate(p, whole(p, p_c=1, feedback=False)))) for p in (long, short)]
-    assert [len(piece) for _, piece in both[0]] == [len(piece) for _, piece in both[1]]
-    for (one, _), (other, _) in zip(*both, strict=True):
+    assert [rows for *_, rows in both[0]] == [rows for *_, rows in both[1]]
+    for (one, *_), (other, *_) in zip(*both, strict=True):
         np.testing.assert_allclose(one.coefficients, other.coefficients, rtol=1e-8)
+
+
+def test_left_out_pieces_cover_every_predicted_sample_once(split):
+    problem = Problem.build(split, Options(p_c=1, d=2, mixed=False, resamples=5, block=60))
+    found = list(fold_models(problem, evaluate(problem, whole(problem, p_c=1, feedback=False))))
+    for record in problem.split.train:
+        samples = [np.arange(len(record))[rows] for _, each, rows in found if each is record]
+        np.testing.assert_array_equal(np.concatenate(samples), np.arange(1, len(record)))
+
+
+def test_a_model_without_a_piece_is_the_fit_to_the_other_rows(split):
+    problem = Problem.build(split, Options(p_c=1, d=2, mixed=False, resamples=5, block=60))
+    genome = whole(problem, p_c=1, feedback=False)
+    model, record, rows = next(fold_models(problem, evaluate(problem, genome)))
+    assert record is problem.split.train[0]
+    active = np.flatnonzero(genome.active(problem.library))
+    weights = problem.row_weights.copy()
+    weights[: rows.stop - 1] = 0.0
+    by_hand = STRidge(genome.lambda1, genome.lambda2).fit(problem.theta(active).T, problem.target, weights)
+    np.testing.assert_allclose(model.coefficients, by_hand[by_hand != 0], rtol=1e-8)
 
 
 def test_validation_records_replace_the_folds(split):

@@ -1,0 +1,58 @@
+"""How far a sample lies from those that a regression was fitted to: its leverage.
+
+    h(x)**2 = theta(x)' (Theta' W Theta + lambda1 1)^-1 theta(x)                                         (1)
+    excess  = max(h / h_u - 1, 0),     h_u the upper quartile of h over the training rows                 (2)
+
+h is, in units of the noise, the standard error of the fitted value at x. It sees what the ranges of the inputs do
+not: a high current at a state of charge at which none was high, each of them within range. What a wrong model errs
+by there grows with h too. W are the weights of the rows, lambda1 is the ridge; (2) has no unit, so models with
+different rows compare. Hoaglin & Welsch, Am. Stat. 32 (1978) 17, doi:10.1080/00031305.1978.10479237.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from aesi.numerics.typing import Array
+from aesi.sparse.stridge import triangle
+
+UPPER_QUARTILE = 0.75
+LEAST_RIDGE = 1e-12
+"""Of the largest squared diagonal: collinear terms and no ridge leave directions without any information."""
+
+
+@dataclass(frozen=True, eq=False)
+class Leverage:
+    """root : (m, m) upper triangle R with R'R the matrix inverted in (1).  typical : h_u of (2)."""
+
+    root: Array
+    typical: float
+
+    @classmethod
+    def of(cls, factor: Array, lambda1: float, theta: Array) -> Self:
+        """factor : (any, m) F with F'F = Theta' W Theta.  theta : (m, n) the terms along the training rows."""
+        top = float(np.max(np.sum(factor**2, axis=0)))
+        ridge = np.sqrt(max(lambda1, LEAST_RIDGE * top)) * np.eye(len(theta))
+        root = triangle(np.vstack([factor, ridge]))
+        return cls(root, float(np.quantile(_height(root, theta), UPPER_QUARTILE)))
+
+    def excess(self, theta: Array) -> Array:
+        """(n,) of (2), >= 0; theta : (m, n)."""
+        return np.asarray(np.maximum(_height(self.root, theta) / self.typical - 1.0, 0.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values and an array."""
+        return {"root": self.root, "typical": self.typical}
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> Self:
+        """Inverse of `to_dict`; the array may come back as lists."""
+        return cls(np.asarray(data["root"], dtype=float), float(data["typical"]))
+
+
+def _height(root: Array, theta: Array) -> Array:
+    return np.asarray(np.linalg.norm(solve_triangular(root, theta, trans="T"), axis=0))
