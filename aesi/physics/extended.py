@@ -48,6 +48,7 @@ def run_extended(
         given,
         hold == "backward",
         model.substep_s,
+        model.most_substeps,
         theta0,
         *general_arguments(model),
         out,

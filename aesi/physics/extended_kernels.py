@@ -32,7 +32,7 @@ DIFFUSIONS = (0, 1, 4)
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
 def run_general(  # type: ignore[no-untyped-def]
-    time, current, temperature, given, backward, substep, theta0,
+    time, current, temperature, given, backward, substep, most, theta0,
     units, rates, gains, lump, share, volume, exchange,
     solid_psi, solid_scale, at, project_s,
     interface, ohm_solid, ohm_salt,
@@ -78,7 +78,7 @@ def run_general(  # type: ignore[no-untyped-def]
     fault_at, fault = -1, 0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
-        parts = max(1, math.ceil(whole / substep)) if k > 0 else 1
+        parts = min(max(1, math.ceil(whole / substep)), most) if k > 0 else 1
         dt = whole / parts
         for part in range(parts):
             end_share = (part + 1.0) / parts

@@ -75,7 +75,7 @@ def kinetic_ratio(density, exchange, theta):  # type: ignore[no-untyped-def]
 def run_linear(  # type: ignore[no-untyped-def]
     time, current, backward,
     theta0, rates, gains, lump,
-    e_rates, e_gains, to_nodes, project, gauss, mean, psi, psi_scale, nonlinear, substep,
+    e_rates, e_gains, to_nodes, project, gauss, mean, psi, psi_scale, nonlinear, substep, most,
     ocp_n, ocp_p, kappa, scalars,
     out,
 ):  # fmt: skip
@@ -112,7 +112,7 @@ def run_linear(  # type: ignore[no-untyped-def]
             slot = key % CACHE_SLOTS
             if keys[slot] != key:
                 keys[slot] = key
-                parts[slot] = max(1, math.ceil(dt / substep)) if nonlinear else 1
+                parts[slot] = min(max(1, math.ceil(dt / substep)), most) if nonlinear else 1
                 for j in range(n_modes):
                     decay, start, end = step_weights(rates[0, j], dt)
                     w_n[slot, 0, j], w_n[slot, 1, j], w_n[slot, 2, j] = (

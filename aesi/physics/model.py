@@ -14,6 +14,7 @@ from aesi.physics.relations import Constant
 DEFAULT_SOLID_ORDER = 12
 DEFAULT_ELECTROLYTE_ORDER = 3
 DEFAULT_SUBSTEP_S = 1.0
+ANY_NUMBER = 2**31
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class EspmModel:
     region_contrast : factor of what differs between the regions of an electrode in ohmic drop and in salt.
     heat : None for a temperature that is given or constant.
     solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
-    substep_s : longest step of whatever is not stepped exactly.
+    substep_s : longest step of whatever is not stepped exactly.  most_substeps : of them between two samples.
     """
 
     cell: Cell
@@ -70,6 +71,7 @@ class EspmModel:
     solid_order: int = DEFAULT_SOLID_ORDER
     electrolyte_order: int = DEFAULT_ELECTROLYTE_ORDER
     substep_s: float = DEFAULT_SUBSTEP_S
+    most_substeps: int = ANY_NUMBER
 
     def of(self, cell: Cell) -> EspmModel:
         """The same model of another cell."""

@@ -88,7 +88,7 @@ def plain_arguments(model: EspmModel) -> tuple[Any, ...]:
         stack.lam * diffusion.d0 * faster,
         _salt_gain(stack) * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2),
         stack.to_nodes, np.ascontiguousarray(stack.project.T), stack.gauss, stack.mean,
-        diffusion.psi, 1.0 / diffusion.d0, not diffusion.linear, model.substep_s,
+        diffusion.psi, 1.0 / diffusion.d0, not diffusion.linear, model.substep_s, model.most_substeps,
         ocp_table(shifted_ocp(n, rise), "negative"), ocp_table(shifted_ocp(p, rise), "positive"),
         kappa * arrhenius(e.conductivity_ea_j_mol, temperature, reference),
         _scalars(model, temperature, diffusion.top),

@@ -12,7 +12,7 @@ from aesi.physics.model import DEFAULT_SUBSTEP_S, EspmModel
 from aesi.records import Measurement
 
 LONGEST_STEP_S = 60.0
-STEPS_A_SAMPLE = 4.0
+STEPS_A_SAMPLE = 4
 
 PARAMETERS = {
     "substep_s": Parameter(
@@ -25,15 +25,18 @@ PARAMETERS = {
 
 
 def longer_steps(model: EspmModel, *, substep_s: float) -> EspmModel:
-    """The model with another longest step."""
-    return replace(model, substep_s=substep_s)
+    """The model with another longest step, and few of them between two samples: records are thinned to where little
+    happens between them."""
+    return replace(model, substep_s=substep_s, most_substeps=STEPS_A_SAMPLE)
 
 
 EFFECT = Effect("longer_steps", "instrument", __doc__ or "", PARAMETERS, on_model=longer_steps)
 
 
 def stepping(data: Measurement) -> tuple[ActiveEffect, ...]:
-    """What a record is simulated with: nothing, or longer steps where its samples are far apart."""
-    spacing = float(np.median(np.diff(data.time_s)))
-    step = min(spacing / STEPS_A_SAMPLE, LONGEST_STEP_S)
-    return (EFFECT.activate(substep_s=step),) if step > DEFAULT_SUBSTEP_S else ()
+    """What a record is simulated with: nothing, or longer steps where samples are far apart."""
+    gaps = np.diff(data.time_s)
+    if float(gaps.max(initial=0.0)) <= STEPS_A_SAMPLE * DEFAULT_SUBSTEP_S:
+        return ()
+    typical = float(np.median(gaps)) / STEPS_A_SAMPLE
+    return (EFFECT.activate(substep_s=min(max(typical, DEFAULT_SUBSTEP_S), LONGEST_STEP_S)),)

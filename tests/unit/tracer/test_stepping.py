@@ -1,0 +1,40 @@
+"""Longer steps where samples are far apart, without another voltage."""
+
+import numpy as np
+import pytest
+
+from aesi.physics import simulate
+from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
+from aesi.tracer.records import condensed
+from aesi.tracer.stepping import STEPS_A_SAMPLE, stepping
+
+
+@pytest.fixture
+def pulses(cell):
+    """Pulses of 10 s at 2C and rests of an hour, thinned to rows that are dense after each step."""
+    time = np.arange(14_400.0)
+    current = np.where(time % 3600 < 10, 60.0, 0.0)
+    current[0] = 0.0
+    data = Measurement(time, current, np.full(len(time), 3.7), name="pulses")
+    return condensed(data, np.abs(np.diff(current)) > 0.3, 300.0)[0]
+
+
+def test_a_drive_at_a_sample_a_second_is_stepped_as_declared(make):
+    assert stepping(make(n=600)) == ()
+
+
+@pytest.mark.parametrize(
+    "name", ["self_heating", "concentration_dependent_diffusivity", "reaction_nonuniformity"]
+)
+def test_few_steps_between_thinned_rows_are_as_good_as_many(cell, pulses, name):
+    effect = CATALOGUE[name].activate()
+
+    def voltage(*steps):
+        return simulate(
+            cell, pulses.time_s, pulses.current_a, 0.8, (effect, *steps), None, "backward"
+        ).voltage_v
+
+    coarse, fine = voltage(*stepping(pulses)), voltage()
+    assert pulses.time_s[-1] > 20 * STEPS_A_SAMPLE * len(pulses)  # steps of a second would be many more
+    assert coarse == pytest.approx(fine, abs=1e-4)
