@@ -158,7 +158,7 @@ def _horizon_figures(
 
 
 def _inside(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
-    """Coverage of the rows inside the trained range, where alone the band promises any; NaN without such rows."""
+    """Coverage of the rows inside the trained range, where alone the band is calibrated; NaN without such rows."""
     covered = [
         each.covers(residual)[each.warm & np.isfinite(residual)]
         for each, residual in zip(intervals, residuals, strict=True)
