@@ -60,6 +60,12 @@ def without_leverage(errors: _Errors) -> HalfWidths:
     return bands(replace(errors, calibration=replace(errors.calibration, excess=nothing)))
 
 
+def held_at_the_edge(errors: _Errors) -> HalfWidths:
+    """The bands of the package, no wider where the model leaves its trained range."""
+    nowhere = {h: [np.zeros(len(r)) for r in each] for h, each in errors.test.reach.items()}
+    return bands(replace(errors, test=replace(errors.test, reach=nowhere)))
+
+
 def best_width(errors: _Errors) -> HalfWidths:
     """The best constant width in hindsight: the quantile of the test errors themselves."""
     return one_width(replace(errors, calibration=errors.test))
@@ -70,8 +76,8 @@ def bands(errors: _Errors) -> HalfWidths:
     found, test = errors.calibration.bands(ALPHA), errors.test
     return {
         h: [
-            found.at(h, test.dt_s, i, s, x)[1]
-            for i, s, x in zip(test.current_a, test.soc, test.excess, strict=True)
+            found.at(h, test.dt_s, i, s, x, r)[1]
+            for i, s, x, r in zip(test.current_a, test.soc, test.excess, test.reach[h], strict=True)
         ]
         for h in errors.calibration.by_horizon
     }
@@ -80,6 +86,7 @@ def bands(errors: _Errors) -> HalfWidths:
 DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
     "one width": one_width,
     "scaled, without leverage": without_leverage,
+    "scaled, without reach": held_at_the_edge,
     "scaled": bands,
     "best width in hindsight": best_width,
 }

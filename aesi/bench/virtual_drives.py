@@ -25,9 +25,10 @@ from aesi.pipeline.sections import RepeatsConfig
 from aesi.records import ErrorSeries, Measurement, Split
 from aesi.sparse import with_inputs
 
-Layout = Literal["repeats", "schedules"]
+Layout = Literal["repeats", "schedules", "beyond"]
 """repeats : WLTC five times over the whole state of charge, training on 1, 3 and 5, test on 2 and 4.
-schedules : the paper's training, validation and test schedules."""
+schedules : the paper's training, validation and test schedules.
+beyond : as repeats, but the training drives never charge, and the test drives do, at BEYOND times the current."""
 
 INPUTS = ("I", "I_next", "I_60s", "c_sp", "c_sn", "c_e0", "c_eL")
 DT_S = 1.0
@@ -35,6 +36,7 @@ NOISE_V = 5e-4
 OPEN_CIRCUIT_V = 3e-3
 OPEN_CIRCUIT_TERMS = 7
 N_REPEATS = 5
+BEYOND = 1.3
 SOC_START, SOC_END = 0.97, 0.06
 TEST_REPEATS = (2, 4)
 TRAIN_REPEATS = (1, 3, 5)
@@ -45,7 +47,7 @@ Values = dict[str, float]
 
 def virtual_splits(cell: Cell, layout: Layout, count: int, seed: int = 0) -> Iterator[Split]:
     """`count` virtual cells under one drive, each with another set of undeclared differences."""
-    profiles = _repeats(cell) if layout == "repeats" else paper_profiles(cell.capacity_ah, DT_S)
+    profiles = PROFILES[layout](cell.capacity_ah)
     rng = np.random.default_rng(seed)
     for _ in range(count):
         yield _split(cell, profiles, rng)
@@ -90,16 +92,32 @@ def _factors(rng: np.random.Generator, spread: float) -> Values:
     return {"negative_factor": float(negative), "positive_factor": float(positive)}
 
 
-def _repeats(cell: Cell) -> dict[str, tuple[Profile, ...]]:
-    """WLTC so many times as hard that five of them use up the charge between SOC_START and SOC_END."""
-    once = Bench(cell.capacity_ah, DT_S).drive("wltc_3b")
-    share = float(np.sum(once)) * DT_S / 3600 / cell.capacity_ah
-    bench = Bench(cell.capacity_ah, DT_S, scale=(SOC_START - SOC_END) / N_REPEATS / share)
-    return {
-        "record": (
-            bench.profile("drive", [bench.rest(60.0), *[bench.drive("wltc_3b")] * N_REPEATS], SOC_START),
-        )
-    }
+def _repeats(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
+    return _in_turn(capacity_ah, lambda once: once, lambda once: once)
+
+
+def _beyond(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
+    return _in_turn(capacity_ah, lambda once: np.maximum(once, 0.0), lambda once: BEYOND * once)
+
+
+def _in_turn(
+    capacity_ah: float, train: Callable[[Array], Array], test: Callable[[Array], Array]
+) -> dict[str, tuple[Profile, ...]]:
+    """WLTC by turns for training and test, so many times as hard that all use up the charge from start to end."""
+    bench = Bench(capacity_ah, DT_S)
+    once = bench.drive("wltc_3b")
+    drives = [(test if k + 1 in TEST_REPEATS else train)(once) for k in range(N_REPEATS)]
+    share = float(np.sum(drives)) * DT_S / 3600 / capacity_ah
+    scale = (SOC_START - SOC_END) / share
+    pieces = [bench.rest(60.0), *(scale * drive for drive in drives)]
+    return {"record": (bench.profile("drive", pieces, SOC_START),)}
+
+
+PROFILES: dict[Layout, Callable[[float], dict[str, tuple[Profile, ...]]]] = {
+    "repeats": _repeats,
+    "schedules": lambda capacity_ah: paper_profiles(capacity_ah, DT_S),
+    "beyond": _beyond,
+}
 
 
 def _split(cell: Cell, profiles: dict[str, tuple[Profile, ...]], rng: np.random.Generator) -> Split:

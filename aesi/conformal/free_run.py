@@ -17,7 +17,8 @@ Student's t does for a normal error whose size is known from m pieces. Errors a 
 within a piece: every FORGOTTEN horizons of it count as one.
 
 Only rows inside the range that their model was trained on are counted. A model fitted without the first piece
-of a drive extrapolates there; the final model, asked inside its range, does not, and outside of it says so.
+of a drive extrapolates there; the final model, asked inside its range, does not. Outside of it its inputs are held at
+the edge, and the band reaches as much farther as the prediction would move if the model went on from there.
 
 What this promises: about 1 - alpha on average over pieces that are exchangeable with those of the calibration.
 With few pieces the share covered on one drive scatters by many points about that average; the coverage of each
@@ -162,27 +163,41 @@ class FreeRunBands:
         return cls(alpha, tuple(bands))
 
     def at(
-        self, horizon_s: float, dt_s: float, current_a: Array, soc: Array, excess: Array | None = None
+        self,
+        horizon_s: float,
+        dt_s: float,
+        current_a: Array,
+        soc: Array,
+        excess: Array | None = None,
+        reach_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
-        the half-width is interpolated in the logarithm of time."""
-        return self._around(np.full(len(soc), horizon_s), covariates(current_a, soc, dt_s, excess))
+        the half-width is interpolated in the logarithm of time.  reach_v : (n,) what to add to it, how far the
+        prediction would move if the model went on beyond its trained range."""
+        return self._around(np.full(len(soc), horizon_s), covariates(current_a, soc, dt_s, excess), reach_v)
 
     def along(
-        self, dt_s: float, current_a: Array, soc: Array, excess: Array | None = None
+        self,
+        dt_s: float,
+        current_a: Array,
+        soc: Array,
+        excess: Array | None = None,
+        reach_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
 
         Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
-        whole drive.
+        whole drive.  reach_v : as for `at`.
         """
         elapsed = dt_s * np.arange(len(soc), dtype=np.float64)
-        return self._around(elapsed, covariates(current_a, soc, dt_s, excess))
+        return self._around(elapsed, covariates(current_a, soc, dt_s, excess), reach_v)
 
-    def intervals(self, series: ErrorSeries, free: FreeRun, horizon_s: float | None = None) -> Intervals:
-        """The band along a free run of a record, or of predictions `horizon_s` ahead; `warm` is False outside
-        the trained range, where the band is not calibrated."""
-        where = (series.dt_s, series.current_a, series.soc, free.excess)
+    def intervals(
+        self, series: ErrorSeries, free: FreeRun, reach_v: Array | float = 0.0, horizon_s: float | None = None
+    ) -> Intervals:
+        """The band along a free run of a record, or of predictions `horizon_s` ahead, with their own `reach_v`;
+        `warm` is False outside the trained range, where the band is not calibrated."""
+        where = (series.dt_s, series.current_a, series.soc, free.excess, reach_v)
         low, high = self.along(*where) if horizon_s is None else self.at(horizon_s, *where)
         return Intervals(low, high, ~free.outside)
 
@@ -204,9 +219,9 @@ class FreeRunBands:
         alpha = float(state["alpha"])
         return cls(alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]))
 
-    def _around(self, elapsed_s: Array, columns: Array) -> tuple[Array, Array]:
+    def _around(self, elapsed_s: Array, columns: Array, reach_v: Array | float) -> tuple[Array, Array]:
         halves = np.array([band.half_width(columns) for band in self.horizons])
-        half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s)
+        half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
         return -half, half
 
 

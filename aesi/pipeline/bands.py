@@ -13,6 +13,7 @@ import numpy as np
 from aesi.conformal import WHOLE_DRIVE, FreeRunBands
 from aesi.numerics.typing import Array, BoolArray
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
+from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare, Persistence
 
 Unseen = tuple[ErrorModel, ErrorSeries, slice]
@@ -27,7 +28,7 @@ class HonestErrors:
 
     by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
     current_a, soc : A and 1.  inside : True where the model had been trained on such inputs.
-    excess : `FreeRun.excess` of each model.
+    excess : `FreeRun.excess` of each model.  reach : as by_horizon, `reach` of each prediction, V.
     """
 
     dt_s: float
@@ -36,6 +37,7 @@ class HonestErrors:
     soc: list[Array]
     inside: list[BoolArray]
     excess: list[Array | None]
+    reach: dict[float, list[Array]]
 
     @classmethod
     def of(
@@ -57,6 +59,7 @@ class HonestErrors:
             soc=[series.soc for _, series, _ in pairs],
             inside=[_inside(model, series, rows, train) for model, series, rows in pairs],
             excess=[run.excess for run in runs],
+            reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
         )
 
     def bands(self, alpha: float) -> FreeRunBands:
@@ -74,10 +77,18 @@ class HonestErrors:
 
 def error_ahead(model: ErrorModel, series: ErrorSeries, horizon_s: float) -> Array:
     """(n,) V left by predictions from a measurement `horizon_s` earlier; NaN where there is none so early."""
-    steps = max(1, round(horizon_s / series.dt_s))
+    steps = _steps(series, horizon_s)
     left = series.error_v - model.k_step(series, steps)
     left[:steps] = np.nan
     return left
+
+
+def reach(model: ErrorModel, series: ErrorSeries, horizon_s: float = WHOLE_DRIVE) -> Array:
+    """(n,) V, how far predictions that far ahead would move if the model went on beyond its trained range; zero for
+    models that hold nothing at an edge."""
+    if not isinstance(model, SparseModel):
+        return np.zeros(len(series))
+    return model.reach(series, None if horizon_s == WHOLE_DRIVE else _steps(series, horizon_s))
 
 
 def error_of_free_run(series: ErrorSeries, run: FreeRun) -> Array:
@@ -102,6 +113,10 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     low = np.min([rows.min(axis=0) for rows in seen if len(rows)], axis=0)
     high = np.max([rows.max(axis=0) for rows in seen if len(rows)], axis=0)
     return np.asarray(((series.inputs >= low) & (series.inputs <= high)).all(axis=1))
+
+
+def _steps(series: ErrorSeries, horizon_s: float) -> int:
+    return max(1, round(horizon_s / series.dt_s))
 
 
 def _others(n: int, rows: slice) -> BoolArray:

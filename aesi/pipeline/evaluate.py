@@ -18,7 +18,7 @@ from aesi.conformal.free_run import HorizonBand
 from aesi.conformal.scores import score
 from aesi.numerics.metrics import mser, rmse
 from aesi.numerics.typing import Array
-from aesi.pipeline.bands import error_ahead
+from aesi.pipeline.bands import error_ahead, reach
 from aesi.pipeline.fit import Fitted
 from aesi.pipeline.load import ROLES, Role
 from aesi.pipeline.report.views import Prediction, Trace
@@ -83,7 +83,7 @@ def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
         free=free,
         one_step=prediction,
         intervals=None if one.intervals is None else one.intervals.intervals(residual, series.current_a),
-        bands=None if one.bands is None else one.bands.intervals(series, free),
+        bands=None if one.bands is None else one.bands.intervals(series, free, reach(one.model, series)),
         compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()},
     )
 
@@ -123,7 +123,7 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
             whole | _inside([r.bands for r in test], residuals) | _left_out(one.bands.horizons[-1])
         )
         row["bands_by_horizon"] = {
-            _seconds(band.horizon_s): _horizon_figures(one.bands, band, test, ahead[band.horizon_s])
+            _seconds(band.horizon_s): _horizon_figures(one, one.bands, band, test, ahead[band.horizon_s])
             for band in one.bands.horizons
             if band.horizon_s in ahead
         }
@@ -147,15 +147,18 @@ def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> 
 
 
 def _horizon_figures(
-    bands: FreeRunBands, band: HorizonBand, test: Sequence[_Judged], left: Sequence[Array]
+    one: Fitted, bands: FreeRunBands, band: HorizonBand, test: Sequence[_Judged], left: Sequence[Array]
 ) -> dict[str, float]:
-    intervals = [bands.intervals(r.series, r.free, band.horizon_s) for r in test]
+    intervals = [
+        bands.intervals(r.series, r.free, reach(one.model, r.series, band.horizon_s), band.horizon_s)
+        for r in test
+    ]
     figures = _interval_figures(test, intervals, left, bands.alpha)
     return figures | _inside(intervals, left) | _left_out(band)
 
 
 def _inside(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
-    """Coverage of the rows inside the trained range, where alone the band promises any; NaN without such rows."""
+    """Coverage of the rows inside the trained range, where alone the band is calibrated; NaN without such rows."""
     covered = [
         each.covers(residual)[each.warm & np.isfinite(residual)]
         for each, residual in zip(intervals, residuals, strict=True)

@@ -139,7 +139,8 @@ class HybridModel:
             run = self.correction.free_run(series, error0_v)
         low = high = np.full(n, np.nan)
         if self.bands is not None:
-            low, high = self.bands.along(self.dt_s, series.current_a, series.soc, run.excess)
+            reach = 0.0 if self.correction is None else self.correction.reach(series, error0_v=error0_v)
+            low, high = self.bands.along(self.dt_s, series.current_a, series.soc, run.excess, reach)
         alpha = None if self.bands is None else self.bands.alpha
         return Prediction.of(series, run.error_v, low, high, run.outside, alpha)
 

@@ -24,7 +24,7 @@ import numpy as np
 
 from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.sparse.basis import FUNCTIONS, MAX_ORDER, SPECIAL, values
+from aesi.sparse.basis import FUNCTIONS, MAX_ORDER, SPECIAL, slopes, values
 
 ERROR = "e"
 """The name of the first variable, the voltage error fed back."""
@@ -148,8 +148,11 @@ class Library:
         return evaluate_terms(self.terms, scaled).T
 
 
-def evaluate_terms(terms: Sequence[Term], scaled: Array) -> Array:
-    """(m, n): each term along scaled data (n, n_variables); each single function is computed once."""
+def evaluate_terms(terms: Sequence[Term], scaled: Array, further: Array | None = None) -> Array:
+    """(m, n): each term along scaled data (n, n_variables); each single function is computed once.
+
+    further : (n, n_variables), how far each function goes on from there along its slope.
+    """
     series = np.ascontiguousarray(np.asarray(scaled, dtype=float).T)
     known: dict[Factor, Array] = {}
     out = np.empty((len(terms), series.shape[1]))
@@ -157,7 +160,10 @@ def evaluate_terms(terms: Sequence[Term], scaled: Array) -> Array:
         row[:] = 1.0
         for factor in term.factors:
             if factor not in known:
-                known[factor] = values(factor[1], series[factor[0]])
+                variable, function = factor
+                known[factor] = values(function, series[variable])
+                if further is not None:
+                    known[factor] += slopes(function, series[variable]) * further[:, variable]
             row *= known[factor]
     return out
 

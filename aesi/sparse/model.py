@@ -10,7 +10,8 @@ which is a feedback of gain `memory` < 1 over the whole range. (At the start of 
 what came before.)
 
 It lives in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged
-in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence.
+in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. What the model
+would say there if its terms went on with the slope they have at the edge is told by `reach`, for bands.
 """
 
 from __future__ import annotations
@@ -87,13 +88,7 @@ class SparseModel:
         """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
         start = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
-        drive = self._drive(variables)[:, :-1]
-        scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
-        if self.has_feedback:
-            scaled, diverged = free_run.run(drive, self._functions, scaled0, self._clip, free_run.LIMIT)
-        else:
-            scaled, diverged = free_run.held(free_run.remember(drive[0], self.memory, scaled0))
-        error_v = np.append(start, self.scaling.error_to_volts(scaled))
+        error_v, diverged = self._freely(self._drive(variables), start)
         variables[:, 0] = error_v
         return FreeRun(
             error_v,
@@ -106,13 +101,21 @@ class SparseModel:
         """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
         if steps < 1:
             raise DataError(f"{self.name}: a prediction {steps} steps ahead is none; give at least 1.")
-        drive = self._drive(self._variables(series))[:, :-1]
-        measured = self.scaling.error_to_scaled(series.error_v)
-        if self.has_feedback:
-            scaled = free_run.ahead(drive, self._functions, measured, steps, self._clip, free_run.LIMIT)
-        else:
-            scaled = free_run.remember_ahead(drive[0], self.memory, measured, steps)
-        return np.append(series.error_v[:1], self.scaling.error_to_volts(scaled))
+        return self._ahead(self._drive(self._variables(series)), series.error_v, steps)
+
+    def reach(self, series: ErrorSeries, steps: int | None = None, error0_v: float | None = None) -> Array:
+        """(n,) V, >= 0: how far a prediction would move if the terms went on beyond the trained range of the inputs
+        with the slope that they have at its edge; `steps` ahead (`k_step`), or None for a `free_run`."""
+        variables = self._variables(series)
+        further = self.scaling.cut_off(variables)
+        if not further[:, 1:].any():
+            return np.zeros(len(series))
+        start = float(series.error_v[0]) if error0_v is None else error0_v
+        held, gone_on = (
+            self._freely(drive, start)[0] if steps is None else self._ahead(drive, series.error_v, steps)
+            for drive in (self._drive(variables), self._drive(variables, further))
+        )
+        return np.abs(gone_on - held)
 
     def outside(self, series: ErrorSeries) -> BoolArray:
         """(n,) True where an input or the measured error lies outside the trained range."""
@@ -190,10 +193,33 @@ class SparseModel:
             return None
         return self.leverage.excess(evaluate_terms(self.library.terms, self.scaling.apply(variables)))
 
-    def _drive(self, variables: Array) -> Array:
-        """(n_functions, n): for each function of the error, the sum of its terms' input parts."""
+    def _freely(self, drive: Array, start: float) -> tuple[Array, int]:
+        """(n,) V from the error `start`, and where the scaled run diverged, or -1."""
+        scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
+        if self.has_feedback:
+            scaled, diverged = free_run.run(
+                drive[:, :-1], self._functions, scaled0, self._clip, free_run.LIMIT
+            )
+        else:
+            scaled, diverged = free_run.held(free_run.remember(drive[0, :-1], self.memory, scaled0))
+        return np.append(start, self.scaling.error_to_volts(scaled)), diverged
+
+    def _ahead(self, drive: Array, error_v: Array, steps: int) -> Array:
+        """(n,) V, each from the measured error `steps` samples earlier."""
+        measured = self.scaling.error_to_scaled(error_v)
+        if self.has_feedback:
+            scaled = free_run.ahead(
+                drive[:, :-1], self._functions, measured, steps, self._clip, free_run.LIMIT
+            )
+        else:
+            scaled = free_run.remember_ahead(drive[0, :-1], self.memory, measured, steps)
+        return np.append(error_v[:1], self.scaling.error_to_volts(scaled))
+
+    def _drive(self, variables: Array, further: Array | None = None) -> Array:
+        """(n_functions, n): for each function of the error, the sum of its terms' input parts; further : how far
+        they go on along their slopes."""
         products = evaluate_terms(
-            [term.without_error() for term in self.library.terms], self.scaling.apply(variables)
+            [term.without_error() for term in self.library.terms], self.scaling.apply(variables), further
         )
         return np.stack(
             [

@@ -65,7 +65,8 @@ def outside_finding(model: Row) -> str:
         return ""
     return (
         f"{share:.1f} % of the test samples lie outside the range the correction was trained on; its inputs are "
-        "held at the edge there, and its intervals are not calibrated."
+        "held at the edge there. Its bands in free run reach as much farther as it would go on from the edge, "
+        "which nothing has calibrated."
     )
 
 

@@ -35,3 +35,12 @@ def test_test_repeats_lie_between_training_repeats_in_charge(cell) -> None:
     for (before, after), test in zip(pairwise(split.train), split.test, strict=True):
         assert before.soc[-1] >= test.soc[0] > test.soc[-1] >= after.soc[0]
     assert np.abs(split.test[0].error_v).max() < 0.5
+
+
+def test_the_layout_beyond_the_trained_range_tests_what_was_never_trained(cell) -> None:
+    (split,) = virtual_splits(Cell.from_bpx(cell), "beyond", 1)
+    highest = max(record.current_a.max() for record in split.train)
+    assert min(record.current_a.min() for record in split.train) == 0.0
+    for test in split.test:
+        assert test.current_a.min() < -0.1 * highest
+        assert test.current_a.max() == pytest.approx(1.3 * highest, rel=0.01)

@@ -89,6 +89,18 @@ def test_a_record_outside_the_trained_range_is_flagged() -> None:
     np.testing.assert_array_equal(ahead.upper_v, fitted().at(10.0, DT, current, soc)[1])
 
 
+def test_the_band_reaches_as_far_as_the_model_would_go_on() -> None:
+    _, current, soc = drive(32)
+    reach = np.where(np.arange(N) > 100, 7e-3, 0.0)
+    bands = fitted()
+    for held, wide in (
+        (bands.at(10.0, DT, current, soc), bands.at(10.0, DT, current, soc, reach_v=reach)),
+        (bands.along(DT, current, soc), bands.along(DT, current, soc, reach_v=reach)),
+    ):
+        np.testing.assert_allclose(wide[1] - held[1], reach)
+        np.testing.assert_allclose(held[0] - wide[0], reach)
+
+
 def test_each_piece_is_scored_with_the_scale_of_the_others() -> None:
     # Seven quiet records and one with ten times the error: the quiet ones' scale covers next to nothing of it,
     # and that shows.

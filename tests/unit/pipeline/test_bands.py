@@ -73,3 +73,9 @@ def test_errors_are_those_of_the_horizon(drive) -> None:
     assert np.isnan(ahead[:10]).all()
     np.testing.assert_allclose(ahead[10:], 1e-4)
     np.testing.assert_allclose(errors.by_horizon[WHOLE_DRIVE][0][1:], drive.error_v[1:])
+
+
+def test_a_model_that_holds_nothing_at_an_edge_reaches_nowhere(drive) -> None:
+    errors = HonestErrors.of([(Held(), drive, WHOLE)], (drive,), (10.0,))
+    assert errors.reach.keys() == errors.by_horizon.keys()
+    assert not any(each[0].any() for each in errors.reach.values())

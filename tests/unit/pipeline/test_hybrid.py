@@ -12,6 +12,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.hybrid import HybridModel
 from aesi.pipeline.load import load
 from aesi.pipeline.model_folder import SCHEMA
+from aesi.sparse import SparseModel
 
 
 @pytest.fixture(scope="module")
@@ -74,10 +75,16 @@ def test_one_step_finds_its_start_from_the_rest_voltage(model, data):
     assert prediction.soc[0] == pytest.approx(SOC0, abs=5e-3)
 
 
-def test_inputs_beyond_the_trained_range_are_flagged(model, data):
+def test_inputs_beyond_the_trained_range_are_flagged_and_the_band_is_wider_there(model, data, monkeypatch):
     prediction = model.predict(data.time_s, 1.5 * data.current_a, SOC0)
     beyond = np.abs(1.5 * data.current_a) > np.abs(data.current_a).max()
     assert prediction.outside[beyond].all()
+    monkeypatch.setattr(SparseModel, "reach", lambda self, series, **_: np.zeros(len(series)))
+    held = model.predict(data.time_s, 1.5 * data.current_a, SOC0)
+    wider = prediction.upper_v - held.upper_v
+    np.testing.assert_allclose(held.lower_v - prediction.lower_v, wider, atol=1e-12)
+    assert wider.min() == 0.0
+    assert np.mean(wider[beyond]) > 2 * np.mean(wider[~beyond])
 
 
 def test_a_missing_voltage_is_refused_with_its_row(model, data):

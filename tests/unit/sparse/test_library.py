@@ -8,6 +8,7 @@ from aesi.errors import InputError
 from aesi.records import INPUT_NAMES
 from aesi.sparse import Genome, Library
 from aesi.sparse.basis import FUNCTIONS, MAX_ORDER, clipped_values, slopes, values
+from aesi.sparse.library import evaluate_terms
 
 
 def test_the_whole_library_has_the_terms_it_says():
@@ -86,3 +87,15 @@ def test_the_hash_of_a_genome_is_that_of_the_terms_it_admits():
     with_feedback, without = (Genome.whole(whole, 1.0, 1.0, p_c=2, d=2, feedback=f) for f in (True, False))
     assert with_feedback.digest(whole) != without.digest(whole)
     assert with_feedback.digest(whole) == Genome.whole(small, 1.0, 1.0).digest(small)
+
+
+def test_terms_go_on_along_the_slope_of_each_function():
+    library = Library.build(["I"], p_c=3, d=3)
+    at = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    on, step = np.array([[0.5, 0.0], [0.0, 2.0]]), 1e-6
+    gone = evaluate_terms(library.terms, at, on)
+    after, before = (evaluate_terms(library.terms, at + sign * step * on) for sign in (1, -1))
+    tangent = evaluate_terms(library.terms, at) + (after - before) / (2 * step)
+    single = [len(term.factors) < 2 for term in library.terms]
+    np.testing.assert_allclose(gone[single], tangent[single], atol=1e-6)
+    np.testing.assert_allclose(gone[library.names.index("T1(e)*T1(I)")], (at + on).prod(axis=1))

@@ -119,3 +119,23 @@ def test_inputs_are_derived_by_name():
     assert series.inputs[1, 2] == pytest.approx(keep * current[0] + (1 - keep) * current[1])
     with pytest.raises(DataError, match="no input 'voltage'"):
         with_inputs(make_record(40), ("voltage",))
+
+
+def test_reach_is_what_holding_at_the_edge_leaves_out():
+    # e[k + 1] = 0.5 I[k], held at I = 1; at 3 A the slope would take it one volt farther.
+    model, series = linear(0.0, 0.5), record([0.0] * 5, [0.5, 3.0, -3.0, 1.0, 1.0])
+    np.testing.assert_allclose(model.reach(series), [0.0, 0.0, 1.0, 1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(model.reach(series, 1), [0.0, 0.0, 1.0, 1.0, 0.0], atol=1e-12)
+
+
+def test_reach_carries_on_with_the_feedback_and_ends_with_the_horizon():
+    model, series = linear(0.5, 0.2), record([0.0] * 6, [0.5, 3.0, 0.0, 0.0, 0.0, 0.0])
+    # 0.2 times the 2 A beyond, halved at each step; a prediction two steps ahead has forgotten it after two.
+    np.testing.assert_allclose(model.reach(series), [0.0, 0.0, 0.4, 0.2, 0.1, 0.05], atol=1e-12)
+    np.testing.assert_allclose(model.reach(series, 2), [0.0, 0.0, 0.4, 0.2, 0.0, 0.0], atol=1e-12)
+
+
+def test_nothing_is_to_be_reached_inside_the_range_or_where_nothing_is_held():
+    inside, beyond = record([0.0] * 3, [1.0, -1.0, 0.5]), record([0.0] * 3, [3.0, 3.0, 0.5])
+    assert not linear(0.5, 0.2).reach(inside).any()
+    assert not linear(0.5, 0.2, outside="extrapolate").reach(beyond).any()
