@@ -55,24 +55,6 @@ LOOSE_SHARE = 0.5
 """A combination whose uncertainty is more than this share of the admissible range is called undetermined."""
 
 
-@dataclass(frozen=True, eq=False)
-class Calibrating(ZeroProblem):
-    """The case of a calibration, in which rows may count for less.
-
-    weights : (n,) of the rows, None where all are alike.
-    """
-
-    weights: Array | None = None
-
-    def weighted(self, table: Array) -> Array:
-        """Rows (n, m) as the fit counts them."""
-        return table if self.weights is None else table * self.weights[:, None]
-
-    def whiten(self, table: Array, noise: Sequence[ColouredNoise]) -> tuple[Array, float]:
-        """As of any problem, of weighted rows."""
-        return super().whiten(self.weighted(table), noise)
-
-
 @dataclass(frozen=True)
 class FileError:
     """RMSE of one measurement before and after, V."""
@@ -123,7 +105,7 @@ def calibrate(
         check_record(start, record)
     effects = {OCP_CORRECTION.id: OCP_CORRECTION} | {n: CATALOGUE[n] for n in OWN}
     reach = max(float(np.max(np.abs(m.current_a))) for m in measurements)
-    problem = Calibrating(
+    problem = ZeroProblem(
         start,
         records,
         effects,
@@ -173,13 +155,13 @@ def with_model_error(record: Record) -> Record:
     return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=soc0_sd)
 
 
-def _best(problem: Calibrating, rng: np.random.Generator) -> tuple[Calibrating, Array]:
+def _best(problem: ZeroProblem, rng: np.random.Generator) -> tuple[ZeroProblem, Array]:
     """The best of several descents, and the problem with the weights at its end."""
     fitter = Fitter(problem, OWN)
     first = np.zeros(len(fitter.knobs))
     rates = np.array([k.owner in RATES for k in fitter.knobs])
     reach = np.array([SPREAD / k.scale if k.log and k.owner in RATES else 0.0 for k in fitter.knobs])
-    best: tuple[float, Calibrating, Array] | None = None
+    best: tuple[float, ZeroProblem, Array] | None = None
     for attempt in range(STARTS):
         moved = first + (reach * rng.normal(size=len(reach)) if attempt else 0.0)
         cost, weighted, x = _descended(problem, np.clip(moved, fitter.low, fitter.high))
@@ -195,7 +177,7 @@ def _best(problem: Calibrating, rng: np.random.Generator) -> tuple[Calibrating, 
     return best[1:]
 
 
-def _descended(problem: Calibrating, x: Array) -> tuple[float, Calibrating, Array]:
+def _descended(problem: ZeroProblem, x: Array) -> tuple[float, ZeroProblem, Array]:
     """Cost, weights and place after rounds of least squares, each with the weights of where it starts."""
     fitter, best = Fitter(problem, OWN), np.inf
     for _ in range(ROUNDS):

@@ -201,8 +201,11 @@ def fit_hypothesis(problem: Problem, hypothesis: Hypothesis, warm: Sequence[Arra
     for x0 in [*warm, *(starts(fitter.knobs) if not warm or hypothesis else [])]:
         x = fitter.descend_white(x0, REFRESH)
         e = None if x is None else fitter.residual(x)
-        if x is not None and e is not None and (best is None or float(e @ e) < best[0]):
-            best = float(e @ e), x
+        if x is None or e is None:
+            continue
+        left = float(np.sum(problem.weighted(e[:, None]) ** 2))
+        if best is None or left < best[0]:
+            best = left, x
     if best is None:
         return None
     x = fitter.descend_white(best[1], problem.steps - REFRESH)

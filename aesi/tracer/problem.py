@@ -48,7 +48,7 @@ class Problem:
     their tolerance alone and do not compete.
     model_error_v : what the model is known to miss (V): fits are then plain least squares at this weight, because a
     residual's memory is the model's fault and not the sensor's. None lets the residual's own memory decide.
-    steps : of a descent.
+    steps : of a descent.  weights : (n_fit of all records,) what rows count in fits, None where all are alike.
     """
 
     cell: Cell
@@ -59,6 +59,7 @@ class Problem:
     nuisances: frozenset[str] = frozenset()
     model_error_v: float | None = None
     steps: int = 8
+    weights: Array | None = None
 
     @property
     def competing(self) -> tuple[str, ...]:
@@ -151,8 +152,13 @@ class Problem:
         ends = np.cumsum([r.n_fit for r in self.records])
         return [slice(int(e - r.n_fit), int(e)) for e, r in zip(ends, self.records, strict=True)]
 
+    def weighted(self, table: Array) -> Array:
+        """Rows (n, m) as fits count them."""
+        return table if self.weights is None else table * self.weights[:, None]
+
     def whiten(self, table: Array, noise: Sequence[ColouredNoise]) -> tuple[Array, float]:
-        """Columns (n, m) whitened record by record, and the log-determinant of their covariance."""
+        """Columns (n, m), weighted and whitened record by record, and the log-determinant of their covariance."""
+        table = self.weighted(table)
         parts, total = [], 0.0
         for rows, record, model in zip(self.slices, self.records, noise, strict=True):
             part, log_det = whiten(table[rows], record.thin.time_s[: record.n_fit], model)
