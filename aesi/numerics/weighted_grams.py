@@ -53,7 +53,7 @@ def weighted_grams(rows: Array, weights: CountArray) -> Array:
         if len(some):
             scaled = rows[some]
             scaled *= np.sqrt(extra[some].astype(float))[:, None]
-            gram += dsyrk(1.0, scaled.T, lower=0)
+            gram += np.triu(dsyrk(1.0, scaled.T, lower=0))  # below the diagonal is whatever was in memory
         gram[lower] = gram.T[lower]
     return grams
 
