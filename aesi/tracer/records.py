@@ -242,9 +242,8 @@ def condensed(data: Measurement, steps: BoolArray, longest_s: float) -> tuple[Me
     place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
     opens = first | np.concatenate([[True], np.diff(place) != 0.0])
     opens[[1, -1]] = True
-    opens[1:] |= first[
-        :-1
-    ]  # the first row of a current by itself, and the last: between them the steps are exact
+    # The first row of a current by itself, and the last: between them the steps are exact.
+    opens[1:] |= first[:-1]
     opens[:-1] |= first[1:]
     starts = np.flatnonzero(opens)
     rows = np.diff(np.append(starts, n)).astype(float)
