@@ -207,7 +207,7 @@ def _searched(
 ) -> tuple[list[Scored], Verdict]:
     problem = search.problem
     search.report = _reporter(progress)
-    steps = select(search, max_effects, lambda base, one: _grade(problem, noise_v, base, one), breadth)
+    steps = select(search, max_effects, lambda base, one: _grade(search, noise_v, base, one), breadth)
     if steps is None:
         raise DataError(
             f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
@@ -248,13 +248,14 @@ def _with_noise_of_residual(problem: Problem) -> Problem:
     return replace(problem, records=tuple(records))
 
 
-def _grade(problem: Problem, noise_v: float, base: Scored, current: Scored) -> int:
+def _grade(search: Search, noise_v: float, base: Scored, current: Scored) -> int:
     """How far what is left is within what a model may miss: see `select`."""
     before = base.structured_v if current.hypothesis else 0.0
-    allowed = tolerance_v(noise_v, polarisation_v(problem, current.fit), before)
+    allowed = tolerance_v(noise_v, polarisation_v(search.problem, current.fit), before)
     if current.structured_v > allowed:
         return 0
-    return 2 if beyond(current.held_out_rmse_v, noise_v) <= UNSEEN_SHARE * allowed else 1
+    unseen_v = search.unseen_rmse_v(current, float(np.hypot(UNSEEN_SHARE * allowed, noise_v)))
+    return 2 if beyond(unseen_v, noise_v) <= UNSEEN_SHARE * allowed else 1
 
 
 def _noise_v(problem: Problem) -> float:

@@ -17,7 +17,7 @@ from aesi.records import digest
 from aesi.tracer.fit import Fit, as_dict, fit_hypothesis, from_dict
 from aesi.tracer.knobs import SOC0, placed_in, starts
 from aesi.tracer.problem import Hypothesis, Problem
-from aesi.tracer.score import held_out_rmse_v, placebo_gain, structured_v
+from aesi.tracer.score import held_out_rmse_v, placebo_gain, refitted_rmse_v, structured_v
 
 EVIDENCE_NATS = 10.0
 """What an effect has to bring beyond its own complexity: the price of having tried some twenty others."""
@@ -167,6 +167,7 @@ class Search:
     report: Callable[[Scored, Admission | None], None] = lambda scored, admission: None
     scored: dict[frozenset[str], Scored | None] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
+    refitted: dict[frozenset[str], float] = field(default_factory=dict)
     admissions: dict[tuple[frozenset[str], frozenset[str]], Admission] = field(default_factory=dict)
 
     @property
@@ -178,6 +179,16 @@ class Search:
     def material_v(self) -> float:
         """What an effect has to take off the error on unseen data to be worth a name, V."""
         return float(np.hypot(MATERIAL_SHARE * self.noise_v, POLARISATION_SHARE * self.polarisation_v))
+
+    def unseen_rmse_v(self, scored: Scored, bound_v: float) -> float:
+        """What a hypothesis leaves on unseen data, V: the linear estimate, or where that is above `bound_v` although
+        the fit itself is below, what refits leave."""
+        if scored.held_out_rmse_v <= bound_v or scored.fit.rmse_v > bound_v:
+            return scored.held_out_rmse_v
+        key = frozenset(scored.hypothesis)
+        if key not in self.refitted:
+            self.refitted[key] = refitted_rmse_v(self.problem, scored.fit)
+        return min(scored.held_out_rmse_v, self.refitted[key])
 
     def far_behind(self, one: Scored, other: Scored) -> bool:
         """Does `one` leave so much more on unseen data than `other` that its evidence does not count?"""

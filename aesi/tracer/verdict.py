@@ -77,8 +77,9 @@ def judge(search: Search, steps: Sequence[Scored], noise_v: float, polarisation_
     before, left = beyond(base.fit.rmse_v, noise_v), beyond(chosen.fit.rmse_v, noise_v)
     allowed = tolerance_v(noise_v, polarisation_v, before if len(chosen.hypothesis) else 0.0)
     if chosen.hypothesis:
-        left = max(left, beyond(chosen.held_out_rmse_v, noise_v))
         allowed *= UNSEEN_SHARE
+        unseen_v = search.unseen_rmse_v(chosen, float(np.hypot(allowed, noise_v)))
+        left = max(left, beyond(unseen_v, noise_v))
     if left > allowed:
         return _unknown(search, steps, before, left, allowed, noise_v)
     if not chosen.hypothesis:

@@ -9,7 +9,7 @@ from aesi.tracer.fit import fit_hypothesis
 from aesi.tracer.outcome import rmse_difference
 from aesi.tracer.problem import Problem
 from aesi.tracer.records import prepare_all
-from aesi.tracer.score import blocks_of, held_out_residual
+from aesi.tracer.score import blocks_of, held_out_residual, held_out_rmse_v, refitted_rmse_v
 from aesi.tracer.tell_apart import experiment
 from aesi.tracer.verdict import tolerance_v
 
@@ -95,3 +95,12 @@ def test_look_alikes_come_with_an_experiment():
     kinds = {"leakage_current": "physics", "current_sensor_offset": "instrument"}
     assert "rest of some days" in experiment(list(kinds), kinds)
     assert experiment(["mine", "yours"], {}) == "data at other rates, temperatures and states of charge"
+
+
+def test_refits_agree_with_the_linear_estimate_where_the_model_is_linear(cell, few, make):
+    data = make((few["series_resistance"].activate(resistance_ohm=2e-4),))
+    problem = Problem(cell, prepare_all(cell, [data], 0.9, 0.0), few)
+    fit = fit_hypothesis(problem, ("series_resistance",))
+    assert refitted_rmse_v(problem, fit) == pytest.approx(held_out_rmse_v(problem, fit), rel=0.02)
+    bare = fit_hypothesis(problem, ())
+    assert refitted_rmse_v(problem, bare) > 1.5 * refitted_rmse_v(problem, fit)
