@@ -7,13 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.fit import Fit, Fitter
 from aesi.tracer.problem import Problem
 
 BLOCKS = 10
 PLACEBOS = 12
 REFITS = 3
+REFIT_STEPS = 3
+"""Of a refit, which starts where all data ended."""
 
 
 def blocks_of(problem: Problem, count: int = BLOCKS) -> list[Array]:
@@ -72,21 +74,27 @@ def _held_out(
     return out
 
 
-def refitted_rmse_v(problem: Problem, fit: Fit, steps: int = 3) -> float:
+def refitted_rmse_v(problem: Problem, fit: Fit) -> float:
     """As `held_out_rmse_v`, by refits without every third block in turn: for a model that is not linear over the
     distance that its parameters move, at the price of simulations.  Infinite where one cannot be simulated."""
     blocks = blocks_of(problem)
     left = np.empty_like(fit.residual_v)
     for first in range(REFITS):
-        out = np.concatenate(blocks[first::REFITS])
-        seen = np.ones(len(left))
-        seen[out] = 0.0
-        fitter = Fitter(replace(problem, weights=seen), fit.hypothesis)
-        e = fitter.residual(fitter.descend(fit.x, fit.noise, steps))
+        out = np.concatenate(blocks[first::REFITS]).astype(int)
+        e = refitted_without(problem, fit, out)
         if e is None:
             return float(np.inf)
-        left[out] = e[out]
+        left[out] = e
     return float(np.sqrt(np.mean(left**2)))
+
+
+def refitted_without(problem: Problem, fit: Fit, out: IntArray | BoolArray) -> Array | None:
+    """V: the residual on the rows `out` of a refit that has not seen them; None where it cannot be simulated."""
+    seen = np.ones(len(fit.residual_v))
+    seen[out] = 0.0
+    fitter = Fitter(replace(problem, weights=seen), fit.hypothesis)
+    e = fitter.residual(fitter.descend(fit.x, fit.noise, REFIT_STEPS))
+    return None if e is None else e[out]
 
 
 def held_out_rmse_v(problem: Problem, fit: Fit) -> float:

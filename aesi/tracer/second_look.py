@@ -20,12 +20,12 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.calibrate import MODEL_ERROR_V, OUTLIER_V, RESISTANCE, with_model_error
 from aesi.tracer.calibrate import settled as settled_cell
-from aesi.tracer.fit import Fit, Fitter, fit_hypothesis
+from aesi.tracer.fit import Fit, fit_hypothesis
 from aesi.tracer.knobs import SOC0, placed_in
 from aesi.tracer.ocp_correction import EFFECT as OCP_CORRECTION
 from aesi.tracer.problem import TOLERANCES, Problem
 from aesi.tracer.records import Record
-from aesi.tracer.score import structured_v
+from aesi.tracer.score import refitted_without, structured_v
 from aesi.tracer.search import EVIDENCE_NATS, Admission, Breadth, Scored, Search
 from aesi.tracer.verdict import Verdict, Word
 
@@ -62,8 +62,6 @@ BLOCKS = 12
 BETWEEN, BEYOND = range(1, BLOCKS, 3), range(9, BLOCKS)
 """Of the blocks of each quick record, those that a hypothesis has to predict unseen: every third, between others that
 it sees, and in a second refit the last quarter, beyond them."""
-REFIT_STEPS = 3
-"""Of a refit, which starts where all data ended."""
 UNSEEN_SHARE = 0.97
 """And with an error of at most this share of what is left without the effect."""
 
@@ -170,13 +168,8 @@ class SecondSearch(Search):
     def _predicted(self, scored: Scored, blocks: range) -> Array:
         """V: errors on these blocks of a fit without them, at most OUTLIER_V."""
         out = self._rows_of(blocks)
-        cut = replace(self.problem, weights=np.where(out, 0.0, 1.0))
-        fitter = Fitter(cut, scored.hypothesis)
-        x = fitter.descend_white(scored.fit.x, REFIT_STEPS)
-        e = None if x is None else fitter.residual(x)
-        return (
-            np.full(np.count_nonzero(out), OUTLIER_V) if e is None else np.clip(e[out], -OUTLIER_V, OUTLIER_V)
-        )
+        e = refitted_without(self.problem, scored.fit, out)
+        return np.full(np.count_nonzero(out), OUTLIER_V) if e is None else np.clip(e, -OUTLIER_V, OUTLIER_V)
 
     def _rows_of(self, blocks: range) -> BoolArray:
         """(n,) True on the rows of the quick records that lie in these blocks of their time."""
