@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.errors import FitError
-from aesi.numerics.coloured import ColouredNoise
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
@@ -19,7 +18,7 @@ from aesi.records import Measurement
 from aesi.tracer.candidates import Estimate
 from aesi.tracer.cell_start import one_branch, sized, with_activation
 from aesi.tracer.checks import check_measurement, check_record
-from aesi.tracer.cycler_zero import ZERO, ZERO_ERROR, ZeroProblem, zeros_noted
+from aesi.tracer.cycler_zero import OFFSET, ZERO, ZERO_ERROR, zero_noted
 from aesi.tracer.fit import Fitter, summarise
 from aesi.tracer.knobs import SOC0
 from aesi.tracer.ocp_correction import correction
@@ -104,33 +103,35 @@ def calibrate(
     for record in records:
         check_record(start, record)
     effects = {OCP_CORRECTION.id: OCP_CORRECTION} | {n: CATALOGUE[n] for n in OWN}
-    reach = max(float(np.max(np.abs(m.current_a))) for m in measurements)
-    problem = ZeroProblem(
+    problem = Problem(
         start,
         records,
         effects,
         tolerances={OCP_CORRECTION.id: OCP_TOLERANCE_V},
-        current_sd_a=ZERO_ERROR * reach,
+        model_error_v=MODEL_ERROR_V,
+        outlier_v=OUTLIER_V,
+        zero_sd_a=zero_sd_a(records),
     )
-    problem, x = _best(problem, np.random.default_rng(seed))
     fitter = Fitter(problem, OWN)
+    x = _best(fitter, np.random.default_rng(seed))
     residual = fitter.residual(x)
     jacobian = None if residual is None else fitter.jacobian(x, residual)
     if residual is None or jacobian is None:
         raise FitError(
             f"{cell.name}: the fit left what can be simulated; start from a cell of the same chemistry."
         )
-    fit = summarise(fitter, x, residual, jacobian, white(problem))
+    fit = summarise(fitter, x, residual, jacobian, fitter.white(residual))
     values = {owner: given for owner, given in fit.values.items() if owner not in (SOC0, ZERO.id)}
     found = _rewound(problem, settled(problem, values), fit.values[SOC0])
     if start.nominal_capacity_ah != cell.nominal_capacity_ah:
         found = replace(found, nominal_capacity_ah=found.capacity_ah)
-    counted = problem.weighted(np.column_stack([residual, fit.jacobian]))
-    inflation = float(np.sqrt(np.mean(counted[:, 0] ** 2))) / MODEL_ERROR_V
+    leniency = problem.leniency(residual)
+    counted = leniency * residual
+    inflation = float(np.sqrt(np.mean(counted**2))) / MODEL_ERROR_V
     parameters = {}
     for index, knob in enumerate(fit.knobs):
         if knob.owner in OWN:
-            low, high = fit.interval(index, 1.96 * max(inflation, 1.0) * _redundancy(counted[:, 0]))
+            low, high = fit.interval(index, 1.96 * max(inflation, 1.0) * _redundancy(counted))
             parameters[f"{knob.owner}.{knob.name}"] = Estimate(
                 knob.to_value(float(x[index])), low, high, knob.unit
             )
@@ -140,10 +141,14 @@ def calibrate(
         cell=found,
         declared=cell,
         parameters=parameters,
-        undetermined=_undetermined(fitter, counted[:, 1:]),
+        undetermined=_undetermined(fitter, leniency[:, None] * jacobian),
         at_bounds=fit.at_bounds,
         files=tuple(FileError(r.name, b, a) for r, b, a in zip(records, old, rms, strict=True)),
-        notes=(*notes, *(n for r in records for n in r.notes), *zeros_noted(records, fit.values[ZERO.id])),
+        notes=(
+            *notes,
+            *(n for r in records for n in r.notes),
+            *zero_noted(records, fit.values[ZERO.id][OFFSET]),
+        ),
         seconds=time.perf_counter() - began,
     )
 
@@ -155,55 +160,43 @@ def with_model_error(record: Record) -> Record:
     return replace(record, noise_v=max(record.noise_v, MODEL_ERROR_V), soc0_sd=soc0_sd)
 
 
-def _best(problem: ZeroProblem, rng: np.random.Generator) -> tuple[ZeroProblem, Array]:
-    """The best of several descents, and the problem with the weights at its end."""
-    fitter = Fitter(problem, OWN)
+def zero_sd_a(records: Sequence[Record]) -> float:
+    """What the zero of the currents is uncertain by, A."""
+    return ZERO_ERROR * max(float(np.max(np.abs(r.data.current_a))) for r in records)
+
+
+def _best(fitter: Fitter, rng: np.random.Generator) -> Array:
+    """Where the best of several descents ended."""
     first = np.zeros(len(fitter.knobs))
     rates = np.array([k.owner in RATES for k in fitter.knobs])
     reach = np.array([SPREAD / k.scale if k.log and k.owner in RATES else 0.0 for k in fitter.knobs])
-    best: tuple[float, ZeroProblem, Array] | None = None
+    best: tuple[float, Array] | None = None
     for attempt in range(STARTS):
         moved = first + (reach * rng.normal(size=len(reach)) if attempt else 0.0)
-        cost, weighted, x = _descended(problem, np.clip(moved, fitter.low, fitter.high))
+        cost, x = _descended(fitter, np.clip(moved, fitter.low, fitter.high))
         if np.isfinite(cost) and (best is None or cost < best[0]):
-            best = cost, weighted, x
+            best = cost, x
             first = np.where(rates, first, x)
-        if cost < len(problem.measured):
+        if 2.0 * cost < len(fitter.measured):
             break  # what is left is what the model is expected to miss
     if best is None:
         raise FitError(
             "no start of the calibration can be simulated; start from a cell of the same chemistry."
         )
-    return best[1:]
+    return best[1]
 
 
-def _descended(problem: ZeroProblem, x: Array) -> tuple[float, ZeroProblem, Array]:
-    """Cost, weights and place after rounds of least squares, each with the weights of where it starts."""
-    fitter, best = Fitter(problem, OWN), np.inf
+def _descended(fitter: Fitter, x: Array) -> tuple[float, Array]:
+    """Cost and place after as many rounds of a few steps as gain something."""
+    noise = fitter.white(fitter.measured)
+    best = fitter.cost(x, noise)
     for _ in range(ROUNDS):
-        e = fitter.residual(x)
-        if e is None:
-            break
-        problem = replace(problem, weights=(1.0 + (e / OUTLIER_V) ** 2) ** -0.25)
-        fitter = Fitter(problem, OWN)
-        x = fitter.descend(x, white(problem), STEPS)
-        e = fitter.residual(x)
-        cost = np.inf if e is None else _cost(e, fitter.prior * x)
+        x = fitter.descend(x, noise, STEPS)
+        cost = fitter.cost(x, noise)
         if not best - cost > ENOUGH * cost:
-            return min(cost, best), problem, x
+            return min(cost, best), x
         best = cost
-    return best, problem, x
-
-
-def white(problem: Problem) -> list[ColouredNoise]:
-    """Every sample at the weight of the model's error."""
-    return [ColouredNoise(MODEL_ERROR_V, 1e-9, 100.0)] * len(problem.records)
-
-
-def _cost(e: Array, prior: Array) -> float:
-    """What a round with these weights lowers: quadratic in small errors, linear in large ones."""
-    loss = 2.0 * OUTLIER_V**2 * (np.sqrt(1.0 + (e / OUTLIER_V) ** 2) - 1.0)
-    return float(np.sum(loss)) / MODEL_ERROR_V**2 + float(np.sum(prior**2))
+    return best, x
 
 
 def _declared_error_v(cell: Cell, problem: Problem, record: Record) -> float:

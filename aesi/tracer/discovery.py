@@ -170,6 +170,9 @@ def _look_again(
     archived = Archive(archive, context_of(problem))
     search = second_look.SecondSearch(problem, np.random.default_rng(seed), archived)
     steps, verdict = _searched(search, max_effects, progress, second_look.BREADTH, noise_v)
+    if not search.improves(steps[-1], first.steps[0].fit):
+        verdict = second_look.contradicted(first.verdict)
+        return replace(first, verdict=verdict, steps=first.steps[:1], chosen=first.steps[0])
     nats = second_look.nats_of_potential(problem, steps[0].fit)
     moved = {second_look.OCP: nats} if nats >= EVIDENCE_NATS else {}
     left = [beyond(scored.fit.rmse_v, noise_v) for scored in (first.steps[0], steps[0], steps[-1])]

@@ -11,7 +11,7 @@ import numpy as np
 from aesi.numerics.bounded import descend
 from aesi.numerics.coloured import ColouredNoise, fit_noise
 from aesi.numerics.typing import Array
-from aesi.tracer.knobs import Knob, starts, values_by_owner
+from aesi.tracer.knobs import SOC0, Knob, starts, values_by_owner
 from aesi.tracer.problem import Hypothesis, Problem
 
 FREE_STEP = 2e-3
@@ -122,9 +122,9 @@ class Fitter:
             for h in (step, -step) if x[j] + step <= self.high[j] else (-step, step):
                 moved = x.copy()
                 moved[j] = x[j] + h
-                other = self._simulated(moved)
-                if other is not None:
-                    columns[:, j] = (residual - other) / h
+                slope = self._slope(moved, j, residual)
+                if slope is not None:
+                    columns[:, j] = slope / h
                     break
             else:
                 return None
@@ -132,26 +132,45 @@ class Fitter:
                 kept[j] = columns[:, j]
         return columns
 
+    def _slope(self, moved: Array, j: int, residual: Array) -> Array | None:
+        """(n,) V: what a move of one knob does to the model; a record's state of charge leaves the others alone."""
+        self.simulations += 1
+        knob = self.knobs[j]
+        if knob.owner != SOC0:
+            predicted = self.problem.predict(self.knobs, moved)
+            return None if predicted is None else residual - (self.measured - np.concatenate(predicted))
+        index = int(knob.name)
+        predicted = self.problem.predict(self.knobs, moved, index)
+        if predicted is None:
+            return None
+        rows = self.problem.slices[index]
+        out = np.zeros_like(residual)
+        out[rows] = residual[rows] - (self.measured[rows] - predicted[0])
+        return out
+
+    def cost(self, x: Array, noise: Sequence[ColouredNoise]) -> float:
+        """Half of what a descent lowers; infinite where the model fails."""
+        e = self.residual(x)
+        if e is None:
+            return np.inf
+        r = self.problem.whiten(self.problem.saturated(e)[:, None], noise)[0][:, 0]
+        pull = self.prior * x
+        return 0.5 * float(r @ r + pull @ pull)
+
     def descend(self, x0: Array, noise: Sequence[ColouredNoise], steps: int) -> Array:
         """Penalised generalised least squares under a fixed noise model."""
         kept: dict[int, Array] = {}
 
-        def whole(x: Array) -> Array | None:
-            e = self.residual(x)
-            if e is None:
-                return None
-            return np.concatenate([self.problem.whiten(e[:, None], noise)[0][:, 0], self.prior * x])
-
         def cost(x: Array) -> float:
-            r = whole(x)
-            return np.inf if r is None else 0.5 * float(r @ r)
+            return self.cost(x, noise)
 
         def linearise(x: Array) -> tuple[Array, Array] | None:
             e = self.residual(x)
             jacobian = None if e is None else self.jacobian(x, e, kept)
             if e is None or jacobian is None:
                 return None
-            table, _ = self.problem.whiten(np.column_stack([e, -jacobian]), noise)
+            table = np.column_stack([e, -jacobian]) * self.problem.leniency(e)[:, None]
+            table, _ = self.problem.whiten(table, noise)
             return (
                 np.concatenate([table[:, 0], self.prior * x]),
                 np.vstack([table[:, 1:], np.diag(self.prior)]),
@@ -203,7 +222,7 @@ def fit_hypothesis(problem: Problem, hypothesis: Hypothesis, warm: Sequence[Arra
         e = None if x is None else fitter.residual(x)
         if x is None or e is None:
             continue
-        left = float(np.sum(problem.weighted(e[:, None]) ** 2))
+        left = float(np.sum(problem.weighted(problem.saturated(e)[:, None]) ** 2))
         if best is None or left < best[0]:
             best = left, x
     if best is None:
@@ -228,7 +247,8 @@ def _polish(fitter: Fitter, x: Array) -> Fit | None:
 
 def summarise(fitter: Fitter, x: Array, e: Array, jacobian: Array, noise: list[ColouredNoise]) -> Fit:
     """Covariance and evidence at a fitted point."""
-    table, log_det = fitter.problem.whiten(np.column_stack([e, jacobian]), noise)
+    counted = jacobian * fitter.problem.leniency(e)[:, None]
+    table, log_det = fitter.problem.whiten(np.column_stack([fitter.problem.saturated(e), counted]), noise)
     whitened, sensitivities = table[:, 0], table[:, 1:]
     n = len(e)
     likelihood = -0.5 * (float(whitened @ whitened) + log_det + n * float(np.log(2 * np.pi)))

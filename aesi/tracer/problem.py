@@ -15,6 +15,7 @@ from aesi.physics import simulate
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.records import Hold, Measurement, Run
+from aesi.tracer.cycler_zero import ZERO, zero_knob
 from aesi.tracer.knobs import SOC0, Knob, free_knobs, soc_knob, tolerated_knob, values_by_owner
 from aesi.tracer.records import Record
 from aesi.tracer.stepping import stepping
@@ -48,6 +49,8 @@ class Problem:
     their tolerance alone and do not compete.
     model_error_v : what the model is known to miss (V): fits are then plain least squares at this weight, because a
     residual's memory is the model's fault and not the sensor's. None lets the residual's own memory decide.
+    outlier_v : beyond this an error counts by its size and no longer by its square (None: never).
+    zero_sd_a : what the zero of the cycler's current is uncertain by.
     steps : of a descent.  weights : (n_fit of all records,) what rows count in fits, None where all are alike.
     """
 
@@ -58,6 +61,8 @@ class Problem:
     fixed: tuple[ActiveEffect, ...] = ()
     nuisances: frozenset[str] = frozenset()
     model_error_v: float | None = None
+    outlier_v: float | None = None
+    zero_sd_a: float = 0.0
     steps: int = 8
     weights: Array | None = None
 
@@ -75,6 +80,8 @@ class Problem:
         wider = {tolerated: sd for name in hypothesis for tolerated, sd in LOOSENED.get(name, {}).items()}
         state_sd = wider.get(SOC0, 0.0)
         knobs = [soc_knob(str(i), r.soc0, max(r.soc0_sd, state_sd)) for i, r in enumerate(self.records)]
+        if self.zero_sd_a > 0:
+            knobs.append(zero_knob(self.zero_sd_a))
         for effect, tolerance in ({**self.tolerances, **wider}).items():
             if effect in self.effects and effect not in hypothesis:
                 for name, p in self.parameters(effect).items():
@@ -91,16 +98,18 @@ class Problem:
         An effect under test is in even at its neutral point: some say the same thing of a cell in other words there
         (windows by voltages), and a fit must not see a step.
         """
+        named = {**self.effects, ZERO.id: ZERO}
         owners = [owner for owner in values if owner != SOC0]
-        return (*self.fixed, *(self.effects[owner].activate(**values[owner]) for owner in owners))
+        return (*self.fixed, *(named[owner].activate(**values[owner]) for owner in owners))
 
-    def predict(self, knobs: Sequence[Knob], x: Array) -> list[Array] | None:
-        """Voltage of every record's fit part, (n_fit,) V each, or None where the model fails."""
+    def predict(self, knobs: Sequence[Knob], x: Array, only: int | None = None) -> list[Array] | None:
+        """Voltage of every record's fit part, (n_fit,) V each, or of one of them; None where the model fails."""
         values = values_by_owner(knobs, x)
         out = []
         try:
             effects = self.active(values)
-            for i, record in enumerate(self.records):
+            for i in range(len(self.records)) if only is None else (only,):
+                record = self.records[i]
                 seen = record.thin.take(slice(0, record.n_fit))
                 out.append(self.voltage(seen, values[SOC0][str(i)], effects, record.thin_hold))
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
@@ -155,6 +164,19 @@ class Problem:
     def weighted(self, table: Array) -> Array:
         """Rows (n, m) as fits count them."""
         return table if self.weights is None else table * self.weights[:, None]
+
+    def saturated(self, residual: Array) -> Array:
+        """(n,) V: what errors count as; their squares are the loss."""
+        if self.outlier_v is None:
+            return residual
+        size = np.sqrt(2.0 * (np.sqrt(1.0 + (residual / self.outlier_v) ** 2) - 1.0))
+        return np.asarray(np.sign(residual) * self.outlier_v * size)
+
+    def leniency(self, residual: Array) -> Array:
+        """(n,) what a row of a linearised problem counts, so that its slope is that of the loss."""
+        if self.outlier_v is None:
+            return np.ones_like(residual)
+        return np.asarray((1.0 + (residual / self.outlier_v) ** 2) ** -0.25)
 
     def whiten(self, table: Array, noise: Sequence[ColouredNoise]) -> tuple[Array, float]:
         """Columns (n, m), weighted and whitened record by record, and the log-determinant of their covariance."""

@@ -48,6 +48,7 @@ class Breadth:
     of a size that are grown further, since the best single effect need not be half of the best pair.  grown : effects
     that are fitted in full on top of each of them.  lost : abreast and grown where not one effect was admitted.
     least_share : of the structured variance that the best effect so far has to explain for the search to go on.
+    most_left_v : what it may leave for that, V.
     """
 
     singles: int | None = None
@@ -55,6 +56,7 @@ class Breadth:
     grown: int = 6
     lost: tuple[int, int] = (2, 4)
     least_share: float = 0.0
+    most_left_v: float = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +148,7 @@ def context_of(problem: Problem) -> str:
         repr(problem.cell),
         repr(sorted(problem.effects)),
         repr(sorted(problem.tolerances.items(), key=str)),
-        f"{problem.model_error_v} {problem.steps}",
+        f"{problem.model_error_v} {problem.outlier_v} {problem.zero_sd_a} {problem.steps}",
     ]
     pieces += [f"{r.data.digest}{r.n_fit}{r.soc0}{r.soc0_sd}{r.noise_v}" for r in problem.records]
     return digest(np.frombuffer("".join(pieces).encode(), dtype=np.uint8).astype(float))
@@ -359,8 +361,8 @@ def select(
         best = max(plainer, key=lambda s: s.evidence, default=best)
         if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
             steps.append(best)
-        left = (1.0 - breadth.least_share) * base.structured_v**2
-        hopeless = (size > 1 and len(steps[-1].hypothesis) < size) or steps[-1].structured_v ** 2 > left
+        enough_v = min((1.0 - breadth.least_share) ** 0.5 * base.structured_v, breadth.most_left_v)
+        hopeless = (size > 1 and len(steps[-1].hypothesis) < size) or steps[-1].structured_v > enough_v
         done = grade(base, steps[-1]) >= (2 if steps[-1].hypothesis else 1)
         if size == max_effects or hopeless or done:
             break

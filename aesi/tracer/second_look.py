@@ -25,6 +25,7 @@ from aesi.tracer.knobs import SOC0, placed_in
 from aesi.tracer.ocp_correction import EFFECT as OCP_CORRECTION
 from aesi.tracer.problem import TOLERANCES, Problem
 from aesi.tracer.records import Record
+from aesi.tracer.rough_look import FAR_OFF
 from aesi.tracer.score import refitted_without, structured_v
 from aesi.tracer.search import EVIDENCE_NATS, Admission, Breadth, Scored, Search
 from aesi.tracer.verdict import Verdict, Word
@@ -46,8 +47,9 @@ STEPS = 14
 """Of a descent: many parameters at once, far from where they were declared."""
 SLOW_C_RATE = 0.15
 SPAN = 0.8
-FIRST = Breadth(least_share=0.5)
-"""Of the search before: it goes on from single effects only where one explains most of what there is."""
+FIRST = Breadth(least_share=0.5, most_left_v=FAR_OFF * MODEL_ERROR_V)
+"""Of the search before: it goes on from single effects only where one explains most of what there is, and leaves no
+more than a model that needs calibrating would."""
 BREADTH = Breadth(singles=5, abreast=1, grown=3, lost=(1, 3))
 LIKELY = (
     "reaction_nonuniformity",
@@ -62,8 +64,13 @@ BLOCKS = 12
 BETWEEN, BEYOND = range(1, BLOCKS, 3), range(9, BLOCKS)
 """Of the blocks of each quick record, those that a hypothesis has to predict unseen: every third, between others that
 it sees, and in a second refit the last quarter, beyond them."""
-UNSEEN_SHARE = 0.97
-"""And with an error of at most this share of what is left without the effect."""
+CONTRADICTION = (
+    "the records contradict one another, by the zero of their currents or by more than the model lacks, and nothing "
+    "is adopted"
+)
+BETWEEN_SHARE, BEYOND_SHARE = 0.97, 1.2
+"""And with errors of at most these shares of those without the effect: better between, and no worse beyond, where the
+potential at charges that no other record has seen decides more than any effect."""
 
 
 def is_possible(problem: Problem) -> bool:
@@ -90,6 +97,7 @@ def freed(problem: Problem) -> Problem:
         tolerances=own,
         nuisances=frozenset(own),
         model_error_v=MODEL_ERROR_V,
+        outlier_v=OUTLIER_V,
         steps=STEPS,
     )
 
@@ -123,6 +131,15 @@ def reworded(
     return replace(verdict, word=word, effects=effects, groups=groups, reason=reason)
 
 
+def contradicted(verdict: Verdict) -> Verdict:
+    """The verdict where a recalibration does not carry to data that it has not seen: nothing is named."""
+    reason = (
+        f"{verdict.reason}; refitted to all of these records, the model's own parameters do worse on parts that the "
+        f"fit has not seen than the declared ones: {CONTRADICTION}"
+    )
+    return replace(verdict, word="unknown", effects=(), groups=(), reason=reason)
+
+
 @dataclass
 class SecondSearch(Search):
     """A search on top of a recalibrated model.
@@ -131,13 +148,14 @@ class SecondSearch(Search):
     is fitted in full, and unseen data are parts of the quick records that refits leave out.
     """
 
-    unseen: dict[frozenset[str], float] = field(default_factory=dict)
+    unseen: dict[frozenset[str], tuple[float, float]] = field(default_factory=dict)
 
     def _promising(self, parent: Scored, names: list[str]) -> list[str]:
         return [name for name in LIKELY if name in names]
 
     def _score(self, fit: Fit) -> Scored:
-        return Scored(fit, fit.rmse_v, structured_v(self.problem, fit.residual_v))
+        counted = self.problem.saturated(fit.residual_v)
+        return Scored(fit, float(np.sqrt(np.mean(counted**2))), structured_v(self.problem, counted))
 
     def _admission(self, parent: Scored, child: Scored) -> Admission:
         nats = child.evidence - parent.evidence
@@ -149,20 +167,34 @@ class SecondSearch(Search):
         gain = 0.0
         if not reasons:
             before, after = self._unseen_rmse_v(parent), self._unseen_rmse_v(child)
-            gain = float(np.sqrt(max(before**2 - after**2, 0.0)))
-            if after > UNSEEN_SHARE * before:
-                reasons.append(
-                    f"leaves {1e3 * after:.2f} mV on data that it has not seen, {1e3 * before:.2f} mV without it"
-                )
+            gain = float(np.sqrt(max(before[0] ** 2 - after[0] ** 2, 0.0)))
+            for where, share, was, left in zip(
+                ("between", "beyond"), (BETWEEN_SHARE, BEYOND_SHARE), before, after, strict=True
+            ):
+                if left > share * was:
+                    reasons.append(
+                        f"leaves {1e3 * left:.2f} mV {where} what it has seen, {1e3 * was:.2f} mV without it"
+                    )
         return Admission(not reasons, "; ".join(reasons), nats, gain, 0.0, np.inf)
 
-    def _unseen_rmse_v(self, scored: Scored) -> float:
-        """RMSE on parts of the quick records by fits that have not seen them, V. Errors count up to what saturates a
-        calibration: a model that runs empty says no more by how far."""
+    def improves(self, scored: Scored, declared: Fit) -> bool:
+        """Does it leave less on parts that it has not seen than the declared model does, which has been fitted to none?
+
+        Where records contradict one another, a recalibration to all of them may be worse than none.
+        """
+        counted = np.clip(declared.residual_v, -OUTLIER_V, OUTLIER_V)
+        known = [np.mean(counted[self._rows_of(blocks)] ** 2) for blocks in (BETWEEN, BEYOND)]
+        return bool(sum(e**2 for e in self._unseen_rmse_v(scored)) < sum(known))
+
+    def _unseen_rmse_v(self, scored: Scored) -> tuple[float, float]:
+        """RMSE on parts of the quick records by fits that have not seen them, between and beyond, V. Errors count up
+        to what saturates a calibration: a model that runs empty says no more by how far."""
         key = frozenset(scored.hypothesis)
         if key not in self.unseen:
-            errors = [self._predicted(scored, blocks) for blocks in (BETWEEN, BEYOND)]
-            self.unseen[key] = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+            between, beyond = (
+                float(np.sqrt(np.mean(self._predicted(scored, blocks) ** 2))) for blocks in (BETWEEN, BEYOND)
+            )
+            self.unseen[key] = between, beyond
         return self.unseen[key]
 
     def _predicted(self, scored: Scored, blocks: range) -> Array:

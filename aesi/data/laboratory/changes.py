@@ -18,6 +18,7 @@ from aesi.numerics.typing import Array
 
 Values = Mapping[str, float]
 SECONDS_PER_HOUR = 3600.0
+CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 KELVIN = 273.15
 
 
@@ -87,7 +88,8 @@ def _ambient(parameters: Any, values: Values) -> None:
 
 
 def _resistance(parameters: Any, values: Values) -> None:
-    _update(parameters, {"Contact resistance [Ohm]": values["resistance_ohm"]})
+    there = float(parameters.get(CONTACT_RESISTANCE, 0.0))
+    _update(parameters, {CONTACT_RESISTANCE: there + values["resistance_ohm"]})
 
 
 def _film(time_s: Array, current_a: Array, voltage_v: Array, values: Values) -> Array:

@@ -2,8 +2,8 @@
 
 What keeps it honest: the solver is stopped at every edge of the current and kept from long steps, so that no
 pulse is stepped over; the charge of the model is compared with the integral of the current; a run that ends
-early is an error; the mesh of the reduced model is finer than the default, whose 20 radial points move the
-voltage by millivolts.
+early is an error; radial points are dense at the surface of the particles, where the default's 20 even ones
+move the voltage by millivolts.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from typing import Any, Literal
 import numpy as np
 
 from aesi.data.laboratory.cache import key_of, remember
-from aesi.data.laboratory.changes import Change, find_change
+from aesi.data.laboratory.changes import CONTACT_RESISTANCE, Change, find_change
 from aesi.data.profile import Profile
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 
 Model = Literal["SPMe", "DFN"]
-VERSION = 3
+VERSION = 4
 """Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
 
 SECONDS_PER_HOUR = 3600.0
@@ -37,9 +37,12 @@ CHARGE_TOLERANCE = 6e-4
 2C that is stepped over makes 1.1e-3."""
 MESH: dict[Model, dict[str, int]] = {
     "SPMe": {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 60, "r_p": 60, "R_n": 12, "R_p": 12},
-    "DFN": {"x_n": 20, "x_s": 12, "x_p": 20, "r_n": 50, "r_p": 50, "R_n": 12, "R_p": 12},
+    "DFN": {"x_n": 20, "x_s": 12, "x_p": 20, "r_n": 40, "r_p": 40, "R_n": 12, "R_p": 12},
 }
-"""10 points across and 20 in radius move a DFN under SC03 and a 5C pulse by 0.35 mV RMS against 20 and 40."""
+"""10 points across move a DFN under SC03 and a 5C pulse by 0.35 mV RMS against 20."""
+STRETCH = 2.3
+"""Of the radial mesh towards the surface. Against 240 even points on the LG M50 under US06, 60 even ones err by
+0.35 mV RMS, 60 of these by 0.006 mV."""
 TOLERANCE: dict[Model, float] = {"SPMe": 1e-6, "DFN": 1e-5}
 COARSE_TOLERANCE = 1e-5
 """With radial points of one's own choice, for runs whose differences count."""
@@ -145,7 +148,8 @@ def _simulate(setup: Setup, profile: Profile) -> dict[str, Array]:
     changes = setup.changes()
     values = parameter_values(setup.bpx, profile.soc0)
     capacity = float(values["Nominal cell capacity [A.h]"])
-    options = _options([change for change, _ in changes])
+    declared = {"contact resistance": "true"} if values.get(CONTACT_RESISTANCE, 0.0) else {}
+    options = _options([declared, *(change.options for change, _ in changes)])
     for change, chosen in changes:
         change.alter(values, chosen)
     current = profile.current_a
@@ -177,10 +181,10 @@ def _simulate(setup: Setup, profile: Profile) -> dict[str, Array]:
     }
 
 
-def _options(changes: Sequence[Change]) -> dict[str, Any]:
+def _options(asked: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     options: dict[str, Any] = {}
-    for change in changes:
-        for name, value in change.options.items():
+    for wanted in asked:
+        for name, value in wanted.items():
             if options.get(name, value) != value:
                 raise DataError(f"Two changes ask for different values of the model option {name!r}.")
             options[name] = value
@@ -207,7 +211,11 @@ def _solve(setup: Setup, profile: Profile, values: Any, options: dict[str, Any])
     mesh = dict(MESH[setup.model])
     if setup.radial_points:
         mesh.update(r_n=setup.radial_points, r_p=setup.radial_points)
-    simulation = pybamm.Simulation(model, parameter_values=values, solver=solver, var_pts=mesh)
+    radial = pybamm.MeshGenerator(pybamm.Exponential1DSubMesh, {"side": "right", "stretch": STRETCH})
+    kinds = {**model.default_submesh_types, "negative particle": radial, "positive particle": radial}
+    simulation = pybamm.Simulation(
+        model, parameter_values=values, solver=solver, var_pts=mesh, submesh_types=kinds
+    )
     try:
         solution = simulation.solve(edges(profile), t_interp=profile.time_s)
     except (pybamm.SolverError, pybamm.ModelError, ValueError) as error:

@@ -13,6 +13,11 @@ def nmc() -> Path:
 
 
 @pytest.fixture(scope="session")
+def m50() -> Path:
+    return CELLS / "lg_m50_chen2020.bpx.json"
+
+
+@pytest.fixture(scope="session")
 def cells() -> Path:
     return CELLS
 

@@ -12,7 +12,7 @@ from aesi.pipeline.calibrate import to_json, to_text
 from aesi.records import Measurement
 from aesi.tracer.calibrate import calibrate
 from aesi.tracer.cell_start import one_branch, sized, with_activation
-from aesi.tracer.cycler_zero import ZERO, zeros_noted
+from aesi.tracer.cycler_zero import ZERO, zero_noted
 from aesi.tracer.records import prepare
 
 
@@ -99,15 +99,18 @@ def test_a_start_that_runs_empty_on_the_pulses_finds_its_way(cell):
     assert np.sqrt(np.mean((again.voltage_v - data[1].voltage_v) ** 2)) < 8e-3, "one is where it was full"
 
 
-def test_a_zero_of_the_cycler_in_the_slow_test_is_not_capacity(cell):
+def test_a_zero_of_the_cycler_is_not_capacity(cell):
     offset = 1e-3 * cell.nominal_capacity_ah
+
+    def read(data):
+        return replace(data, current_a=data.current_a + offset * (data.current_a != 0))
+
     slow = discharge(cell)
-    read = replace(slow, current_a=slow.current_a + offset * (slow.current_a > 0))
-    found = calibrate(cell, [read, pulsed(cell)])
+    found = calibrate(cell, [read(slow), read(pulsed(cell))])
     assert found.cell.capacity_ah == pytest.approx(cell.capacity_ah, rel=0.01)
-    record = prepare(cell, read, 1.0, 0.0)
-    assert "4.0 % of it" in zeros_noted([record], {"0": 0.04 * 0.2 * cell.nominal_capacity_ah})[0]
-    assert zeros_noted([record], {"0": offset}) == ()
+    record = prepare(cell, slow, 1.0, 0.0)
+    assert "4.0 % of it" in zero_noted([record], 0.04 * 0.2 * cell.nominal_capacity_ah)[0]
+    assert zero_noted([record], offset) == ()
     still = Record(slow.time_s, np.zeros(len(slow)), None)
     assert not ZERO.on_record(still, offset_a=0.1).current_a.any(), "no current flows at rest"
 

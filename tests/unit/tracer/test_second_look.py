@@ -1,5 +1,7 @@
 """Recalibration under a search: what is freed, when, and that the settled cell says the same as its parameters did."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from aesi.tracer import second_look
 from aesi.tracer.fit import Fitter, fit_hypothesis
 from aesi.tracer.problem import Problem
 from aesi.tracer.records import prepare_all
+from aesi.tracer.search import Archive
 
 OFF = (
     CATALOGUE["charge_transfer_kinetics"].activate(negative_factor=0.5, positive_factor=0.7),
@@ -48,6 +51,40 @@ def test_a_cell_that_is_off_in_many_ways_is_recalibrated_without_naming_physics(
     recalibrated = fit_hypothesis(second_look.freed(problem), ())
     assert recalibrated.rmse_v < 0.25 * declared.rmse_v
     assert second_look.nats_of_potential(second_look.freed(problem), recalibrated) > 10.0
+
+
+def test_a_recalibration_is_adopted_where_it_carries_to_what_it_has_not_seen(problem):
+    search = second_look.SecondSearch(second_look.freed(problem), np.random.default_rng(0), Archive(None, ""))
+    declared = fit_hypothesis(problem, ())
+    assert search.improves(search.fit(()), declared)
+    good = replace(declared, residual_v=1e-4 * np.ones_like(declared.residual_v))
+    assert not search.improves(search.fit(()), good)
+
+
+def test_large_errors_count_by_their_size_and_with_the_slope_of_what_they_count(problem):
+    freed = second_look.freed(problem)
+    e = np.array([-0.5, -0.015, -1e-4, 1e-4, 0.03, 2.0])
+    h = 1e-7
+    loss = [0.5 * freed.saturated(e + shift) ** 2 for shift in (-h, h)]
+    assert (loss[1] - loss[0]) / (2 * h) == pytest.approx(freed.leniency(e) ** 2 * e, rel=1e-5)
+    assert freed.saturated(e)[2:4] == pytest.approx(e[2:4], rel=1e-4)
+    assert freed.saturated(np.array([2.0]))[0] ** 2 == pytest.approx(
+        2 * second_look.OUTLIER_V * 2.0, rel=0.01
+    )
+    assert np.array_equal(problem.saturated(e), e)
+
+
+def test_a_state_of_charge_moves_its_own_record_alone(problem):
+    fitter = Fitter(problem, ())
+    x = np.zeros(len(fitter.knobs))
+    residual = fitter.residual(x)
+    slopes = fitter.jacobian(x, residual)
+    own = [j for j, k in enumerate(fitter.knobs) if k.owner == "soc0"]
+    for rows, j in zip(problem.slices, own, strict=True):
+        moved = x.copy()
+        moved[j] += fitter.steps[j]
+        assert slopes[:, j] == pytest.approx((residual - fitter.residual(moved)) / fitter.steps[j])
+        assert np.abs(slopes[rows, j]).max() > 0
 
 
 def test_the_settled_cell_says_what_its_parameters_said(problem):
