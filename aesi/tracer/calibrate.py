@@ -147,7 +147,7 @@ def calibrate(
         notes=(
             *notes,
             *(n for r in records for n in r.notes),
-            *zero_noted(records, fit.values[ZERO.id][OFFSET]),
+            *zero_noted(start, records, fit.values[ZERO.id][OFFSET]),
         ),
         seconds=time.perf_counter() - began,
     )

@@ -1,4 +1,4 @@
-"""A cycler's current whose zero is off, the same in all records: what a calibration leaves open.
+"""A cycler's current whose zero is off: what a calibration leaves open in slow tests.
 
     I = I_read - offset   while current flows;   none with the relay open, whatever is read
 
@@ -17,6 +17,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray
 from aesi.parameters import Parameter
+from aesi.physics.cell import Cell
 from aesi.physics.effect import Effect
 from aesi.physics.effect import Record as Driven
 from aesi.tracer.knobs import Knob, tolerated_knob
@@ -27,9 +28,16 @@ OPEN_SHARE = 1e-3
 ZERO_ERROR = 5e-4
 """Of the largest current among the data: what a cycler's zero is uncertain by, 0.1 % of its range being usual. Of a
 C/20 current that is several per cent."""
+SLOW_C_RATE = 0.15
 OFFSET = "offset_a"
 NOTED_ZERO = 0.02
 """Of a record's typical current."""
+
+
+def is_slow(cell: Cell, record: Record) -> bool:
+    """Is the current so small that a zero that is off would be a share of it?"""
+    seen = np.abs(record.thin.current_a[: record.n_fit])
+    return float(np.quantile(seen, 0.95)) <= SLOW_C_RATE * cell.nominal_capacity_ah
 
 
 def flowing(current_a: Array) -> BoolArray:
@@ -57,16 +65,15 @@ def zero_knob(sd_a: float) -> Knob:
     return tolerated_knob(ZERO.id, OFFSET, ZERO.parameters[OFFSET], sd_a)
 
 
-def zero_noted(records: Sequence[Record], offset_a: float) -> tuple[str, ...]:
-    """A sentence where the cycler's zero moves much of a record's charge."""
-    shares = {}
+def zero_noted(cell: Cell, records: Sequence[Record], offset_a: float) -> tuple[str, ...]:
+    """A sentence for each record whose charge the cycler's zero moves by much."""
+    sentences = []
     for record in records:
         current = record.data.current_a
-        shares[record.name] = abs(offset_a) / float(np.median(np.abs(current[flowing(current)])))
-    name = max(shares, key=lambda name: shares[name])
-    if shares[name] <= NOTED_ZERO:
-        return ()
-    return (
-        f"{name}: its charge fits if the current reads {1e3 * abs(offset_a):.2g} mA too "
-        f"{'high' if offset_a > 0 else 'low'} ({100 * shares[name]:.1f} % of it); that is taken out of every record.",
-    )
+        share = abs(offset_a) / float(np.median(np.abs(current[flowing(current)])))
+        if share > NOTED_ZERO and is_slow(cell, record):
+            sentences.append(
+                f"{record.name}: its charge fits if its current reads {1e3 * abs(offset_a):.2g} mA too "
+                f"{'high' if offset_a > 0 else 'low'} ({100 * share:.1f} % of it); that is taken out."
+            )
+    return tuple(sentences)

@@ -15,7 +15,7 @@ from aesi.physics import simulate
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.records import Hold, Measurement, Run
-from aesi.tracer.cycler_zero import ZERO, zero_knob
+from aesi.tracer.cycler_zero import ZERO, is_slow, zero_knob
 from aesi.tracer.knobs import SOC0, Knob, free_knobs, soc_knob, tolerated_knob, values_by_owner
 from aesi.tracer.records import Record
 from aesi.tracer.stepping import stepping
@@ -50,7 +50,7 @@ class Problem:
     model_error_v : what the model is known to miss (V): fits are then plain least squares at this weight, because a
     residual's memory is the model's fault and not the sensor's. None lets the residual's own memory decide.
     outlier_v : beyond this an error counts by its size and no longer by its square (None: never).
-    zero_sd_a : what the zero of the cycler's current is uncertain by.
+    zero_sd_a : what the zero of the cycler's current is uncertain by; it counts in slow records alone.
     steps : of a descent.  weights : (n_fit of all records,) what rows count in fits, None where all are alike.
     """
 
@@ -98,9 +98,15 @@ class Problem:
         An effect under test is in even at its neutral point: some say the same thing of a cell in other words there
         (windows by voltages), and a fit must not see a step.
         """
-        named = {**self.effects, ZERO.id: ZERO}
-        owners = [owner for owner in values if owner != SOC0]
-        return (*self.fixed, *(named[owner].activate(**values[owner]) for owner in owners))
+        owners = [owner for owner in values if owner not in (SOC0, ZERO.id)]
+        return (*self.fixed, *(self.effects[owner].activate(**values[owner]) for owner in owners))
+
+    def read_by(
+        self, values: Mapping[str, Mapping[str, float]], record: Record
+    ) -> tuple[ActiveEffect, ...]:
+        """What stood between the current of a slow record and what was written of it; of others it is nothing."""
+        zero = values.get(ZERO.id)
+        return () if zero is None or not is_slow(self.cell, record) else (ZERO.activate(**zero),)
 
     def predict(self, knobs: Sequence[Knob], x: Array, only: int | None = None) -> list[Array] | None:
         """Voltage of every record's fit part, (n_fit,) V each, or of one of them; None where the model fails."""
@@ -111,7 +117,8 @@ class Problem:
             for i in range(len(self.records)) if only is None else (only,):
                 record = self.records[i]
                 seen = record.thin.take(slice(0, record.n_fit))
-                out.append(self.voltage(seen, values[SOC0][str(i)], effects, record.thin_hold))
+                known = self.read_by(values, record)
+                out.append(self.voltage(seen, values[SOC0][str(i)], (*effects, *known), record.thin_hold))
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
         if not all(np.isfinite(v).all() for v in out):

@@ -20,6 +20,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.calibrate import MODEL_ERROR_V, OUTLIER_V, RESISTANCE, with_model_error
 from aesi.tracer.calibrate import settled as settled_cell
+from aesi.tracer.cycler_zero import is_slow
 from aesi.tracer.fit import Fit, fit_hypothesis
 from aesi.tracer.knobs import SOC0, placed_in
 from aesi.tracer.ocp_correction import EFFECT as OCP_CORRECTION
@@ -45,7 +46,6 @@ RESISTANCE_OHM_AH = 0.02
 """Of contacts that were not declared, for a cell of one ampere-hour."""
 STEPS = 14
 """Of a descent: many parameters at once, far from where they were declared."""
-SLOW_C_RATE = 0.15
 SPAN = 0.8
 FIRST = Breadth(least_share=0.5, most_left_v=FAR_OFF * MODEL_ERROR_V)
 """Of the search before: it goes on from single effects only where one explains most of what there is, and leaves no
@@ -80,9 +80,8 @@ def is_possible(problem: Problem) -> bool:
 
 def _is_slow_and_wide(cell: Cell, record: Record) -> bool:
     seen = record.thin.take(slice(0, record.n_fit))
-    slow = float(np.quantile(np.abs(seen.current_a), 0.95)) <= SLOW_C_RATE * cell.nominal_capacity_ah
     moved_ah = np.concatenate([[0.0], np.cumsum(seen.current_a[1:] * np.diff(seen.time_s))]) / 3600.0
-    return slow and float(np.ptp(moved_ah)) >= SPAN * cell.capacity_ah
+    return is_slow(cell, record) and float(np.ptp(moved_ah)) >= SPAN * cell.capacity_ah
 
 
 def freed(problem: Problem) -> Problem:
