@@ -92,7 +92,7 @@ def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) ->
             tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise
     _track_result(tracker, case, found, content, out)
-    _say(console, content, out, started)
+    _say(console, content, found.notes, out, started)
     return content
 
 
@@ -183,13 +183,18 @@ def _track_result(
     tracker.end("FINISHED")
 
 
-def _say(console: Console, content: dict[str, Any], out: Path, started: float) -> None:
+def _say(
+    console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float
+) -> None:
+    from aesi.pipeline.notes import together
     from aesi.pipeline.report.words import confidence, reason_finding
 
     rest = {"none": "nothing to add", "unknown": "something that no effect of the catalogue explains"}
     said = [*content["effects"], *([rest[content["verdict"]]] if content["verdict"] in rest else [])]
     console.say(f"{content['verdict']} ({confidence(content)}): {', '.join(said)}")
     console.say(f"  {reason_finding(content)}")
+    for note in together(notes):
+        console.say(f"  {note}")
     for group in content["indistinguishable"]:
         console.say(f"  these data cannot tell apart: {', '.join(group)}")
     rmse: Callable[[str, str], float] = lambda state, part: content[state][part]["rmse_mv"]  # noqa: E731

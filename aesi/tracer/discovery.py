@@ -171,6 +171,7 @@ def _look_again(
     search = second_look.SecondSearch(problem, np.random.default_rng(seed), archived)
     steps, verdict = _searched(search, max_effects, progress, second_look.BREADTH, noise_v)
     if not search.improves(steps[-1], first.steps[0].fit):
+        first.search.notes.append(second_look.CONTRADICTION)
         verdict = second_look.contradicted(first.verdict)
         return replace(first, verdict=verdict, steps=first.steps[:1], chosen=first.steps[0])
     nats = second_look.nats_of_potential(problem, steps[0].fit)

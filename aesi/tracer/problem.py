@@ -101,9 +101,7 @@ class Problem:
         owners = [owner for owner in values if owner not in (SOC0, ZERO.id)]
         return (*self.fixed, *(self.effects[owner].activate(**values[owner]) for owner in owners))
 
-    def read_by(
-        self, values: Mapping[str, Mapping[str, float]], record: Record
-    ) -> tuple[ActiveEffect, ...]:
+    def read_by(self, values: Mapping[str, Mapping[str, float]], record: Record) -> tuple[ActiveEffect, ...]:
         """What stood between the current of a slow record and what was written of it; of others it is nothing."""
         zero = values.get(ZERO.id)
         return () if zero is None or not is_slow(self.cell, record) else (ZERO.activate(**zero),)

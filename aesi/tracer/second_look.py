@@ -64,13 +64,14 @@ BLOCKS = 12
 BETWEEN, BEYOND = range(1, BLOCKS, 3), range(9, BLOCKS)
 """Of the blocks of each quick record, those that a hypothesis has to predict unseen: every third, between others that
 it sees, and in a second refit the last quarter, beyond them."""
-CONTRADICTION = (
-    "the records contradict one another, by the zero of their currents or by more than the model lacks, and nothing "
-    "is adopted"
-)
 BETWEEN_SHARE, BEYOND_SHARE = 0.97, 1.2
 """And with errors of at most these shares of those without the effect: better between, and no worse beyond, where the
 potential at charges that no other record has seen decides more than any effect."""
+CONTRADICTION = (
+    "the model's own parameters, refitted to all of these records, do worse on parts that the fit has not seen than "
+    "the declared ones: the records contradict one another, by the zero of their currents or by more than one effect, "
+    "and nothing is adopted"
+)
 
 
 def is_possible(problem: Problem) -> bool:
@@ -132,11 +133,9 @@ def reworded(
 
 def contradicted(verdict: Verdict) -> Verdict:
     """The verdict where a recalibration does not carry to data that it has not seen: nothing is named."""
-    reason = (
-        f"{verdict.reason}; refitted to all of these records, the model's own parameters do worse on parts that the "
-        f"fit has not seen than the declared ones: {CONTRADICTION}"
+    return replace(
+        verdict, word="unknown", effects=(), groups=(), reason=f"{verdict.reason}; {CONTRADICTION}"
     )
-    return replace(verdict, word="unknown", effects=(), groups=(), reason=reason)
 
 
 @dataclass
