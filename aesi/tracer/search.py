@@ -47,7 +47,8 @@ class Breadth:
     singles : effects that are fitted alone, the most promising by a linear estimate (None: all).  abreast : hypotheses
     of a size that are grown further, since the best single effect need not be half of the best pair.  grown : effects
     that are fitted in full on top of each of them.  lost : abreast and grown where not one effect was admitted.
-    least_share : of the structured variance that the best effect so far has to explain for the search to go on.
+    least_share : of the structured variance that the best effect so far has to explain for the search to go on, where
+    it is not 0: half of a pair may leave more by itself than nothing does.
     most_left_v : what it may leave for that, V.
     """
 
@@ -361,8 +362,9 @@ def select(
         best = max(plainer, key=lambda s: s.evidence, default=best)
         if best is not None and best.evidence - steps[-1].evidence >= EVIDENCE_NATS:
             steps.append(best)
-        enough_v = min((1.0 - breadth.least_share) ** 0.5 * base.structured_v, breadth.most_left_v)
-        hopeless = (size > 1 and len(steps[-1].hypothesis) < size) or steps[-1].structured_v > enough_v
+        left_v = steps[-1].structured_v
+        little = left_v**2 > (1.0 - breadth.least_share) * base.structured_v**2 and breadth.least_share > 0
+        hopeless = (size > 1 and len(steps[-1].hypothesis) < size) or little or left_v > breadth.most_left_v
         done = grade(base, steps[-1]) >= (2 if steps[-1].hypothesis else 1)
         if size == max_effects or hopeless or done:
             break

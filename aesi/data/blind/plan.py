@@ -18,6 +18,7 @@ FILES = {NMC: "nmc_30ah.bpx.json", M50: "lg_m50_chen2020.bpx.json"}
 RATES = {NMC: 1.0, M50: 0.7}
 """The LG M50 is an energy cell, with higher resistances; its currents stay lower."""
 SOC0 = {NMC: (0.8, 0.95), M50: (0.6, 0.75)}
+"""From higher up, charge pulses take the LG M50 to 4.34 V, beyond its upper voltage."""
 PLATING_SOC0 = (0.65, 0.75)
 """Fast charges go on from there without leaving the window of voltage by more than pulses do."""
 TARGETS_MV = (2.0, 4.0, 8.0)
@@ -97,6 +98,6 @@ def _strong(number: int, cell: str, rng: np.random.Generator) -> CaseSpec:
         cell=cell,
         model="DFN",
         rate=1.2 if cell == NMC else 0.9,
-        soc0=0.9,
+        soc0=min(0.9, SOC0[cell][1]),
         seed=int(rng.integers(2**31)),
     )
