@@ -8,7 +8,7 @@ import pytest
 from aesi.tracer.fit import fit_hypothesis
 from aesi.tracer.problem import Problem
 from aesi.tracer.records import prepare_all
-from aesi.tracer.search import Admission, Archive, Scored, Search, only_by_freedom
+from aesi.tracer.search import Admission, Archive, Breadth, Scored, Search, only_by_freedom, select
 from aesi.tracer.verdict import CONFIDENT, judge
 
 NOISE_V = 1e-3
@@ -150,3 +150,29 @@ def test_a_flexible_curve_needs_more_than_solvers_differ_by(ranked):
     search.polarisation_v = 60e-3
     assert search.material_v == pytest.approx(np.hypot(0.35 * search.noise_v, 0.012 * 60e-3))
     assert only_by_freedom(plain, curve, search.material_v)
+
+
+@pytest.mark.parametrize(
+    ("breadth", "effects"),
+    [
+        (Breadth(), {"current_sensor_gain", "ocv_hysteresis"}),
+        (Breadth(least_share=0.5), {"current_sensor_gain"}),
+        (Breadth(most_left_v=9e-3), {"current_sensor_gain"}),
+    ],
+    ids=["no limit", "too little explained", "too much left"],
+)
+def test_half_of_a_pair_may_leave_more_by_itself_than_nothing_does(ranked, monkeypatch, breadth, effects):
+    """The symptom: a gain that the evidence favours left more in all than no effect, and no pair was tried."""
+    gain, hysteresis = ("current_sensor_gain",), ("ocv_hysteresis",)
+    search = ranked(
+        {gain: (900.0, 11e-3), hysteresis: (30.0, 9.5e-3), (*gain, *hysteresis): (1000.0, NOISE_V)}
+    )
+
+    def grow(parent, limit=None):
+        one_more = len(parent.hypothesis) + 1
+        scored = [s for s in search.scored.values() if len(s.hypothesis) == one_more]
+        return [s for s in scored if set(parent.hypothesis) < set(s.hypothesis)]
+
+    monkeypatch.setattr(search, "grow", grow)
+    steps = select(search, 3, lambda base, one: 2 if one.structured_v < 0.5e-3 else 0, breadth)
+    assert set(steps[-1].hypothesis) == effects
