@@ -183,9 +183,7 @@ def _track_result(
     tracker.end("FINISHED")
 
 
-def _say(
-    console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float
-) -> None:
+def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
     from aesi.pipeline.report.words import confidence, reason_finding
 
