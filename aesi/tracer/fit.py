@@ -136,16 +136,13 @@ class Fitter:
         """(n,) V: what a move of one knob does to the model; a record's state of charge leaves the others alone."""
         self.simulations += 1
         knob = self.knobs[j]
-        if knob.owner != SOC0:
-            predicted = self.problem.predict(self.knobs, moved)
-            return None if predicted is None else residual - (self.measured - np.concatenate(predicted))
-        index = int(knob.name)
-        predicted = self.problem.predict(self.knobs, moved, index)
+        only = int(knob.name) if knob.owner == SOC0 else None
+        predicted = self.problem.predict(self.knobs, moved, only)
         if predicted is None:
             return None
-        rows = self.problem.slices[index]
+        rows = slice(None) if only is None else self.problem.slices[only]
         out = np.zeros_like(residual)
-        out[rows] = residual[rows] - (self.measured[rows] - predicted[0])
+        out[rows] = residual[rows] - (self.measured[rows] - np.concatenate(predicted))
         return out
 
     def cost(self, x: Array, noise: Sequence[ColouredNoise]) -> float:
