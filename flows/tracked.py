@@ -8,9 +8,9 @@ from math import log10
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline.candidate import Scored
-from aesi.pipeline.config import ExperimentConfig
-from aesi.pipeline.load import ROLES, Loaded
+from aesi.pipeline.experiment.candidate import Scored
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.load import ROLES, Loaded
 from aesi.records import Failed
 from aesi.sparse import Genome, Problem, SparseModel
 from flows.provenance import versions

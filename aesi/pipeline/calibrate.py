@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline.discover import declared
+from aesi.pipeline.discovery.discover import declared
 from aesi.pipeline.notes import together
 from aesi.records import Measurement
 from aesi.tracer.calibrate import Calibration, calibrate

@@ -12,7 +12,7 @@ from aesi.data.current import CurrentProfile, read_current
 from aesi.data.read import Sign
 from aesi.errors import DataError, InputError
 from aesi.physics import Cell, simulate
-from aesi.pipeline.hybrid import HybridModel
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, Run
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from aesi.data import read_measurement
 from aesi.data.resample import to_even
 from aesi.errors import ConfigError, DataError
 from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
-from aesi.pipeline.config import NO_ROLES, ExperimentConfig
-from aesi.pipeline.sections import DataConfig, RepeatsConfig
+from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
+from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run, Split
 from aesi.sparse import with_inputs
 
@@ -213,7 +213,7 @@ def declared_cell(path: Path) -> tuple[Cell, tuple[ActiveEffect, ...]]:
     """The cell of a BPX file, or cell and effects of a saved model's folder."""
     if not path.is_dir():
         return Cell.from_bpx(path), ()
-    from aesi.pipeline.hybrid import HybridModel
+    from aesi.pipeline.product.hybrid import HybridModel
 
     model = HybridModel.load(path)
     return model.cell, model.effects

@@ -18,9 +18,9 @@ from aesi.conformal.free_run import HorizonBand
 from aesi.conformal.scores import score
 from aesi.numerics.metrics import mser, rmse
 from aesi.numerics.typing import Array
-from aesi.pipeline.bands import error_ahead, reach
-from aesi.pipeline.fit import Fitted
-from aesi.pipeline.load import ROLES, Role
+from aesi.pipeline.experiment.bands import error_ahead, reach
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.load import ROLES, Role
 from aesi.pipeline.report.views import Prediction, Trace
 from aesi.records import ErrorSeries, FreeRun, Split
 

@@ -10,9 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from aesi.conformal import Calibrated, FreeRunBands
-from aesi.pipeline.candidate import genome_space
-from aesi.pipeline.config import ExperimentConfig
-from aesi.pipeline.load import Loaded
+from aesi.pipeline.experiment.candidate import genome_space
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.load import Loaded
 from aesi.records import ErrorModel
 from aesi.sparse import Candidate, Options, Problem
 from aesi.sparse.baselines import BASELINES, Tuning

@@ -12,7 +12,7 @@ from aesi.conformal import METHODS, Method
 from aesi.conformal.candidate import validation_scores
 from aesi.errors import AesiError, ConfigError
 from aesi.numerics.typing import Array
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import ErrorSeries, Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
 from aesi.sparse.genome_space import GenomeSpace

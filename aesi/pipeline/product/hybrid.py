@@ -1,7 +1,7 @@
 """The product: ESPM, the effects added to it, the sparse correction of what is left, and prediction bands.
 
 A record is brought to the step of the correction, predicted there in free run or one step ahead, and brought
-back to its own rows. How a model is kept on disk: `aesi.pipeline.model_folder`.
+back to its own rows. How a model is kept on disk: `aesi.pipeline.product.model_folder`.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, simulate
-from aesi.pipeline.load import error_series, rest_soc
-from aesi.pipeline.model_folder import part_file, read_model, write_model
-from aesi.pipeline.prediction import Prediction
+from aesi.pipeline.experiment.load import error_series, rest_soc
+from aesi.pipeline.product.model_folder import part_file, read_model, write_model
+from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.sparse import SparseModel
 

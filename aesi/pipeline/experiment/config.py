@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
 from aesi.errors import ConfigError
-from aesi.pipeline.sections import (
+from aesi.pipeline.experiment.sections import (
     CellConfig,
     ConformalConfig,
     DataConfig,

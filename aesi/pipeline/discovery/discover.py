@@ -14,8 +14,8 @@ import numpy as np
 from aesi.errors import InputError
 from aesi.physics import ActiveEffect, Cell
 from aesi.physics.effects import CATALOGUE, Effect, load_effect
-from aesi.pipeline.hybrid import HybridModel
 from aesi.pipeline.notes import together
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover

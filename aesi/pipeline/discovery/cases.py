@@ -8,10 +8,10 @@ from pathlib import Path
 from aesi.data import read_measurement
 from aesi.data.read import Sign
 from aesi.errors import ConfigError
-from aesi.pipeline.config import ExperimentConfig
-from aesi.pipeline.discover import Case
-from aesi.pipeline.load import cell_path, locator, virtual_experiment
-from aesi.pipeline.sections import DiscoverConfig
+from aesi.pipeline.discovery.discover import Case
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.load import cell_path, locator, virtual_experiment
+from aesi.pipeline.experiment.sections import DiscoverConfig
 from aesi.records import Measurement
 
 MOST_ROWS = 80_000

@@ -10,15 +10,14 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline import tables
-from aesi.pipeline.config import ExperimentConfig
-from aesi.pipeline.evaluate import Evaluation
-from aesi.pipeline.figures import paper_figures
-from aesi.pipeline.fit import Fitted
-from aesi.pipeline.hybrid import HybridModel
-from aesi.pipeline.load import Loaded
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.evaluate import Evaluation
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.notes import together
-from aesi.pipeline.report import write_figures, write_run_report
+from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.report import tables, write_figures, write_run_report
+from aesi.pipeline.report.figures import paper_figures
 from aesi.pipeline.report.views import BootstrapView, RunView, Trace
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking

@@ -12,10 +12,10 @@ import numpy as np
 
 from aesi.conformal import METHODS, Calibrated, Method
 from aesi.errors import FitError
-from aesi.pipeline.bands import WHOLE, HonestErrors, Unseen
-from aesi.pipeline.candidate import method
-from aesi.pipeline.config import ExperimentConfig
-from aesi.pipeline.fit import Fitted
+from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
+from aesi.pipeline.experiment.candidate import method
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.fit import Fitted
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence

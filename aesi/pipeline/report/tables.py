@@ -22,7 +22,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
-from aesi.pipeline.table_formats import ABSENT, Table, to_csv, to_latex, to_markdown
+from aesi.pipeline.report.table_formats import ABSENT, Table, to_csv, to_latex, to_markdown
 
 Row = Mapping[str, Any]
 Format = Literal["md", "tex", "csv"]
