@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, catalogue, declared, run_case, write_discovery
+from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, catalogue, run_case, write_discovery
+from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
 from flows import environment
 from flows.console import Console, duration
@@ -34,7 +35,7 @@ def discover(
     Raises AesiError, one sentence, for what cannot be used; nothing is started then.
     """
     environment.prepare()
-    declared(case.cell)
+    declared_model(case.cell)
     catalogue(case.effect_files)
     if use_prefect or (use_prefect is None and os.environ.get("PREFECT_API_URL")):
         return _as_flow(case, out, experiment)

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import InputError
-from aesi.physics import ActiveEffect, Cell
 from aesi.physics.effects import CATALOGUE, Effect, load_effect
 from aesi.pipeline.notes import together
+from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
 from aesi.records import Measurement
@@ -48,17 +48,6 @@ class Case:
     effect_files: tuple[Path, ...] = ()
 
 
-def declared(path: Path) -> tuple[Cell, tuple[ActiveEffect, ...]]:
-    """The cell of a BPX file, or cell and effects of a model folder.
-
-    Raises CellError or InputError, one sentence, for what cannot be read.
-    """
-    if path.is_dir():
-        model = HybridModel.load(path)
-        return model.cell, model.effects
-    return Cell.from_bpx(path), ()
-
-
 def catalogue(files: Sequence[Path]) -> dict[str, Effect]:
     """The catalogue and the user's own effects.  Raises InputError for a file that holds none."""
     own = [load_effect(file) for file in files]
@@ -70,10 +59,10 @@ def catalogue(files: Sequence[Path]) -> dict[str, Effect]:
 
 def run_case(case: Case, out: Path, progress: Progress | None = None) -> Discovery:
     """Trace one case; fits are kept in `out`, so that the same case goes on where it was interrupted."""
-    cell, given = declared(case.cell)
+    given = declared_model(case.cell)
     out.mkdir(parents=True, exist_ok=True)
     return discover(
-        cell,
+        given.cell,
         case.measurements,
         case.tests,
         soc0=case.soc0,
@@ -81,7 +70,7 @@ def run_case(case: Case, out: Path, progress: Progress | None = None) -> Discove
         max_effects=case.max_effects,
         seed=case.seed,
         effects=catalogue(case.effect_files),
-        given=given,
+        given=given.effects,
         archive=out / ARCHIVE,
         progress=progress,
     )

@@ -20,9 +20,8 @@ from aesi.numerics.metrics import mser, rmse
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.bands import error_ahead, reach
 from aesi.pipeline.experiment.fit import Fitted
-from aesi.pipeline.experiment.load import ROLES, Role
 from aesi.pipeline.report.views import Prediction, Trace
-from aesi.records import ErrorSeries, FreeRun, Split
+from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
 
 MILLIVOLT_PER_VOLT = 1e3
 HORIZONS_S = (1.0, 10.0, 60.0)

@@ -10,27 +10,24 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from aesi.data import read_measurement
 from aesi.data.resample import to_even
 from aesi.errors import ConfigError, DataError
-from aesi.physics import ActiveEffect, Cell, initial_soc, simulate
+from aesi.physics import ActiveEffect, Cell, simulate
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
-from aesi.records import INPUT_NAMES, ErrorSeries, Measurement, Run, Split
+from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.error_series import error_series
+from aesi.pipeline.product.initial_state import rest_soc
+from aesi.records import ROLES, ErrorSeries, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
     from aesi.data.virtual import Experiment
-
-REST_C_RATE = 0.02
-"""A first current below this C-rate counts as rest, and the first voltage as a rest voltage."""
-
-Role = Literal["train", "valid", "test"]
-ROLES: tuple[Role, ...] = ("train", "valid", "test")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,35 +68,6 @@ def load(config: ExperimentConfig) -> Loaded:
         return replace(loaded, notes=(note, *loaded.notes))
 
 
-def error_series(measurement: Measurement, run: Run, dt_s: float) -> ErrorSeries:
-    """The voltage error of a simulation of an evenly sampled measurement, with the inputs of the sparse model."""
-    inputs = np.column_stack([measurement.current_a, *(run.series[name] for name in INPUT_NAMES[1:])])
-    return ErrorSeries(
-        name=measurement.name,
-        dt_s=dt_s,
-        time_s=measurement.time_s,
-        error_v=measurement.voltage_v - run.voltage_v,
-        inputs=inputs,
-        soc=run.series["soc"],
-        model_v=run.voltage_v,
-    )
-
-
-def rest_soc(cell: Cell, measurement: Measurement) -> float:
-    """State of charge from the first voltage of a record that starts at rest.
-
-    Raises DataError where the first current is above `REST_C_RATE`: the voltage then says nothing exact.
-    """
-    limit = REST_C_RATE * cell.capacity_ah
-    first = float(measurement.current_a[0])
-    if abs(first) > limit:
-        raise DataError(
-            f"{measurement.name} starts under {first:.3g} A, not at rest (below {limit:.2g} A), so its first voltage "
-            "does not give the state of charge; give soc0."
-        )
-    return initial_soc(cell, float(measurement.voltage_v[0]))
-
-
 def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
     """Pieces of a record that repeats a schedule; each training repeat gives its last share to validation."""
     train, valid = [], []
@@ -126,8 +94,8 @@ def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
 
 def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
-    cell, given = declared_cell(path)
-    effects = (*given, *_effects(config))
+    given = declared_model(path)
+    cell, effects = given.cell, (*given.effects, *_effects(config))
     sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
     series: dict[str, ErrorSeries] = {}
     soc0: dict[str, float] = {}
@@ -207,16 +175,6 @@ def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
     if unknown:
         raise ConfigError(f"cell.effects: there is no effect {unknown[0]!r}; `aesi effects` lists them.")
     return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
-
-
-def declared_cell(path: Path) -> tuple[Cell, tuple[ActiveEffect, ...]]:
-    """The cell of a BPX file, or cell and effects of a saved model's folder."""
-    if not path.is_dir():
-        return Cell.from_bpx(path), ()
-    from aesi.pipeline.product.hybrid import HybridModel
-
-    model = HybridModel.load(path)
-    return model.cell, model.effects
 
 
 def cell_path(config: ExperimentConfig) -> Path:

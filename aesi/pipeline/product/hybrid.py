@@ -17,7 +17,8 @@ from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, simulate
-from aesi.pipeline.experiment.load import error_series, rest_soc
+from aesi.pipeline.product.error_series import error_series
+from aesi.pipeline.product.initial_state import rest_soc
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement

@@ -12,15 +12,14 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
 from aesi.pipeline.report.plots import ensemble, maps, records
-from aesi.pipeline.report.views import Role, RunView, Trace
+from aesi.pipeline.report.views import RunView, Trace
+from aesi.records import ROLES
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 ZOOM_S = 120.0
 """Length of the zoom on the prediction intervals."""
-
-ROLES: tuple[Role, ...] = ("train", "valid", "test")
 
 
 def paper_figures(view: RunView) -> dict[str, Figure]:

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from aesi.numerics.typing import Array, BoolArray
+from aesi.records import Role
 
 Row = Mapping[str, Any]
-Role = Literal["train", "valid", "test"]
 Part = Literal["fit", "test"]
 
 KIND_ORDER = ("physics", "parameter", "instrument", "placebo")
