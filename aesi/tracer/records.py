@@ -151,8 +151,8 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
         return ()
     low, high = float(np.min(data.temperature_degc)), float(np.max(data.temperature_degc))
     return (
-        f"{data.name}: simulated at its measured temperature, {low:.1f} to {high:.1f} degC; effects that would infer the "
-        "temperature (self_heating, ambient_temperature) do not compete for it.",
+        f"{data.name}: simulated at its measured temperature, {low:.1f} to {high:.1f} degC; effects that would infer "
+        "it (self_heating, ambient_temperature) do not compete for this record.",
     )
 
 
