@@ -36,7 +36,7 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from aesi.conformal.band import State
+from aesi.conformal.bands.band import State
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import LocalScale, covariates
 from aesi.errors import FitError, InputError

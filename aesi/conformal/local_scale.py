@@ -17,7 +17,7 @@ from typing import Self
 import numpy as np
 from scipy.signal import lfilter
 
-from aesi.conformal.band import State
+from aesi.conformal.bands.band import State
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from aesi.conformal.band import Band
-from aesi.conformal.boosted import BoostedQuantiles
-from aesi.conformal.forest import ForestQuantiles
-from aesi.conformal.linear import LinearQuantiles
-from aesi.conformal.marginal import FixedBand, RollingBand
-from aesi.conformal.method import EnbPI, Method, SplitConformal
-from aesi.conformal.normalised import NormalisedQuantiles
-from aesi.conformal.regression import FitTask, QuantileModel, RegressionBand
-from aesi.conformal.spci import SPCI
+from aesi.conformal.bands.band import Band
+from aesi.conformal.bands.marginal import FixedBand, RollingBand
+from aesi.conformal.bands.regression import FitTask, QuantileModel, RegressionBand
+from aesi.conformal.online.method import EnbPI, Method, SplitConformal
+from aesi.conformal.online.spci import SPCI
+from aesi.conformal.regressors.boosted import BoostedQuantiles
+from aesi.conformal.regressors.forest import ForestQuantiles
+from aesi.conformal.regressors.linear import LinearQuantiles
+from aesi.conformal.regressors.normalised import NormalisedQuantiles
 from aesi.numerics.boosting import Growth
 
 BANDS: dict[str, type[Band]] = {band.kind: band for band in (FixedBand, RollingBand, RegressionBand)}

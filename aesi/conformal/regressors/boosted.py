@@ -7,8 +7,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.band import State
-from aesi.conformal.regression import FitTask, QuantileModel
+from aesi.conformal.bands.band import State
+from aesi.conformal.bands.regression import FitTask, QuantileModel
 from aesi.numerics.boosting import BoostedTrees, Growth, bin_edges, binned, fit_boosted
 from aesi.numerics.typing import Array
 

@@ -13,9 +13,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.band import Band, RawBand, State
-from aesi.conformal.history import History
-from aesi.conformal.narrowest import narrowest
+from aesi.conformal.bands.band import Band, RawBand, State
+from aesi.conformal.bands.history import History
+from aesi.conformal.bands.narrowest import narrowest
 from aesi.numerics.typing import Array, BoolArray
 
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.conformal.band import Band
-from aesi.conformal.history import History, View
-from aesi.conformal.method import Calibration, Method
-from aesi.conformal.narrowest import level_pairs
-from aesi.conformal.regression import FitTask, Fitter, RegressionBand
-from aesi.conformal.scale import Scale
+from aesi.conformal.bands.band import Band
+from aesi.conformal.bands.history import History, View
+from aesi.conformal.bands.narrowest import level_pairs
+from aesi.conformal.bands.regression import FitTask, Fitter, RegressionBand
+from aesi.conformal.online.method import Calibration, Method
+from aesi.conformal.online.scale import Scale
 from aesi.errors import FitError
 from aesi.numerics.typing import Array, BoolArray
 

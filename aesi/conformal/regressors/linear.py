@@ -14,8 +14,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numba import njit
 
-from aesi.conformal.band import State
-from aesi.conformal.regression import FitTask, QuantileModel
+from aesi.conformal.bands.band import State
+from aesi.conformal.bands.regression import FitTask, QuantileModel
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array
 

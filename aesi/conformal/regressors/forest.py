@@ -11,8 +11,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.band import State
-from aesi.conformal.regression import FitTask, QuantileModel
+from aesi.conformal.bands.band import State
+from aesi.conformal.bands.regression import FitTask, QuantileModel
 from aesi.numerics.trees import Splits, flatten, forest_quantiles
 from aesi.numerics.typing import Array
 

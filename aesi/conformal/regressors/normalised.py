@@ -14,9 +14,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.band import State
-from aesi.conformal.linear import LinearQuantiles
-from aesi.conformal.regression import FitTask, Fitter, QuantileModel
+from aesi.conformal.bands.band import State
+from aesi.conformal.bands.regression import FitTask, Fitter, QuantileModel
+from aesi.conformal.regressors.linear import LinearQuantiles
 from aesi.numerics.typing import Array
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aesi.conformal.intervals import Intervals
-from aesi.conformal.method import Method
+from aesi.conformal.online.method import Method
 from aesi.conformal.scores import Scores, score
 from aesi.numerics.typing import Array
 

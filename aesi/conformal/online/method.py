@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.conformal.band import Band
-from aesi.conformal.calibrated import Calibrated
-from aesi.conformal.marginal import FixedBand, RollingBand
-from aesi.conformal.narrowest import level_pairs
-from aesi.conformal.records import checked_currents, checked_records
-from aesi.conformal.scale import Scale
+from aesi.conformal.bands.band import Band
+from aesi.conformal.bands.marginal import FixedBand, RollingBand
+from aesi.conformal.bands.narrowest import level_pairs
+from aesi.conformal.online.calibrated import Calibrated
+from aesi.conformal.online.records import checked_currents, checked_records
+from aesi.conformal.online.scale import Scale
 from aesi.errors import FitError, InputError
 from aesi.numerics.quantiles import conformal_quantile
 from aesi.numerics.typing import Array

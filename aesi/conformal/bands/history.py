@@ -7,7 +7,7 @@ from typing import Literal, Self
 
 import numpy as np
 
-from aesi.conformal.band import State
+from aesi.conformal.bands.band import State
 from aesi.numerics.drive import drive_features, drive_row
 from aesi.numerics.typing import Array, BoolArray
 from aesi.numerics.windows import N_LAGS, history_features, history_row, n_features, raw_lags, spans

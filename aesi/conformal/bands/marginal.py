@@ -8,8 +8,8 @@ from typing import ClassVar, Self
 import numpy as np
 from numba import njit
 
-from aesi.conformal.band import Band, RawBand, State
-from aesi.conformal.narrowest import narrowest
+from aesi.conformal.bands.band import Band, RawBand, State
+from aesi.conformal.bands.narrowest import narrowest
 from aesi.numerics.typing import Array, BoolArray
 
 

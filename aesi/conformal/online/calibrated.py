@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.conformal.band import Band, State
+from aesi.conformal.bands.band import Band, State
 from aesi.conformal.intervals import Intervals
-from aesi.conformal.records import checked_current, checked_record
-from aesi.conformal.scale import Scale
-from aesi.conformal.tracker import move, replay, scaled
+from aesi.conformal.online.records import checked_current, checked_record
+from aesi.conformal.online.scale import Scale
+from aesi.conformal.online.tracker import move, replay, scaled
 from aesi.errors import InputError
 from aesi.numerics.drive import N_RECENT
 from aesi.numerics.typing import Array

@@ -7,7 +7,7 @@ from typing import Self
 
 import numpy as np
 
-from aesi.conformal.band import State
+from aesi.conformal.bands.band import State
 from aesi.numerics.quantiles import conformal_quantile
 from aesi.numerics.typing import Array, IntArray
 
