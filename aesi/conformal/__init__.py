@@ -5,6 +5,7 @@ from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.calibrated import Calibrated, Stream
 from aesi.conformal.online.method import Method
 from aesi.conformal.registry import DEFAULT_METHOD, METHODS
+from aesi.conformal.saved import calibrated_from_dict
 
 __all__ = [
     "DEFAULT_METHOD",
@@ -15,4 +16,5 @@ __all__ = [
     "Intervals",
     "Method",
     "Stream",
+    "calibrated_from_dict",
 ]

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
-from aesi.numerics.typing import Array, BoolArray
-
-State = dict[str, Any]
-"""Plain values and numpy arrays under string keys; nothing in it needs pickle."""
+from aesi.conformal.regressors.model import Kinds
+from aesi.numerics.typing import Array, BoolArray, SavedState
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,10 +45,10 @@ class Band(ABC):
         most recent last. recent_current : A, the coming sample's at the end. None where `past` is too short."""
 
     @abstractmethod
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         """Everything `from_state` needs."""
 
     @classmethod
     @abstractmethod
-    def from_state(cls, state: State) -> Self:
-        """Inverse of `to_state`."""
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
+        """Inverse of `to_state`; `kinds` holds the regressors that a band may rest on."""

@@ -7,9 +7,8 @@ from typing import Literal, Self
 
 import numpy as np
 
-from aesi.conformal.bands.band import State
 from aesi.numerics.drive import drive_features, drive_row
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.windows import N_LAGS, history_features, history_row, n_features, raw_lags, spans
 
 View = Literal["features", "lags"]
@@ -60,11 +59,11 @@ class History:
             history_row(past, spans(self.window), out)
         return np.concatenate([out, drive_row(recent_current)]) if self.with_current else out
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         """The three fields."""
         return {"window": self.window, "view": self.view, "with_current": self.with_current}
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState) -> Self:
         """Inverse of `to_state`."""
         return cls(int(state["window"]), state["view"], bool(state["with_current"]))

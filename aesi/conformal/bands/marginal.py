@@ -8,9 +8,10 @@ from typing import ClassVar, Self
 import numpy as np
 from numba import njit
 
-from aesi.conformal.bands.band import Band, RawBand, State
+from aesi.conformal.bands.band import Band, RawBand
 from aesi.conformal.bands.narrowest import narrowest
-from aesi.numerics.typing import Array, BoolArray
+from aesi.conformal.regressors.model import Kinds
+from aesi.numerics.typing import Array, BoolArray, SavedState
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +29,11 @@ class FixedBand(Band):
     def row(self, past: Array, recent_current: Array) -> tuple[float, float] | None:
         return self.low, self.high
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         return {"low": self.low, "high": self.high}
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         return cls(float(state["low"]), float(state["high"]))
 
 
@@ -87,9 +88,9 @@ class RollingBand(Band):
         narrowest(quantiles, low, high)
         return float(low[0]), float(high[0])
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         return {"window": self.window, "needed": self.needed, "levels": self.levels}
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         return cls(int(state["window"]), int(state["needed"]), np.asarray(state["levels"], dtype=float))

@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.conformal.bands.band import Band, State
+from aesi.conformal.bands.band import Band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.records import checked_current, checked_record
 from aesi.conformal.online.scale import Scale
 from aesi.conformal.online.tracker import move, replay, scaled
 from aesi.errors import InputError
 from aesi.numerics.drive import N_RECENT
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, SavedState
 
 SCHEMA = "aesi.conformal/1"
 
@@ -70,8 +70,9 @@ class Calibrated:
         """The same intervals with another rate of the adaptive step (0 turns it off)."""
         return replace(self, rate=rate)
 
-    def to_dict(self) -> State:
-        """Plain values and numpy arrays only; `from_dict` restores the same intervals to the last bit."""
+    def to_dict(self) -> SavedState:
+        """Plain values and numpy arrays only; `aesi.conformal.calibrated_from_dict` restores the same
+        intervals to the last bit."""
         return {
             "schema": SCHEMA,
             "method": self.method,
@@ -84,31 +85,6 @@ class Calibrated:
             "marginal_v": list(self.marginal_v),
             "floor_v": self.floor_v,
         }
-
-    @staticmethod
-    def from_dict(state: State) -> Calibrated:
-        """Inverse of `to_dict`; arrays may come back as lists.
-
-        Raises InputError for another schema or a kind of band this version does not know.
-        """
-        from aesi.conformal.registry import BANDS
-
-        if state.get("schema") != SCHEMA:
-            raise InputError(f"intervals have schema {state.get('schema')!r}, this version reads {SCHEMA!r}.")
-        kind = state["band_kind"]
-        if kind not in BANDS:
-            raise InputError(f"unknown kind of band {kind!r}; this version knows {', '.join(sorted(BANDS))}.")
-        low, high = state["marginal_v"]
-        return Calibrated(
-            method=str(state["method"]),
-            alpha=float(state["alpha"]),
-            window=int(state["window"]),
-            band=BANDS[kind].from_state(state["band"]),
-            scale=Scale.from_state(state["scale"]),
-            rate=float(state["rate"]),
-            marginal_v=(float(low), float(high)),
-            floor_v=float(state["floor_v"]),
-        )
 
     def _current(self, current_a: Array | None, n: int) -> Array | None:
         if not self.needs_current:

@@ -7,9 +7,8 @@ from typing import Self
 
 import numpy as np
 
-from aesi.conformal.bands.band import State
 from aesi.numerics.quantiles import conformal_quantile
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, IntArray, SavedState
 
 GROUP_LEVELS = (0.05, 0.2, 0.4, 0.6, 0.8, 0.95)
 """Quantiles of the calibration currents that separate the groups: rest, mild and hard use either way."""
@@ -54,11 +53,11 @@ class Scale:
         """(n,) group of each current."""
         return np.searchsorted(self.edges_a, current_a).astype(np.int64)
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         """Edges and factors."""
         return {"edges_a": self.edges_a, "log_ratio": self.log_ratio}
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState) -> Self:
         """Inverse of `to_state`."""
         return cls(np.asarray(state["edges_a"], dtype=float), np.asarray(state["log_ratio"], dtype=float))

@@ -17,9 +17,10 @@ import numpy as np
 from aesi.conformal.bands.band import Band
 from aesi.conformal.bands.history import History, View
 from aesi.conformal.bands.narrowest import level_pairs
-from aesi.conformal.bands.regression import FitTask, Fitter, RegressionBand
+from aesi.conformal.bands.regression import RegressionBand
 from aesi.conformal.online.method import Calibration, Method
 from aesi.conformal.online.scale import Scale
+from aesi.conformal.regressors.model import FitTask, Fitter
 from aesi.errors import FitError
 from aesi.numerics.typing import Array, BoolArray
 

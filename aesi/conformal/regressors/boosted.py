@@ -7,10 +7,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.bands.band import State
-from aesi.conformal.bands.regression import FitTask, QuantileModel
+from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
 from aesi.numerics.boosting import BoostedTrees, Growth, bin_edges, binned, fit_boosted
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, SavedState
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +34,7 @@ class BoostedQuantiles(QuantileModel):
     def quantiles(self, rows: Array) -> Array:
         return np.column_stack([trees.predict(rows) for trees in self.trees])
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         return {
             "base": np.array([t.base for t in self.trees]),
             "feature": np.array([t.feature for t in self.trees]),
@@ -44,7 +43,7 @@ class BoostedQuantiles(QuantileModel):
         }
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         base, threshold, leaf = (np.asarray(state[k], dtype=float) for k in ("base", "threshold", "leaf"))
         feature = np.asarray(state["feature"], dtype=np.int64)
         return cls(

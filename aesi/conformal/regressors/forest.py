@@ -11,10 +11,9 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.bands.band import State
-from aesi.conformal.bands.regression import FitTask, QuantileModel
+from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
 from aesi.numerics.trees import Splits, flatten, forest_quantiles
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, SavedState
 
 GRID_POINTS = 512
 TAIL = 2e-4
@@ -87,11 +86,11 @@ class ForestQuantiles(QuantileModel):
         )
         return out
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         return {"levels": self.levels, "grid": self.grid, "leaf_cdf": self.leaf_cdf, **vars(self.splits)}
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         real = {k: np.asarray(state[k], dtype=float) for k in ("levels", "grid", "leaf_cdf", "threshold")}
         whole = {k: np.asarray(state[k], dtype=np.int64) for k in ("roots", "feature", "left", "right")}
         splits = Splits(whole["roots"], whole["feature"], real["threshold"], whole["left"], whole["right"])

@@ -14,10 +14,9 @@ from typing import ClassVar, Self
 import numpy as np
 from numba import njit
 
-from aesi.conformal.bands.band import State
-from aesi.conformal.bands.regression import FitTask, QuantileModel
+from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
 from aesi.numerics.quantile_regression import fit_quantiles
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, SavedState
 
 
 @njit(cache=True)
@@ -52,11 +51,11 @@ class LinearQuantiles(QuantileModel):
         _affine(rows, self.intercept, self.slope, out)
         return out
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         return {"intercept": self.intercept, "slope": self.slope}
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         return cls(np.asarray(state["intercept"], dtype=float), np.asarray(state["slope"], dtype=float))
 
 

@@ -14,10 +14,9 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from aesi.conformal.bands.band import State
-from aesi.conformal.bands.regression import FitTask, Fitter, QuantileModel
 from aesi.conformal.regressors.linear import LinearQuantiles
-from aesi.numerics.typing import Array
+from aesi.conformal.regressors.model import FitTask, Fitter, Kinds, QuantileModel
+from aesi.numerics.typing import Array, SavedState
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +44,7 @@ class NormalisedQuantiles(QuantileModel):
         inside, middle, scale = _normalised(self.line, rows, self.n_history, self.floor_v)
         return np.asarray(middle[:, None] + scale[:, None] * self.inner.quantiles(inside))
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         return {
             "line": self.line.to_state(),
             "inner_kind": self.inner.kind,
@@ -55,12 +54,10 @@ class NormalisedQuantiles(QuantileModel):
         }
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
-        from aesi.conformal.registry import MODELS
-
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
         return cls(
-            LinearQuantiles.from_state(state["line"]),
-            MODELS[state["inner_kind"]].from_state(state["inner"]),
+            LinearQuantiles.from_state(state["line"], kinds),
+            kinds[state["inner_kind"]].from_state(state["inner"], kinds),
             int(state["n_history"]),
             float(state["floor_v"]),
         )

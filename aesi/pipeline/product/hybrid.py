@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.conformal import Calibrated, FreeRunBands
+from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
@@ -103,7 +103,7 @@ class HybridModel:
                 cell=Cell.from_bpx(part_file(folder, "cell.bpx")),
                 effects=tuple(ActiveEffect.from_dict(content) for content in parts.get("effects", ())),
                 correction=SparseModel.from_dict(correction) if correction else None,
-                intervals=Calibrated.from_dict(intervals) if intervals else None,
+                intervals=calibrated_from_dict(intervals) if intervals else None,
                 bands=FreeRunBands.from_dict(bands) if bands else None,
                 dt_s=float(head["dt_s"]),
                 hold=head["hold"],
