@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
-from aesi.physics.relations import Constant, Relation, tabulated
+from aesi.physics.cell.relations import Constant, Relation, tabulated
 
 OCP_POINTS = 8193
 ELECTROLYTE_POINTS = 2049

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from aesi.physics.bpx_read import CONTACT_RESISTANCE
-from aesi.physics.cell import Cell, Electrode
-from aesi.physics.relations import to_bpx
+from aesi.physics.cell.bpx_read import CONTACT_RESISTANCE
+from aesi.physics.cell.cell import Cell, Electrode
+from aesi.physics.cell.relations import to_bpx
 
 BPX_VERSION = "1.1.0"
 ELECTROLYTE_TABLE_MOL_M3 = (1.0, 4000.0)

@@ -10,10 +10,10 @@ import numpy as np
 from aesi.numerics.galerkin import StackModes, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
+from aesi.physics.cell.relations import Constant, Relation, Scaled, Sum
 from aesi.physics.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
+from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table
 from aesi.physics.model import EspmModel
-from aesi.physics.relations import Constant, Relation, Scaled, Sum
-from aesi.physics.tables import conductivity_table, electrolyte_diffusion, ocp_table
 from aesi.records import Hold
 
 
@@ -24,7 +24,7 @@ def run_plain(
 
     And the first sample at which a surface or the electrolyte left its range, -1 for none, with what it was.
     """
-    from aesi.physics.kernels import run_linear
+    from aesi.physics.espm.kernels import run_linear
 
     out = np.empty((7, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))

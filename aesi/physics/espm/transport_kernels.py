@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from aesi.physics.kernels import FASTMATH, SMALLEST_SALT, lookup, step_weights
+from aesi.physics.espm.kernels import FASTMATH, SMALLEST_SALT, lookup, step_weights
 
 GAS = 8.31446261815324
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
-from aesi.physics.expression import compile_expression
+from aesi.physics.cell.expression import compile_expression
 
 TABLE_POINTS_IN_BPX = 1025
 """Rows written where a relation has no closed form of its own (a table plus an expression)."""

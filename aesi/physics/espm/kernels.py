@@ -79,11 +79,11 @@ def run_linear(  # type: ignore[no-untyped-def]
     ocp_n, ocp_p, kappa, scalars,
     out,
 ):  # fmt: skip
-    """Step all samples; see `aesi.physics.espm` for the meaning of the rows of `out`, (7, n).
+    """Step all samples; see `aesi.physics.simulation` for the meaning of the rows of `out`, (7, n).
 
     theta0 : (2,) stoichiometries at rest.  rates, gains : (2, modes) 1/s and stoichiometry/(A s), mean
     excluded.
-    lump : (2,) stoichiometry/(A s) of the means.  scalars : see `aesi.physics.espm`.
+    lump : (2,) stoichiometry/(A s) of the means.  scalars : see `aesi.physics.simulation`.
     Returns the first sample at which a surface (1 negative, 2 positive) or the electrolyte (3) left its
     range.
     """

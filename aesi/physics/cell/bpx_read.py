@@ -7,9 +7,9 @@ from os import PathLike
 from typing import Any
 
 from aesi.errors import CellError
-from aesi.physics.bpx_schema import load_bpx
-from aesi.physics.cell import Cell, Electrode, Electrolyte, Separator, require_positive
-from aesi.physics.relations import Constant, Relation, relation
+from aesi.physics.cell.bpx_schema import load_bpx
+from aesi.physics.cell.cell import Cell, Electrode, Electrolyte, Separator, require_positive
+from aesi.physics.cell.relations import Constant, Relation, relation
 
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """A field of the user-defined section: BPX itself has none for it."""

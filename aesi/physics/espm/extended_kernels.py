@@ -10,9 +10,9 @@ import math
 import numpy as np
 from numba import njit
 
-from aesi.physics.electrode_kernels import drops, local_conductivity, solve_electrode
-from aesi.physics.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
-from aesi.physics.transport_kernels import (
+from aesi.physics.espm.electrode_kernels import drops, local_conductivity, solve_electrode
+from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
+from aesi.physics.espm.transport_kernels import (
     GAS,
     arrhenius,
     heated,

@@ -15,15 +15,15 @@ from aesi.numerics.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.constants import FARADAY_C_MOL
-from aesi.physics.model import EspmModel, Interface, Plating
-from aesi.physics.plain import stack_of
-from aesi.physics.tables import (
+from aesi.physics.espm.plain import stack_of
+from aesi.physics.espm.tables import (
     DiffusionTable,
     conductivity_table,
     electrolyte_diffusion,
     ocp_table,
     solid_diffusion,
 )
+from aesi.physics.model import EspmModel, Interface, Plating
 from aesi.records import Hold
 
 NO_PLATING = Plating(0.0, 0.5)
@@ -35,7 +35,7 @@ def run_extended(
     model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
 ) -> tuple[Array, dict[str, Array], int, int]:
     """Rows as `plain.run_plain`, then further states by name, then the first fault."""
-    from aesi.physics.extended_kernels import run_general
+    from aesi.physics.espm.extended_kernels import run_general
 
     out = np.empty((9, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))

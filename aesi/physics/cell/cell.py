@@ -14,8 +14,8 @@ import numpy as np
 
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
+from aesi.physics.cell.relations import Constant, Relation
 from aesi.physics.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
-from aesi.physics.relations import Constant, Relation
 
 NO_ENTROPY = Constant(0.0)
 
@@ -111,13 +111,13 @@ class Cell:
 
         Raises CellError, one sentence, for a file that fails the schema or lacks a field this model needs.
         """
-        from aesi.physics.bpx_read import read_bpx
+        from aesi.physics.cell.bpx_read import read_bpx
 
         return read_bpx(source)
 
     def to_bpx(self) -> dict[str, Any]:
         """The cell as a BPX 1.x dict; `Cell.from_bpx` gives the cell back."""
-        from aesi.physics.bpx_write import write_bpx
+        from aesi.physics.cell.bpx_write import write_bpx
 
         return write_bpx(self)
 

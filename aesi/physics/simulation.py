@@ -21,8 +21,8 @@ from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.constants import ZERO_CELSIUS_K
 from aesi.physics.effect import ActiveEffect, Record, Trace
+from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
-from aesi.physics.plain import run_plain
 from aesi.records import Hold, Run
 
 OnDepletion = Literal["raise", "clip"]
@@ -121,7 +121,7 @@ def _core(
         rows, fault_at, fault = run_plain(model, time, current, soc0, hold)
         kelvin = np.full(len(time), model.cell.initial_temperature_k)
         return rows, {"temperature_k": kelvin}, fault_at, fault
-    from aesi.physics.extended import run_extended
+    from aesi.physics.espm.extended import run_extended
 
     return run_extended(model, time, current, temperature, soc0, hold)
 

@@ -1,7 +1,7 @@
 """A BPX file as the mapping of BPX 1.x that it holds, checked against the schema before anything reads it.
 
 The schema is checked by the `bpx` package. Its own check of the stoichiometry limits runs the text of the
-open-circuit potentials as Python code, so these are read by `aesi.physics.expression` first and withheld
+open-circuit potentials as Python code, so these are read by `aesi.physics.cell.expression` first and withheld
 from it.
 """
 
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import CellError
-from aesi.physics.relations import relation
+from aesi.physics.cell.relations import relation
 
 STANDIN_TABLE = {"x": [0.0, 1.0], "y": [1.0, 0.0]}
 OCP_FIELDS = ("OCP [V]", "OCP (lithiation) [V]", "OCP (delithiation) [V]")

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numba import njit
 
-from aesi.physics.kernels import (
+from aesi.physics.espm.kernels import (
     BEYOND_RANGE_V,
     FASTMATH,
     SMALLEST_OCCUPANCY,
