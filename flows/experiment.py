@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.experiment.config import ExperimentConfig
 from flows import environment
 from flows.console import Console, duration
 from flows.order import Order
@@ -43,12 +43,12 @@ def run_order(order: Order, run: Run, console: Console) -> Path:
 def _stages(
     config: ExperimentConfig, order: Order, tracker: Tracker, run: Run, console: Console, started: float
 ) -> Path:
-    from aesi.pipeline.conformalise import conformalise
-    from aesi.pipeline.evaluate import evaluate
-    from aesi.pipeline.fit import build_problem, final_models
-    from aesi.pipeline.load import load
+    from aesi.pipeline.experiment.conformalise import conformalise
+    from aesi.pipeline.experiment.evaluate import evaluate
+    from aesi.pipeline.experiment.fit import build_problem, final_models
+    from aesi.pipeline.experiment.load import load
+    from aesi.pipeline.experiment.outputs import Result, write_outputs
     from aesi.pipeline.notes import together
-    from aesi.pipeline.outputs import Result, write_outputs
     from flows.cache import Cache
     from flows.studies import run_study
     from flows.tracked import CandidateTracker, track_result, track_start

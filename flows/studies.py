@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import FitError
-from aesi.pipeline.candidate import Scored, genome_space, scorer, weights
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.experiment.candidate import Scored, genome_space, scorer, weights
+from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, Problem
 from flows import environment, fingerprint
@@ -138,9 +138,9 @@ def study_key(problem: Problem, config: ExperimentConfig) -> str:
 
 def build_scorer(content: str, base: str) -> partial[Scored | Failed]:
     """The evaluating function from the experiment alone, for processes that share no memory with this one."""
-    from aesi.pipeline.config import parse_experiment
-    from aesi.pipeline.fit import build_problem
-    from aesi.pipeline.load import load
+    from aesi.pipeline.experiment.config import parse_experiment
+    from aesi.pipeline.experiment.fit import build_problem
+    from aesi.pipeline.experiment.load import load
 
     environment.prepare()
     config = parse_experiment(json.loads(content), Path(base))

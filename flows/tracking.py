@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
-from aesi.pipeline.sections import TrackingConfig
+from aesi.pipeline.experiment.sections import TrackingConfig
 from flows import environment
 from flows.mlflow_store import KIND, Store, now_ms
 from flows.outbox import Outbox
