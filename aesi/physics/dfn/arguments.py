@@ -12,7 +12,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.constants import FARADAY_C_MOL
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack
 from aesi.physics.model import EspmModel, Plating
-from aesi.physics.tables import conductivity_table, electrolyte_diffusion, ocp_table, solid_diffusion
+from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table, solid_diffusion
 
 NO_PLATING = Plating(0.0, 0.5)
 

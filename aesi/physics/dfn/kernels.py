@@ -7,8 +7,8 @@ from numba import njit
 
 from aesi.physics.dfn.step_kernels import GAS_OVER_FARADAY, advance, hold_layers, settle
 from aesi.physics.dfn.transport_kernels import renew, salt_forcing
-from aesi.physics.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
-from aesi.physics.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
+from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
+from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
 
 TEMPERATURE_STEP_K = 0.01
 """Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""

@@ -4,8 +4,8 @@ import math
 
 from numba import njit
 
-from aesi.physics.electrode_kernels import overpotential
-from aesi.physics.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY, lookup
+from aesi.physics.espm.electrode_kernels import overpotential
+from aesi.physics.espm.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY, lookup
 
 SMALLEST_SALT = 1e-4
 """Of the rest concentration: below it the logarithm goes on as its tangent."""

@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 
 from aesi.physics.dfn.local_kernels import SMALLEST_SALT, equilibrium, kinetic_drop, occupancy, salt_logarithm
-from aesi.physics.electrode_kernels import bounded_exp
-from aesi.physics.kernels import FASTMATH
+from aesi.physics.espm.electrode_kernels import bounded_exp
+from aesi.physics.espm.kernels import FASTMATH
 
 NEWTON_STEPS = 60
 UPDATE_TOLERANCE_V = 1e-6

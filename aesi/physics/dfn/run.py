@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack, State, Trial, Weights
-from aesi.physics.kernels import CACHE_SLOTS
+from aesi.physics.espm.kernels import CACHE_SLOTS
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
 
@@ -17,9 +18,16 @@ VOLTAGE_ROWS = 7
 def run_porous_electrode(
     model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
 ) -> tuple[Array, dict[str, Array], int, int]:
-    """As `extended.run_extended`: rows (7, n), further states by name, the first fault and what it was."""
+    """As `extended.run_extended`: rows (7, n), further states by name, the first fault and what it was.
+
+    Raises InputError for an electrode cut into regions.
+    """
     from aesi.physics.dfn.kernels import run_porous
 
+    if model.regions != 1:
+        raise InputError(
+            "reaction_nonuniformity is what the porous-electrode model has of itself; leave it out, or use model 'espm'."
+        )
     particles, stack, electrodes = porous_arguments(model)
     out = np.empty((9, len(time)))
     given = temperature_k is not None

@@ -12,9 +12,9 @@ from aesi.physics.dfn.transport_kernels import (
     salt_at_places,
     salt_forcing,
 )
-from aesi.physics.electrode_kernels import end_weight
-from aesi.physics.kernels import FASTMATH, lookup
-from aesi.physics.transport_kernels import GAS, arrhenius, solid_forcing
+from aesi.physics.espm.electrode_kernels import end_weight
+from aesi.physics.espm.kernels import FASTMATH, lookup
+from aesi.physics.espm.transport_kernels import GAS, arrhenius, solid_forcing
 
 GAS_OVER_FARADAY = GAS / 96485.33212331001
 SALT_TOLERANCE = 1e-4

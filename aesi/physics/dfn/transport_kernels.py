@@ -10,7 +10,7 @@ this without y1.
 
 from numba import njit
 
-from aesi.physics.kernels import FASTMATH, lookup, step_weights
+from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights
 
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
