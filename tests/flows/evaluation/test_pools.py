@@ -58,7 +58,7 @@ def test_a_hang_is_cut_off_and_the_pool_goes_on(pool):
 
 def test_an_exception_is_an_outcome_that_says_where(pool):
     odd, rejected, fine = outcomes(pool, [("raise", "odd"), ("reject", "no terms"), ("return", 1)])
-    assert odd.reason.startswith("ValueError: odd (in test_pool.py:")
+    assert odd.reason.startswith("ValueError: odd (in test_pools.py:")
     assert rejected == Failed("no terms")
     assert fine == 1
 
