@@ -68,8 +68,8 @@ def tables(
     """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
     from flows.base.console import Console
     from flows.results.tables import tables_of
+    from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.store import Store
-    from flows.tracking.tracker import deliver_leftovers
 
     deliver_leftovers(Store(uri), Console().say)
     typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))

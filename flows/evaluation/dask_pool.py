@@ -14,7 +14,8 @@ from typing import Any
 from aesi.errors import AesiError, InputError
 from aesi.records import Failed
 from flows.base import codec
-from flows.evaluation.local_pool import guarded
+from flows.evaluation.pool import guarded
+from flows.evaluation.scorer_recipe import build_scorer
 
 CONNECT_S = 15
 OWN_CLUSTER = {
@@ -64,7 +65,7 @@ def connect(address: str | None, workers: int) -> tuple[Any, Any]:
 
 
 class DaskPool:
-    """See `flows.evaluation.local_pool.Pool`.
+    """See `flows.evaluation.pool.Pool`.
 
     content, base : the experiment as JSON, and the folder its paths start from (which the workers must see).
     """
@@ -141,8 +142,6 @@ def evaluate_bytes(content: str, base: str, genome: bytes) -> bytes:
 
 @lru_cache(maxsize=1)
 def _scorer(content: str, base: str) -> Any:
-    from flows.search.study import build_scorer
-
     return build_scorer(content, base)
 
 

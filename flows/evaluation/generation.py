@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from flows.base import codec, fingerprint
-from flows.evaluation.local_pool import Pool
-from flows.evaluation.outcome_files import Outcomes
+from flows.evaluation.outcome_store import Outcomes
+from flows.evaluation.pool import Pool
 
 POLL_S = 0.2
 """How often candidates that another process has claimed are looked for."""

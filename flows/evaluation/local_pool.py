@@ -12,37 +12,17 @@ import signal
 import sys
 import threading
 import time
-import traceback
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from typing import Any, Protocol
+from typing import Any
 
-from aesi.errors import AesiError
 from aesi.records import Failed
-
-Evaluate = Callable[[Any], Any]
-"""A genome in, a Candidate or Failed out."""
+from flows.evaluation.pool import Evaluate, guarded
 
 WATCH_S = 1.0
 MEGABYTE = 1 << 20
-
-
-class Pool(Protocol):
-    """Who evaluates: `idle` candidates can be started at once; `collect` waits for finished ones."""
-
-    @property
-    def idle(self) -> int: ...
-
-    @property
-    def busy(self) -> int: ...
-
-    def start(self, tag: Any, genome: Any) -> None: ...
-
-    def collect(self, timeout_s: float) -> list[tuple[Any, Any]]: ...
-
-    def close(self) -> None: ...
 
 
 @dataclass
@@ -142,21 +122,6 @@ class LocalPool:
             process.start()
         theirs.close()
         return _Process(process, ours)
-
-
-def guarded(evaluate: Evaluate, genome: Any) -> Any:
-    """Evaluate; whatever goes wrong inside one candidate is an outcome of that candidate."""
-    try:
-        return evaluate(genome)
-    except AesiError as error:
-        return Failed(str(error))
-    except MemoryError:
-        return Failed("ran out of memory (search.memory_mb)")
-    except Exception as error:
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        return Failed(
-            f"{type(error).__name__}: {error} (in {os.path.basename(where.filename)}:{where.lineno})"
-        )
 
 
 def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, parent: int) -> None:

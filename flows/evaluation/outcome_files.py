@@ -1,54 +1,13 @@
-"""What has been computed, by content key, and who is computing what: on disk, or in a database.
-
-Every process on a study walks through the same deterministic search. Before it evaluates a candidate it looks
-here, then claims it; a claim ends with its owner, whatever ends the owner.
-"""
+"""Outcomes of candidates as files below a folder, claimed by file locks that the kernel drops with their process."""
 
 from __future__ import annotations
 
-import fcntl
-import os
+from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
+
+from filelock import FileLock, Timeout
 
 from flows.base.files import write_atomically
-
-
-class Outcomes(Protocol):
-    """A store of results by key; keys are hexadecimal."""
-
-    def get(self, key: str) -> bytes | None:
-        """What was stored under the key, or None."""
-        ...
-
-    def put(self, key: str, data: bytes) -> None:
-        """Store atomically: a reader sees all of it or nothing."""
-        ...
-
-    def discard(self, key: str) -> None:
-        """Forget a damaged entry."""
-        ...
-
-    def claim(self, key: str) -> bool:
-        """True if this process is now the one that computes the key."""
-        ...
-
-    def release(self, key: str) -> None:
-        """Give the claim back."""
-        ...
-
-    def close(self) -> None:
-        """Give back everything."""
-        ...
-
-
-def open_outcomes(folder: Path, url: str | None = None) -> Outcomes:
-    """A database where a URL is given, else the folder."""
-    if not url:
-        return FileOutcomes(folder)
-    from flows.evaluation.outcome_database import DatabaseOutcomes
-
-    return DatabaseOutcomes(url)
 
 
 class FileOutcomes:
@@ -56,7 +15,7 @@ class FileOutcomes:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._locks: dict[str, int] = {}
+        self._locks: dict[str, FileLock] = {}
 
     def get(self, key: str) -> bytes | None:
         try:
@@ -75,22 +34,20 @@ class FileOutcomes:
             return True
         path = self._folder / "claims" / key
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        lock = FileLock(path, thread_local=False)
         try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(handle)
+            lock.acquire(blocking=False)
+        except Timeout:
             return False
-        self._locks[key] = handle
+        self._locks[key] = lock
         return True
 
     def release(self, key: str) -> None:
-        handle = self._locks.pop(key, None)
-        if handle is not None:
-            (self._folder / "claims" / key).unlink(missing_ok=True)
-            # Evaluation processes are forks and hold a copy of the handle: unlock, do not merely close.
-            fcntl.flock(handle, fcntl.LOCK_UN)
-            os.close(handle)
+        lock = self._locks.pop(key, None)
+        if lock is not None:
+            with suppress(PermissionError):  # Windows keeps a file that is open
+                Path(lock.lock_file).unlink(missing_ok=True)
+            lock.release()
 
     def close(self) -> None:
         for key in list(self._locks):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from aesi.pipeline.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console, duration
-from flows.jobs.run_request import Order
+from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import working_on
 
 if TYPE_CHECKING:
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from flows.tracking.tracker import Tracker
 
 
-def run_order(order: Order, run: Run, console: Console) -> Path:
+def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
     """The flow itself; `run` runs a stage."""
     from flows.tracking.store import Store
 
     started = time.monotonic()
-    config = order.config()
+    config = request.config()
     console.say(f"{config.name}: {config.note}" if config.note else config.name)
     store = Store(config.tracking.uri)
-    with working_on(order, store, console) as tracker:
-        folder = _stages(config, order, tracker, run, console, started)
+    with working_on(request, store, console) as tracker:
+        folder = _stages(config, request, tracker, run, console, started)
     console.say(f"Finished in {duration(time.monotonic() - started)}.")
     console.say(f"Report: {_shown(folder / 'report.html')}")
     console.say(f"Runs:   aesi ui        Tables: aesi tables {config.name}")
@@ -41,7 +41,12 @@ def run_order(order: Order, run: Run, console: Console) -> Path:
 
 
 def _stages(
-    config: ExperimentConfig, order: Order, tracker: Tracker, run: Run, console: Console, started: float
+    config: ExperimentConfig,
+    request: RunRequest,
+    tracker: Tracker,
+    run: Run,
+    console: Console,
+    started: float,
 ) -> Path:
     from aesi.pipeline.conformalise import conformalise
     from aesi.pipeline.evaluate import evaluate
@@ -59,8 +64,8 @@ def _stages(
     track_start(tracker, config, loaded)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
     follow = CandidateTracker(tracker, config, loaded, problem)
-    found = run("search", lambda: run_study(problem, config, console, order.use_cache, follow))
-    cache = Cache(console.say, order.use_cache)
+    found = run("search", lambda: run_study(problem, config, console, request.use_cache, follow))
+    cache = Cache(console.say, request.use_cache)
     key = (config.digest, found.key)
     models = run(
         "final models",

@@ -9,8 +9,8 @@ from prefect import flow
 
 from flows.base import environment
 from flows.base.console import Console
-from flows.jobs.experiment import run_order
-from flows.jobs.run_request import Order
+from flows.jobs.experiment import run_experiment
+from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import as_tasks
 
 
@@ -26,9 +26,9 @@ def experiment(
     """The whole job of `aesi run`: data, physics, search, ensembles, intervals, tables, figures, report."""
     environment.prepare()
     console = Console()
-    order = Order(path, tuple(overrides or ()), runner, address, resume, use_cache)
-    limit_s = order.config().runner.stage_timeout_s
-    return run_order(order, as_tasks(console.say, limit_s), console)
+    request = RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
+    limit_s = request.config().runner.stage_timeout_s
+    return run_experiment(request, as_tasks(console.say, limit_s), console)
 
 
 @flow(name="discovery", flow_run_name="{path}", validate_parameters=False, persist_result=False)

@@ -10,7 +10,7 @@ from aesi.pipeline.config import ExperimentConfig, read_experiment
 
 
 @dataclass(frozen=True)
-class Order:
+class RunRequest:
     """An experiment file, what is laid over it, and how to run it."""
 
     path: str

@@ -13,7 +13,7 @@ from aesi.errors import AesiError
 from aesi.pipeline.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console
-from flows.jobs.run_request import Order
+from flows.jobs.run_request import RunRequest
 from flows.tracking.run_records import RunLock, RunRecord, records
 
 if TYPE_CHECKING:
@@ -29,19 +29,19 @@ class DiskFull(AesiError):
 
 
 @contextmanager
-def working_on(order: Order, store: Store, console: Console) -> Iterator[Tracker]:
+def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[Tracker]:
     """The tracked run to work on, new or resumed, closed as what it becomes.
 
     Raises DiskFull, with what to do, where there is no room for what the run has to keep.
     """
-    config = order.config()
-    with _advice_where_full(order):
-        tracker, record = _begin(order, config, store, console)
+    config = request.config()
+    with _advice_where_full(request):
+        tracker, record = _begin(request, config, store, console)
         with RunLock(tracker.run_id):
             try:
                 yield tracker
             except KeyboardInterrupt:
-                console.say(f"Stopped. Everything so far is kept; go on with: {order.resuming}")
+                console.say(f"Stopped. Everything so far is kept; go on with: {request.resuming}")
                 _close(record, tracker, "killed", wait_s=5)
                 raise
             except BaseException:
@@ -56,14 +56,15 @@ def working_on(order: Order, store: Store, console: Console) -> Iterator[Tracker
 
 
 def _begin(
-    order: Order, config: ExperimentConfig, store: Store, console: Console
+    request: RunRequest, config: ExperimentConfig, store: Store, console: Console
 ) -> tuple[Tracker, RunRecord]:
     """The tracker of the run to work on and its record, after what earlier runs have left is put in order."""
-    from flows.tracking.tracker import Tracker, deliver_leftovers
+    from flows.tracking.leftovers import deliver_leftovers
+    from flows.tracking.tracker import Tracker
 
     _close_killed(config.name, store, console)
     deliver_leftovers(store, console.say)
-    old = _unfinished(config, store, console) if order.resume else None
+    old = _unfinished(config, store, console) if request.resume else None
     tracker = Tracker(store, config, console.say, old.run_id if old else None)
     record = (
         replace(old, status="running")
@@ -76,7 +77,7 @@ def _begin(
 
 
 @contextmanager
-def _advice_where_full(order: Order) -> Iterator[None]:
+def _advice_where_full(request: RunRequest) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -84,7 +85,7 @@ def _advice_where_full(order: Order) -> Iterator[None]:
             raise
         raise DiskFull(
             f"no room is left for {environment.workspace()} ({error.strerror}); everything so far is kept: free "
-            f"some space, then go on with: {order.resuming}"
+            f"some space, then go on with: {request.resuming}"
         ) from error
 
 

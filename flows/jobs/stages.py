@@ -50,7 +50,7 @@ def as_tasks(say: Say, timeout_s: float | None = None) -> Run:
 
     They close over what they need instead of taking it as parameters, because Prefect would walk through
     every array it is handed; what they compute is kept by content (`flows.base.stage_cache`,
-    `flows.evaluation.outcome_files`), with and without Prefect. Bad input is not tried again.
+    `flows.evaluation.outcome_store`), with and without Prefect. Bad input is not tried again.
     """
     from prefect import task
     from prefect.cache_policies import NO_CACHE

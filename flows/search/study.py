@@ -6,20 +6,18 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 from aesi.errors import FitError
-from aesi.pipeline.candidate import Scored, genome_space, scorer, weights
+from aesi.pipeline.candidate import Scored, genome_space, weights
 from aesi.pipeline.config import ExperimentConfig
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, Problem
 from flows.base import environment, fingerprint
 from flows.base.console import Console
 from flows.evaluation.generation import Evaluation, Tally
-from flows.evaluation.local_pool import LocalPool, Pool
-from flows.evaluation.outcome_files import Outcomes, open_outcomes
+from flows.evaluation.open_pool import open_pool
+from flows.evaluation.outcome_store import Outcomes, open_outcomes
 from flows.search.nsga2 import Constraints, search
 from flows.search.result import SearchResult
 
@@ -72,7 +70,7 @@ def run_study(
     Raises FitError, with the reasons counted, where no candidate is feasible.
     """
     outcomes = shared_outcomes(config)
-    pool = _pool(problem, config)
+    pool = open_pool(problem, config)
     tally = tally or Tally()
     evaluation = Evaluation(pool, outcomes, study_key(problem, config), console.say, tally, reuse)
     scored: dict[int, Scored | Failed] = {}
@@ -134,42 +132,6 @@ def study_key(problem: Problem, config: ExperimentConfig) -> str:
     return fingerprint.key(
         fingerprint.code(), *(record.digest for record in records), json.dumps(settings, default=str)
     )
-
-
-def build_scorer(content: str, base: str) -> partial[Scored | Failed]:
-    """The evaluating function from the experiment alone, for processes that share no memory with this one."""
-    from aesi.pipeline.config import parse_experiment
-    from aesi.pipeline.fit import build_problem
-    from aesi.pipeline.load import load
-
-    environment.prepare()
-    config = parse_experiment(json.loads(content), Path(base))
-    return scorer(build_problem(load(config), config), config)
-
-
-def _pool(problem: Problem, config: ExperimentConfig) -> Pool:
-    content = config.model_dump_json()
-    search = config.search
-    if config.runner.kind == "dask":
-        from flows.evaluation.dask_pool import DaskPool
-
-        return DaskPool(content, str(config.base), config.runner.address, search.workers, search.timeout_s)
-    build = _Builder(partial(scorer, problem, config), partial(build_scorer, content, str(config.base)))
-    return LocalPool(build, search.workers, search.timeout_s, search.memory_mb)
-
-
-class _Builder:
-    """Makes the evaluating function in a process; only the recipe travels where memory is not shared."""
-
-    def __init__(self, shared: Callable[[], Any], recipe: Callable[[], Any]) -> None:
-        self._shared: Callable[[], Any] | None = shared
-        self._recipe = recipe
-
-    def __call__(self) -> Any:
-        return (self._shared or self._recipe)()
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {"_shared": None, "_recipe": self._recipe}
 
 
 def _best(scored: dict[int, Scored | Failed]) -> str:

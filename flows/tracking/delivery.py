@@ -113,3 +113,8 @@ SENDERS: dict[str, Callable[[Store, Item, bool], None]] = {
     "end": _send_end,
 }
 """Kind of item -> what sends it: to a store, an item, and whether it may have been sent before."""
+
+
+def deliver(store: Store, item: Item, again: bool) -> None:
+    """Send an item; `again` says that it may have been sent before."""
+    SENDERS[item["kind"]](store, item, again)

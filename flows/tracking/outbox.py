@@ -21,6 +21,8 @@ Deliver = Callable[[Item, bool], None]
 """Sends one item; the flag says that it may have been sent before."""
 
 RETRY_S = (1.0, 2.0, 5.0, 10.0, 20.0)
+FLUSH_S = 60.0
+"""How long a store may stand still before an ending run stops waiting for it."""
 REFUSED = "refused"
 TRIES = 3
 """Failures of one item before a store that answers is taken to refuse it."""

@@ -6,12 +6,12 @@ process that works on the run, and the kernel frees it with that process.
 
 from __future__ import annotations
 
-import fcntl
 import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import IO
+
+from filelock import FileLock, Timeout
 
 from flows.base import environment
 from flows.base.files import write_atomically
@@ -49,28 +49,25 @@ class RunLock:
     """The right to work on a run; `held` says whether this process has it."""
 
     def __init__(self, run_id: str) -> None:
-        self._path = _folder() / f"{run_id}.lock"
-        self._stream: IO[str] | None = None
-        self.held = False
+        self._lock = FileLock(_folder() / f"{run_id}.lock", thread_local=False)
+
+    @property
+    def held(self) -> bool:
+        """Whether this process works on the run."""
+        return self._lock.is_locked
 
     def acquire(self) -> bool:
         """Take the lock if nobody has it."""
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        self._stream = self._path.open("w")
+        _folder().mkdir(parents=True, exist_ok=True)
         try:
-            fcntl.flock(self._stream, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._stream.close()
+            self._lock.acquire(blocking=False)
+        except Timeout:
             return False
-        self.held = True
         return True
 
     def release(self) -> None:
         """Give it back."""
-        if self.held and self._stream is not None:
-            fcntl.flock(self._stream, fcntl.LOCK_UN)
-            self._stream.close()
-            self.held = False
+        self._lock.release()
 
     def __enter__(self) -> RunLock:
         self.acquire()

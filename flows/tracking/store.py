@@ -1,7 +1,7 @@
 """The tracking store, spoken to through MLflow's client with explicit run ids.
 
-Nothing here decides what is tracked (`flows.tracking.tracker` does); this sends items, knows whether a failure
-passes, and sends an item twice without doubling it.
+Nothing here decides what is tracked (`flows.tracking.tracker`) or how an item gets there (`flows.tracking.delivery`):
+this makes experiments and runs, finds them, and knows whether a failure passes.
 """
 
 from __future__ import annotations
@@ -17,9 +17,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from filelock import FileLock
+
 from aesi.errors import AesiError
 from flows.base import environment
-from flows.tracking.outbox import Item
 
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
@@ -112,12 +113,6 @@ class Store:
             return False
         return True
 
-    def deliver(self, item: Item, again: bool) -> None:
-        """Send an item; `again` says that it may have been sent before."""
-        from flows.tracking.delivery import SENDERS
-
-        SENDERS[item["kind"]](self, item, again)
-
 
 def now_ms() -> int:
     """Milliseconds since the epoch, as MLflow counts."""
@@ -130,12 +125,9 @@ def _alone(local: bool) -> Iterator[None]:
     if not local:
         yield
         return
-    import fcntl
-
     path = environment.state() / "mlflow.lock"
     path.parent.mkdir(parents=True, exist_ok=True)
-    with path.open("w") as handle:
-        fcntl.flock(handle, fcntl.LOCK_EX)
+    with FileLock(path):
         yield
 
 

@@ -10,18 +10,19 @@ import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
 from aesi.pipeline.sections import TrackingConfig
 from flows.base import environment
-from flows.tracking.outbox import Outbox
+from flows.tracking.delivery import deliver
+from flows.tracking.outbox import FLUSH_S, Outbox
 from flows.tracking.provenance import source_tags
 from flows.tracking.store import KIND, Store, now_ms
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 SAMPLE_S = 10.0
-FLUSH_S = 60.0
 
 
 class Trackable(Protocol):
@@ -75,7 +76,9 @@ class Tracker:
             self.run_id = run_id
             store.client.update_run(run_id, status="RUNNING")
             self._tracked = set(store.children(self._experiment_id, run_id))
-        self._outbox = Outbox(outbox_folder(self.run_id), store.deliver, store.away, say)
+        self._outbox = Outbox(
+            environment.state() / "outbox" / self.run_id, partial(deliver, store), store.away, say
+        )
         self._tracked |= {item["label"] for item in self._outbox.items() if item["kind"] == "run"}
         self._stop = threading.Event()
         if config.tracking.system_metrics:
@@ -203,38 +206,6 @@ class Tracker:
                 step,
             )
             step += 1
-
-
-def outbox_folder(run_id: str) -> Path:
-    """Where a run's undelivered items wait."""
-    return environment.state() / "outbox" / run_id
-
-
-def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = FLUSH_S) -> None:
-    """Deliver what ended runs could not, where no living run does."""
-    from flows.tracking.run_records import RunLock
-
-    for folder in sorted((environment.state() / "outbox").glob("*")):
-        if not any(folder.glob("[0-9]*.json")) or not _belongs(store, folder.name):
-            continue
-        with RunLock(folder.name) as lock:
-            if not lock.held:
-                continue
-            outbox = Outbox(folder, store.deliver, store.away, say)
-            left = outbox.flush(wait_s)
-            outbox.close()
-            if not left:
-                say(f"tracking: what run {folder.name[:8]} had left over is delivered.")
-
-
-def _belongs(store: Store, run_id: str) -> bool:
-    from mlflow.exceptions import MlflowException
-
-    try:
-        store.client.get_run(run_id)
-    except MlflowException:
-        return False
-    return True
 
 
 def flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from flows.tracking.leftovers import deliver_leftovers
 from flows.tracking.store import KIND, Store
-from flows.tracking.tracker import deliver_leftovers
 
 pytestmark = pytest.mark.slow
 

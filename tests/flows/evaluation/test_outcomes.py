@@ -11,7 +11,8 @@ import pytest
 from aesi.errors import InputError
 from flows.base.files import write_atomically
 from flows.evaluation.outcome_database import DatabaseOutcomes
-from flows.evaluation.outcome_files import FileOutcomes, open_outcomes
+from flows.evaluation.outcome_files import FileOutcomes
+from flows.evaluation.outcome_store import open_outcomes
 
 KEY = "ab" * 16
 

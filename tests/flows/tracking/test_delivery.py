@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from flows.tracking.delivery import deliver
 from flows.tracking.store import KIND, Store
 
 CONTENT = {"bagging": {"T1(I)": 0.25}}
@@ -51,7 +52,7 @@ def coefficients(store, run):
 
 def test_sent_again_it_is_one_run(store, item):
     for again in (False, True, True):
-        store.deliver(item("candidate:1"), again)
+        deliver(store, item("candidate:1"), again)
     (run,) = children(store, item).values()
     assert coefficients(store, run) == CONTENT
     assert run.data.metrics == {"fitness": 0.5, "loss/oob": 1e-9}
@@ -59,6 +60,6 @@ def test_sent_again_it_is_one_run(store, item):
 
 
 def test_a_failed_candidate_has_neither_metrics_nor_files(store, item):
-    store.deliver(item("candidate:1", metrics={}, files={}, status="FAILED"), again=False)
+    deliver(store, item("candidate:1", metrics={}, files={}, status="FAILED"), again=False)
     (run,) = children(store, item).values()
     assert (run.info.status, run.data.metrics) == ("FAILED", {})
