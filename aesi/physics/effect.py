@@ -23,6 +23,8 @@ from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
 
 Kind = Literal["physics", "parameter", "instrument"]
+Measurable = Literal["temperature"]
+"""Quantities that a record may hold beside current and voltage."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,11 @@ class Contribution:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source."""
+    """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source.
+
+    infers : the quantity that the effect supplies where it was not measured; with the measurement it has nothing to
+    say and does not compete.
+    """
 
     id: str
     kind: Kind
@@ -71,6 +77,7 @@ class Effect:
     on_voltage: Callable[..., Contribution] | None = None
     on_reading: Callable[..., Array] | None = None
     file: str | None = None
+    infers: Measurable | None = None
 
     def __reduce__(self) -> tuple[Any, ...]:
         from aesi.physics.effects import find_effect

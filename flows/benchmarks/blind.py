@@ -12,7 +12,7 @@ from typing import Any
 
 from aesi.bench.blind import chosen, judged, summary
 from aesi.data.blind import CaseSpec
-from aesi.pipeline.sections import TrackingConfig
+from aesi.pipeline.experiment.sections import TrackingConfig
 
 SHOWN = ("cell", "label", "target_mv", "verdict", "effects", "indistinguishable", "error")
 

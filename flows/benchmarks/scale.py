@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.pipeline.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.records import Failed
 from aesi.sparse import Genome, Problem
 
@@ -40,8 +40,8 @@ def run(
 
     overrides : laid over the experiment, so that a candidate takes about a second.
     """
-    from aesi.pipeline.fit import build_problem
-    from aesi.pipeline.load import load
+    from aesi.pipeline.experiment.fit import build_problem
+    from aesi.pipeline.experiment.load import load
     from flows.base import environment
 
     environment.prepare()

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.ensemble import synthetic_record
-from aesi.pipeline.sections import TrackingConfig
+from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.records import INPUT_NAMES, Split
 from aesi.sparse import Genome, Library, Options, Problem, evaluate
 from aesi.sparse.inputs import with_inputs

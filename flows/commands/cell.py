@@ -122,7 +122,7 @@ def discover(
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
-    from aesi.pipeline.cases import case_of_files
+    from aesi.pipeline.discovery.cases import case_of_files
 
     case = case_of_files(
         cell,

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from aesi.pipeline.candidate import scorer
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.experiment.candidate import scorer
+from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.sparse import Problem
 from flows.evaluation.local_pool import LocalPool
 from flows.evaluation.pool import Pool

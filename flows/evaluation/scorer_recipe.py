@@ -6,16 +6,16 @@ import json
 from functools import partial
 from pathlib import Path
 
-from aesi.pipeline.candidate import Scored, scorer
+from aesi.pipeline.experiment.candidate import Scored, scorer
 from aesi.records import Failed
 from flows.base import environment
 
 
 def build_scorer(content: str, base: str) -> partial[Scored | Failed]:
     """The evaluating function of an experiment given as JSON; `base` is the folder its paths start from."""
-    from aesi.pipeline.config import parse_experiment
-    from aesi.pipeline.fit import build_problem
-    from aesi.pipeline.load import load
+    from aesi.pipeline.experiment.config import parse_experiment
+    from aesi.pipeline.experiment.fit import build_problem
+    from aesi.pipeline.experiment.load import load
 
     environment.prepare()
     config = parse_experiment(json.loads(content), Path(base))

@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.discover import ARCHIVE, MV, Case, catalogue, declared, run_case, write_discovery
+from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, catalogue, run_case, write_discovery
+from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
 from flows.base import environment
 from flows.base.console import Console, duration
@@ -34,7 +35,7 @@ def discover(
     Raises AesiError, one sentence, for what cannot be used; nothing is started then.
     """
     environment.prepare()
-    declared(case.cell)
+    declared_model(case.cell)
     catalogue(case.effect_files)
     if use_prefect or (use_prefect is None and os.environ.get("PREFECT_API_URL")):
         return _as_flow(case, out, experiment)
@@ -52,8 +53,8 @@ def discover_experiment(path: str, overrides: Sequence[str] = (), out: Path | No
 
 def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, str]:
     """The case of an experiment file, the folder of its results, and the name it is tracked under."""
-    from aesi.pipeline.cases import case_of_experiment
-    from aesi.pipeline.config import read_experiment
+    from aesi.pipeline.discovery.cases import case_of_experiment
+    from aesi.pipeline.experiment.config import read_experiment
 
     config = read_experiment(path, overrides)
     folder = out or environment.workspace() / "runs" / config.name / "discovery"

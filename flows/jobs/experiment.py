@@ -13,7 +13,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.jobs.run_request import RunRequest
@@ -48,12 +48,12 @@ def _stages(
     console: Console,
     started: float,
 ) -> Path:
-    from aesi.pipeline.conformalise import conformalise
-    from aesi.pipeline.evaluate import evaluate
-    from aesi.pipeline.fit import build_problem, final_models
-    from aesi.pipeline.load import load
+    from aesi.pipeline.experiment.conformalise import conformalise
+    from aesi.pipeline.experiment.evaluate import evaluate
+    from aesi.pipeline.experiment.fit import build_problem, final_models
+    from aesi.pipeline.experiment.load import load
+    from aesi.pipeline.experiment.outputs import Result, write_outputs
     from aesi.pipeline.notes import together
-    from aesi.pipeline.outputs import Result, write_outputs
     from flows.base.stage_cache import Cache
     from flows.search.study import run_study
     from flows.tracking.experiment_log import CandidateTracker, track_result, track_start

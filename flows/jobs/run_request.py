@@ -6,7 +6,7 @@ import shlex
 from dataclasses import dataclass
 from typing import Literal
 
-from aesi.pipeline.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aesi.errors import AesiError
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console
 from flows.jobs.run_request import RunRequest

@@ -13,14 +13,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from aesi.errors import FitError
-from aesi.pipeline.config import read_experiment
+from aesi.pipeline.experiment.config import read_experiment
 from flows.base.console import Console, duration
 
 
 def work(path: Path, overrides: Sequence[str]) -> int:
     """Evaluate candidates of an experiment until all are known; returns how many this process evaluated."""
-    from aesi.pipeline.fit import build_problem
-    from aesi.pipeline.load import load
+    from aesi.pipeline.experiment.fit import build_problem
+    from aesi.pipeline.experiment.load import load
     from flows.evaluation.generation import Tally
     from flows.search.study import run_study
 

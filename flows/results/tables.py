@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from aesi.errors import InputError
-from aesi.pipeline import tables
+from aesi.pipeline.report import tables
 from flows.tracking.store import KIND, Store
 
 Row = dict[str, Any]
@@ -92,7 +92,7 @@ def _at(row: Mapping[str, Any], *keys: str) -> Any:
 def _name(experiment: str) -> str:
     path = Path(experiment)
     if path.suffix in (".yaml", ".yml"):
-        from aesi.pipeline.config import read_experiment
+        from aesi.pipeline.experiment.config import read_experiment
 
         return read_experiment(path).name if path.exists() else path.stem
     return experiment

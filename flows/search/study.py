@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from aesi.errors import FitError
-from aesi.pipeline.candidate import Scored, genome_space, weights
-from aesi.pipeline.config import ExperimentConfig
+from aesi.pipeline.experiment.candidate import Scored, genome_space, weights
+from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, Problem
 from flows.base import environment, fingerprint

@@ -8,10 +8,10 @@ from math import log10
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline.candidate import Scored
-from aesi.pipeline.config import ExperimentConfig
-from aesi.pipeline.load import ROLES, Loaded
-from aesi.records import Failed
+from aesi.pipeline.experiment.candidate import Scored
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.load import Loaded
+from aesi.records import ROLES, Failed
 from aesi.sparse import Genome, Problem, SparseModel
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
-from aesi.pipeline.sections import TrackingConfig
+from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
 from flows.tracking.delivery import deliver
 from flows.tracking.outbox import FLUSH_S, Outbox

@@ -8,9 +8,9 @@ import pytest
 
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline import discover as pipeline
-from aesi.pipeline.discover import Case
-from aesi.pipeline.hybrid import HybridModel
+from aesi.pipeline.discovery import discover as pipeline
+from aesi.pipeline.discovery.discover import Case
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 
 CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
