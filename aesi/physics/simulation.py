@@ -1,10 +1,10 @@
 """`simulate`: current in, voltage and internal states out, by one of two models of the same cell.
 
-"dfn" is the porous electrode, see `aesi.physics.dfn`. "espm", the default, is the extended single-particle
-model: solid diffusion in one particle an electrode, electrolyte diffusion through the three layers, Butler-Volmer kinetics averaged over each electrode with the surface and local
-electrolyte concentrations, electrolyte potential with the conductivity at the mean concentration, ohmic drop
-of the solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693,
-doi:10.1149/2.0341915jes.
+"espm", the default, is the extended single-particle model: solid diffusion in one particle an electrode, electrolyte
+diffusion through the three layers, Butler-Volmer kinetics averaged over each electrode with the surface and local
+electrolyte concentrations, electrolyte potential with the conductivity at the mean concentration, ohmic drop of the
+solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693, doi:10.1149/2.0341915jes.
+"dfn" is the porous electrode, see `aesi.physics.dfn`.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from typing import Literal
 
 import numpy as np
 
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
-from aesi.physics.constants import ZERO_CELSIUS_K
 from aesi.physics.effect import ActiveEffect, Record, Trace
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
@@ -117,8 +117,8 @@ def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, .
 Solver = Callable[
     [EspmModel, Array, Array, Array | None, float, Hold], tuple[Array, dict[str, Array], int, int]
 ]
-"""(model, time, current, temperature or None, soc0, hold) -> rows as `plain.run_plain`, further states by name, the first
-fault and what it was."""
+"""(model, time, current, temperature or None, soc0, hold) -> rows as `plain.run_plain`, further states by name, the
+first fault and what it was."""
 
 
 def _solver(name: str) -> Solver:
@@ -129,7 +129,9 @@ def _solver(name: str) -> Solver:
         from aesi.physics.dfn.run import run_porous_electrode
 
         return run_porous_electrode
-    raise InputError(f"there is no model {name!r}; give 'espm' (single particle) or 'dfn' (porous electrode).")
+    raise InputError(
+        f"there is no model {name!r}; give 'espm' (single particle) or 'dfn' (porous electrode)."
+    )
 
 
 def _solved(

@@ -11,7 +11,7 @@ import numpy as np
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.read import Sign
 from aesi.errors import DataError, InputError
-from aesi.physics import simulate
+from aesi.physics import ModelName, simulate
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, Run
@@ -35,12 +35,14 @@ def simulate_file(
     columns: Mapping[str, str | None] | None = None,
     sign: Sign = "discharge-positive",
     say_notes: SayNotes | None = None,
+    model: ModelName = "espm",
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     soc0 : None takes it from the first voltage of the file, where it has one, else from the saved model.
     say_notes : is given what the reader dropped or mapped, one sentence each.
+    model : "espm" or "dfn".
     """
     profile = _read(current, columns, sign, say_notes)
     declared = declared_model(cell)
@@ -59,6 +61,7 @@ def simulate_file(
         profile.temperature_degc,
         hold,
         rest_voltage_v=rest,
+        model=model,
     )
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out)

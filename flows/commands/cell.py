@@ -21,6 +21,7 @@ def simulate(
     hold: options.Hold = "linear",
     column: options.Columns = None,
     sign: options.Sign = "discharge-positive",
+    model: options.Model = "espm",
 ) -> None:
     """The physics model alone, under a current profile."""
     from aesi.pipeline.simulation import simulate_file
@@ -36,6 +37,7 @@ def simulate(
         columns=options.columns(column),
         sign=sign,
         say_notes=options.say_notes,
+        model=model,
     )
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
     typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)
@@ -79,7 +81,7 @@ def calibrate(
     sign: options.Sign = "discharge-positive",
 ) -> None:
     """Fit the physics model's own parameters to measurements."""
-    from flows.calibrate import calibrate as flow
+    from flows.jobs.calibration import calibrate as flow
 
     flow(cell, options.measurements(data, column, sign), out, soc0=soc0, seed=seed)
 
@@ -114,8 +116,8 @@ def discover(
     ] = None,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
-    from flows.discover import discover as flow
-    from flows.discover import discover_experiment
+    from flows.jobs.discovery import discover as flow
+    from flows.jobs.discovery import discover_experiment
 
     if experiment is not None:
         discover_experiment(str(experiment), list(overrides or []), out)

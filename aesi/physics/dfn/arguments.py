@@ -6,13 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
+from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.collocation import gauss_layer, lobatto_to
 from aesi.numerics.galerkin import sphere_modes, stack_modes
 from aesi.numerics.typing import Array
-from aesi.physics.constants import FARADAY_C_MOL
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack
-from aesi.physics.model import EspmModel, Plating
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table, solid_diffusion
+from aesi.physics.model import EspmModel, Plating
 
 NO_PLATING = Plating(0.0, 0.5)
 
@@ -28,7 +28,8 @@ def _particles(model: EspmModel) -> Particles:
     sphere, layer = sphere_modes(model.solid_order), gauss_layer(model.electrode_points)
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     place, kind, scale, share, volume, exchange = [], [], [], [], [], []
-    sides, rates = [], []
+    sides: list[int] = []
+    rates: list[Array] = []
     parts = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))
     for side, (electrode, interface) in enumerate(parts):
         first = len(rates)
@@ -126,7 +127,9 @@ def _electrodes(model: EspmModel) -> Electrodes:
         capacity=np.concatenate(capacity),
         exchange=np.concatenate(exchange),
         node_share=np.concatenate([layer.weight, layer.weight]),
-        plating=np.array([area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient, e.c0_mol_m3]),
+        plating=np.array(
+            [area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient, e.c0_mol_m3]
+        ),
         plating_to_c=1.0 / (FARADAY_C_MOL * n.thickness_m),
         energies=_energies(model),
         heat=_heat(model),

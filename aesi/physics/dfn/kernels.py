@@ -18,7 +18,22 @@ DIFFUSIONS = (0, 1, 4)
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
 def run_porous(  # type: ignore[no-untyped-def]
-    time, current, temperature, given, backward, substep, most, theta0, p, s, e, state, t, weights, out, profile
+    time,
+    current,
+    temperature,
+    given,
+    backward,
+    substep,
+    most,
+    theta0,
+    p,
+    s,
+    e,
+    state,
+    t,
+    weights,
+    out,
+    profile,
 ):
     """Step all samples; `layout` says what the named tuples hold.
 
@@ -71,7 +86,12 @@ def run_porous(  # type: ignore[no-untyped-def]
                     faster[i] = arrhenius(e.energies[DIFFUSIONS[i]], t_k, e.reference_k)
             key = np.int64(dt * NANOSECONDS + 0.5)
             slot = key % CACHE_SLOTS
-            w, taken, w_salt, spread = weights.particle[slot], weights.taken[slot], weights.salt[slot], weights.spread[slot]
+            w, taken, w_salt, spread = (
+                weights.particle[slot],
+                weights.taken[slot],
+                weights.salt[slot],
+                weights.spread[slot],
+            )
             if weights.keys[slot] != key:
                 weights.keys[slot] = key
                 renew(p, s, faster, dt, w, taken, w_salt, spread)
@@ -88,7 +108,9 @@ def run_porous(  # type: ignore[no-untyped-def]
                     gone = e.plating_to_c * state.plating[r] * dt / e.node_share[r]
                     state.plated[r] = max(state.plated[r] - gone, 0.0)
             if e.heat[0] > 0.0:
-                power = heat_power(p, e, state, half, i1, voltage_of(s, e, state, phi_n, phi_p, total[0], t_k), t_k)
+                power = heat_power(
+                    p, e, state, half, i1, voltage_of(s, e, state, phi_n, phi_p, total[0], t_k), t_k
+                )
                 if not given:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat)
                 watts = power

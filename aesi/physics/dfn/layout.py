@@ -15,7 +15,7 @@ class Particles(NamedTuple):
     """Constants of the units.
 
     place, kind : (units,) where, and which row of `rates`.  side : (kinds,) electrode.  scale : (units,)
-    stoichiometry/(A/m2 s) per unit gain.  share, volume : (units,) of the reaction and of the material of its electrode.
+    stoichiometry/(A/m2 s) per unit gain.  share, volume : (units,) of its electrode's reaction and material.
     exchange : (units,) A/m2 at unit salt and occupancy.  rates : (kinds, modes) 1/s.  gains : (modes,).
     psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
     """
@@ -38,10 +38,10 @@ class Particles(NamedTuple):
 class Stack(NamedTuple):
     """Constants of the electrolyte.
 
-    rates : (modes,) 1/s.  at : (places, modes) salt at the places, which is also how the reaction there feeds the modes.
+    rates : (modes,) 1/s.  at : (places, modes) salt at the places, and how the reaction there feeds the modes.
     to_nodes, project : (nodes, modes) both ways.  psi, strength, top : the variable part of diffusion.  c0 : mol/m3.
     supply : mol/C, (1 - t+) / F.  kappa : table of conductivity on [0, top].
-    gap_at, gap_path : points in the separator (points, modes), and thickness over transport efficiency there (points,) m.
+    gap_at, gap_path : points in the separator (points, modes), and thickness over transport efficiency (points,) m.
     path : (2,) the same of the electrodes.
     """
 
@@ -64,7 +64,8 @@ class Electrodes(NamedTuple):
     """Constants of both electrodes and of the cell.
 
     before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.  ocp, entropic : (2, table).
-    alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.  node_share : (places,) weights.  plating : rate A/m2 of cell at c0, transfer coefficient, c0.
+    alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.  node_share : (places,) weights.
+    plating : rate A/m2 of cell at c0, transfer coefficient, c0.
     plating_to_c : mol/m3 per C/m2.  energies : (6,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
     transference : cation transference number.
     """
@@ -91,8 +92,8 @@ class Electrodes(NamedTuple):
 class State(NamedTuple):
     """What a step changes.
 
-    z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y has left its share of the
-    current.  theta : (units,) surfaces.  force : (units, modes + 1).  q, forcing : (salt modes,).  c : (nodes,) mol/m3.
+    z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y leaves its share of
+    the current.  theta : (units,) surfaces.  force : (units, modes + 1).  q, forcing : (salt modes,).  c : (nodes,) mol/m3.
     given : (places,) A/m2.  psi : (places,) V.  salt : (places,) over rest.  layer : (places,) A/m2 into double layers.
     plated : (places,) mol/m3.  plating : (places,) A/m2.
     """

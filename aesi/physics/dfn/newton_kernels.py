@@ -6,8 +6,8 @@ Places are the Gauss points, those of the negative electrode first, each counted
     psi_r + chi ln s_r + sum_v ohm[r, v] Y_v = Phi        with the collector's potential Phi of its electrode,
     Y_r = sum_u y_u + double layer + plating,             sum over an electrode Y_v = its current,
 
-with theta_u = reach_u - give_u y_u and s_r = calm_r + sum_v spread[r, v] Y_v: what particles and salt do within a step is
-linear in the reaction at its end. Newton's method on Y and Phi; units and psi are eliminated place by place.
+with theta_u = reach_u - give_u y_u and s_r = calm_r + sum_v spread[r, v] Y_v: what particles and salt do within a
+step is linear in the reaction at its end. Newton's method on Y and Phi; units and psi are eliminated place by place.
 """
 
 import math
@@ -33,7 +33,8 @@ def solve_reaction(  # type: ignore[no-untyped-def]
     calm, spread, ohm, layer_c, layer_old, plating, plated, unit_salt,
     y, theta, psi, given, salt, plating_current, work, rhs,
 ):  # fmt: skip
-    """Currents y of all units (A per m2 of cell); returns both collectors' potentials and the iterations, -1 if none held.
+    """Currents y of all units (A per m2 of cell); returns the collectors' potentials and the iterations, -1 if none
+    held.
 
     total : (2,) current of each electrode, delithiation positive.  layer_c : (places,) capacity over the step,
     A/(V m2), layer_old : what it gives back.  y, psi : start values in, solution out.  theta, given (Y), salt
@@ -65,7 +66,9 @@ def solve_reaction(  # type: ignore[no-untyped-def]
             eta, d_eta = kinetic_drop(y[u], exchange[u] * math.sqrt(s * room), alpha[side], thermal)
             level, falls = equilibrium(ocp[side], entropic[side], rise, t)
             pot[u] = level + eta
-            moved = -0.5 * y[u] * d_eta  # with the logarithm of the exchange current's salt, or of its occupancy
+            moved = (
+                -0.5 * y[u] * d_eta
+            )  # with the logarithm of the exchange current's salt, or of its occupancy
             slope[u] = max(d_eta - give[u] * (falls + moved * d_room), 1e-3 * d_eta)
             by_salt[u] = moved / s if salt[r] > SMALLEST_SALT else 0.0
             if step == 0 and (u == 0 or place[u - 1] != r):

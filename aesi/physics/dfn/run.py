@@ -26,7 +26,8 @@ def run_porous_electrode(
 
     if model.regions != 1:
         raise InputError(
-            "reaction_nonuniformity is what the porous-electrode model has of itself; leave it out, or use model 'espm'."
+            "reaction_nonuniformity is what the porous-electrode model has of itself; leave it out, or use model "
+            "'espm'."
         )
     particles, stack, electrodes = porous_arguments(model)
     out = np.empty((9, len(time)))
@@ -37,7 +38,7 @@ def run_porous_electrode(
         time, current, kelvin, given, hold == "backward", model.substep_s, model.most_substeps,
         np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, weights,
         out, np.zeros((0, 4, stack.at.shape[0])),
-    )  # type: ignore[call-arg]  # fmt: skip
+    )  # fmt: skip
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]

@@ -139,7 +139,9 @@ def end_forces(p, state, t, dt, w):  # type: ignore[no-untyped-def]
             solid_forcing(mean, t.z_end, p.at, p.project, p.psi[side], t.nodes, t.force[u])
             moved = 0.0
             for j in range(p.gains.shape[0]):
-                moved += p.strength[side] * p.rates[k, j] * w[k, 2, j] * (t.force[u, j + 1] - t.force_end[j + 1])
+                moved += (
+                    p.strength[side] * p.rates[k, j] * w[k, 2, j] * (t.force[u, j + 1] - t.force_end[j + 1])
+                )
             worst = max(worst, abs(moved))
     return worst
 

@@ -17,7 +17,7 @@ from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights
 def renew(p, s, faster, dt, w, taken, w_salt, spread):  # type: ignore[no-untyped-def]
     """Weights of one step length and of factors `faster` (3,) of diffusion (negative, positive, salt).
 
-    Out: w (kinds, 3, modes) and w_salt (3, modes).  taken (kinds,) s, what a unit of y1 takes off a surface, over `scale`.
+    Out: w (kinds, 3, modes), w_salt (3, modes).  taken (kinds,) s, what a unit of y1 takes off a surface, over `scale`.
     spread (places, places) m2/A, what a unit of reaction at v adds to the salt over rest at r.
     """
     for k in range(p.rates.shape[0]):
@@ -115,7 +115,7 @@ def salt_forcing(s, c, forcing):  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def drops(kappa, path, before, after, solid, ohm):  # type: ignore[no-untyped-def]
-    """ohm[r, v] (ohm m2) of one electrode: drop from its collector to place r and on to the separator, per current at v.
+    """ohm[r, v] (ohm m2) of one electrode: drop from collector to place r and on to the separator, per current at v.
 
     kappa : (n,) S/m at the places.  path : thickness over transport efficiency, m.  solid : ohm m2.
     """
