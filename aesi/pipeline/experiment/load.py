@@ -27,7 +27,7 @@ from aesi.records import ROLES, ErrorSeries, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
-    from aesi.data.virtual import Experiment
+    from aesi.data.virtual import VirtualExperiment
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,7 @@ def _sources(config: ExperimentConfig) -> _Sources:
     return _Sources(records, roles)
 
 
-def virtual_experiment(config: ExperimentConfig, cell: Path) -> Experiment:
+def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
     """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
     from aesi.data.virtual import DEFAULT_MIX, Laboratory, paper_experiment
 
