@@ -2,9 +2,9 @@
 
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Contribution, Effect, Record, Trace
-from aesi.physics.espm import simulate
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.model import EspmModel
+from aesi.physics.simulation import simulate
 
 __all__ = [
     "ActiveEffect",

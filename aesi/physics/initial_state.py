@@ -26,9 +26,9 @@ from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.physics.effect import ActiveEffect, Trace
-from aesi.physics.espm import model_with, simulate
+from aesi.physics.espm.plain import shifted_ocp
 from aesi.physics.model import EspmModel
-from aesi.physics.plain import shifted_ocp
+from aesi.physics.simulation import model_with, simulate
 from aesi.records import Hold, Measurement
 
 Basis = Literal["given", "full charge", "rest", "load"]

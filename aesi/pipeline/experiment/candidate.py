@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from aesi.conformal import METHODS, Method
-from aesi.conformal.candidate import validation_scores
+from aesi.conformal.validation import validation_scores
 from aesi.errors import AesiError, ConfigError
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.config import ExperimentConfig
