@@ -49,8 +49,9 @@ CALM_ROWS = 60
 GRID = 4001
 FLOWED_S = (0.0, 20.0, 200.0, 2000.0)
 """How long the first current may have flowed: after the last, it has drawn all but the slowest of its drops."""
-HISTORY_V = 12e-3
-"""What currents before the record leave in the voltage: drives of an LG 18650HG2 cut at random rows."""
+HISTORY_C_RATE = 0.25
+"""A record that starts under load was cut from something: what its voltage remembers of that is taken to be as large as
+what this current leaves once it has flowed for long."""
 DROP_ERROR = 0.2
 """Share of its drop that a model misses at the first row of a record."""
 JUDGED_S = 300.0
@@ -176,14 +177,16 @@ class _Start:
 
     def _under_load(self) -> InitialState:
         first = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
-        drops = [self._drop(first, before_s) for before_s in FLOWED_S]
+        drops = [self._drop(first, self.current_a, before_s) for before_s in FLOWED_S]
         begun = first + drops[0]
         said = f"starts under {self.current_a:.3g} A at {self.record.voltage_v[0]:.3f} V"
         if self._charged(begun):
             return self._full(begun, f"{said}, at rest {begun:.3f} V", None)
+        typical_a = HISTORY_C_RATE * self.cell.capacity_ah
+        history_v = self._drop(begun, typical_a, FLOWED_S[-1]) - self._drop(begun, typical_a, 0.0)
         since, at = [], []
         for before_s, drop in zip(FLOWED_S, drops, strict=True):
-            spread = float(np.hypot(HISTORY_V, DROP_ERROR * drop))
+            spread = float(np.hypot(max(history_v, READING_V), DROP_ERROR * drop))
             if self._admits(first + drop, spread) or not before_s:
                 since.append(before_s)
                 at.append(self._reading(first + drop, spread))
@@ -234,20 +237,18 @@ class _Start:
         beyond = max(BEYOND_V, 2.0 * spread_v)
         return bool(low - beyond <= voltage_v <= high + beyond)
 
-    def _drop(self, voltage_v: float, before_s: float) -> float:
-        """V between the open-circuit voltage and that under the first current, flowing since `before_s`."""
+    def _drop(self, voltage_v: float, current_a: float, before_s: float) -> float:
+        """V between the open-circuit voltage and `voltage_v`, under a current that flows since `before_s`."""
         drop = 0.0
         for _ in range(ROUNDS):
             soc = float(np.interp(voltage_v + drop, self.ocv, self.soc))
             time = np.array([0.0, before_s]) if before_s else np.zeros(1)
-            run = self._run(time, np.full(len(time), self.current_a), self._earlier(soc, before_s))
-            end = float(run[-1])
-            at_end = float(np.interp(soc, self.soc, self.ocv))
-            drop = at_end - end
+            run = self._run(time, np.full(len(time), current_a), self._earlier(soc, current_a, before_s))
+            drop = float(np.interp(soc, self.soc, self.ocv) - run[-1])
         return drop
 
-    def _earlier(self, soc: float, before_s: float) -> float:
-        return soc + self.current_a * before_s / SECONDS_PER_HOUR / self.cell.capacity_ah
+    def _earlier(self, soc: float, current_a: float, before_s: float) -> float:
+        return soc + current_a * before_s / SECONDS_PER_HOUR / self.cell.capacity_ah
 
     def _misfit(self, soc: float, before_s: float) -> float:
         """V**2: variance of the error over the first minutes, for a current that flows since `before_s`."""
@@ -259,7 +260,7 @@ class _Start:
         if before_s:
             time = np.concatenate([[-before_s], time])
             current = np.concatenate([[self.current_a], current])
-        voltage = self._run(time, current, self._earlier(soc, before_s))[-len(rows) :]
+        voltage = self._run(time, current, self._earlier(soc, self.current_a, before_s))[-len(rows) :]
         return float(np.var(rows.voltage_v - voltage))
 
     def _run(self, time_s: Array, current_a: Array, soc: float) -> Array:

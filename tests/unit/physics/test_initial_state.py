@@ -88,12 +88,13 @@ def test_a_load_that_has_flowed_for_long_is_seen_from_the_minutes_after(current_
     assert abs(found.soc - float(run.series["soc"][1200])) < 2.0 * found.sd
 
 
-@settings(max_examples=15, deadline=None)
-@given(st.integers(200, 2400))
-def test_a_record_cut_from_a_drive_is_within_three_of_the_deviations_it_claims(at):
-    cut, soc = cut_from_a_drive(at)
-    found = initial_state(LG_M50, cut)
-    assert abs(found.soc - soc) < 3.0 * found.sd
+def test_records_cut_from_a_drive_are_as_far_off_as_they_claim():
+    off = []
+    for at in range(100, 2800, 60):
+        cut, soc = cut_from_a_drive(at)
+        found = initial_state(LG_M50, cut)
+        off.append(abs(found.soc - soc) / found.sd)
+    assert np.mean(np.array(off) < 2.0) >= 0.9  # 95 % of a normal deviation
 
 
 def test_the_temperature_of_the_record_moves_the_reading_of_a_potential_with_entropy(nmc):
