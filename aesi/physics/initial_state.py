@@ -20,11 +20,11 @@ from typing import Literal
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
-from aesi.physics.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.physics.effect import ActiveEffect, Trace
 from aesi.physics.espm.plain import shifted_ocp
 from aesi.physics.model import EspmModel
