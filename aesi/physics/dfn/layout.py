@@ -94,8 +94,8 @@ class State(NamedTuple):
 
     z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y leaves its share of
     the current.  theta : (units,) surfaces.  force : (units, modes + 1).  q, forcing : (salt modes,).  c : (nodes,)
-    mol/m3.  given : (places,) A/m2.  psi : (places,) V.  salt : (places,) over rest.  layer : (places,) A/m2 into double layers.
-    plated : (places,) mol/m3.  plating : (places,) A/m2.
+    mol/m3.  given : (places,) A/m2.  psi : (places,) V.  salt : (places,) over rest.  layer : (places,) A/m2 into
+    double layers.  plated : (places,) mol/m3.  plating : (places,) A/m2.
     """
 
     z: Array
