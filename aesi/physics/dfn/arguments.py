@@ -141,12 +141,12 @@ def _electrodes(model: EspmModel) -> Electrodes:
 
 
 def _energies(model: EspmModel) -> Array:
-    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
+    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, contacts."""
     n, p, e = model.cell.negative, model.cell.positive, model.cell.electrolyte
     return np.array(
         [
             n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, model.cell.contact_ea_j_mol,
         ]
     )  # fmt: skip
 

@@ -146,12 +146,12 @@ def _ohmic(model: EspmModel) -> tuple[Array, Array]:
 
 
 def _energies(cell: Cell) -> Array:
-    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
+    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, contacts."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     return np.array(
         [
             n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, cell.contact_ea_j_mol,
         ]
     )  # fmt: skip
 

@@ -167,7 +167,8 @@ def run_general(  # type: ignore[no-untyped-def]
             if plating[0] > 0.0:
                 for r in range(regions):
                     plated[r] = max(plated[r] - plating_to_c * plating_current[r] * dt, 0.0)
-            voltage = phi_p - phi_n - j1 * separator / kappa[2 * regions] - i1 * contact
+            voltage = phi_p - phi_n - j1 * separator / kappa[2 * regions]
+            voltage -= i1 * contact / arrhenius(energies[6], t_k, reference_k)
             if heat[0] > 0.0:
                 power = -i1 * voltage
                 for u in range(n_units):
