@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from aesi.data import read_measurement
-    from aesi.physics import Cell, simulate
+    from aesi.physics import Cell, impedance, simulate
     from aesi.pipeline.cross_check import cross_check
     from aesi.pipeline.product.hybrid import HybridModel
 
@@ -28,12 +28,13 @@ __version__ = "0.1.0"
 _HOME = {
     "Cell": "aesi.physics",
     "simulate": "aesi.physics",
+    "impedance": "aesi.physics",
     "read_measurement": "aesi.data",
     "HybridModel": "aesi.pipeline.product.hybrid",
     "cross_check": "aesi.pipeline.cross_check",
 }
 
-__all__ = ["Cell", "HybridModel", "cross_check", "read_measurement", "simulate"]
+__all__ = ["Cell", "HybridModel", "cross_check", "impedance", "read_measurement", "simulate"]
 
 
 def __getattr__(name: str) -> Any:

@@ -185,12 +185,13 @@ def _information(model: Model, errors: Sequence[Array]) -> list[Array]:
     What is left after the fit repeats itself: n rows of first autocorrelation rho are n (1 - rho)/(1 + rho).
     """
     out = []
-    for error, weight in zip(errors, model.weights, strict=True):
-        rms = max(float(np.sqrt(np.mean(error**2))), 1e-6)
-        centred = error - error.mean()
+    for record, error, weight in zip(model.records, errors, model.weights, strict=True):
+        seen = error[record.trusted]
+        rms = max(float(np.sqrt(np.mean(seen**2))), 1e-6)
+        centred = seen - seen.mean()
         rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
         share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
-        out.append(np.sqrt(share) / rms / weight)
+        out.append(np.sqrt(share) / rms / np.where(weight > 0.0, weight, 1.0))
     return out
 
 

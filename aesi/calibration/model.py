@@ -73,7 +73,7 @@ class Model:
         self.layout = Layout(len(free), shapes.n_ocp, shapes.n_entropic, len(records))
         self.zero_a = ZERO_SHARE * max(float(np.abs(r.data.current_a).max()) for r in records)
         self.weights = [
-            np.full(len(r.rows), min(1.0, INDEPENDENT / len(r.rows)) ** 0.5 / ERROR_V) for r in records
+            min(1.0, INDEPENDENT / len(r.rows)) ** 0.5 / ERROR_V * r.trusted.astype(float) for r in records
         ]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T

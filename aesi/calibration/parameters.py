@@ -37,20 +37,24 @@ class Free:
     source: str
     factor: bool = False
     low: float = -np.inf
+    high: float = np.inf
 
     def value(self, z: float) -> float:
         """The value at a working coordinate."""
         if self.factor:
             return self.start * float(np.exp(self.sd * z))
-        return max(self.start + self.sd * z, self.low)
+        return min(max(self.start + self.sd * z, self.low), self.high)
 
     @property
     def bounds(self) -> tuple[float, float]:
         """Of the working coordinate."""
         low = -LIMIT_SD if self.factor else max(-LIMIT_SD, (self.low - self.start) / self.sd)
-        return min(low, -1e-9), LIMIT_SD
+        high = LIMIT_SD if self.factor else min(LIMIT_SD, (self.high - self.start) / self.sd)
+        return min(low, -1e-9), max(high, 1e-9)
 
 
+FULLEST = 0.98
+"""Stoichiometry of an electrode that is as full as a charged cell's may be: beyond, its kinetics stand still."""
 RATES = "rates of commercial cells of one chemistry scatter by a factor of three either way"
 TORTUOSITY = "scatter of tortuosities, Landesfeind et al. 2016, doi:10.1149/2.1141607jes"
 ENERGIES = "30 to 81 kJ/mol in Ecker et al. 2015, doi:10.1149/2.0551509jes; 12 to 25 in O'Regan et al. 2022"
@@ -72,8 +76,8 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
     out = [
         Free("negative.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
         Free("positive.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
-        Free("negative.full_stoichiometry", cell.negative.theta_max, 0.03, "1", HALF_CELLS),
-        Free("positive.full_stoichiometry", cell.positive.theta_min, 0.03, "1", HALF_CELLS),
+        Free("negative.full_stoichiometry", cell.negative.theta_max, 0.03, "1", HALF_CELLS, high=FULLEST),
+        Free("positive.full_stoichiometry", cell.positive.theta_min, 0.03, "1", HALF_CELLS, low=1.0 - FULLEST),
         Free("negative.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("positive.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("negative.diffusivity_slope", 0.0, 1.0, "e-folds a window", "Ecker et al. 2015, figure 9"),

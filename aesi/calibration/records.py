@@ -11,7 +11,7 @@ from aesi.calibration.start import flowing
 from aesi.calibration.thinning import thinned
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.records import Hold, Measurement
@@ -30,7 +30,7 @@ class Prepared:
 
     data : as measured.  rows, hold, longest_s : what is simulated.  kelvin : (rows,) K or None for the cell's own.
     start : state of charge at the first row; soc_sd : what it is uncertain by here.  slow : C/7 at most.
-    flows : (rows,) 1 where a current flows, else 0.
+    flows : (rows,) 1 where a current flows, else 0.  trusted : (rows,) see `Thinned`.
     """
 
     data: Measurement
@@ -42,6 +42,7 @@ class Prepared:
     soc_sd: float
     slow: bool
     flows: Array
+    trusted: BoolArray
 
     @property
     def name(self) -> str:
@@ -77,6 +78,7 @@ def _prepared(cell: Cell, data: Measurement, soc0: float | None, hold: Hold | No
         start=start,
         soc_sd=sd,
         slow=float(np.quantile(current, 0.95)) <= SLOW_C_RATE * cell.nominal_capacity_ah,
+        trusted=thin.trusted,
         flows=flowing(thin.data.current_a).astype(float),
     )
 

@@ -20,6 +20,8 @@ STEP_C_RATE = 0.01
 STEADY_SHARE = 0.01
 """A record whose current changes in fewer of its rows than this is one of steady currents."""
 FIRST_S = 0.2
+SOON_S = 1.0
+"""A row after a step that another follows this soon need not be believed."""
 GROWTH = 0.4
 """Rows of a steady record are this share of the time since the current's last step apart."""
 
@@ -29,9 +31,12 @@ class Thinned:
     """What a fit simulates.
 
     data : the rows.  hold : how the current runs between them.  longest_s : of the model's steps.
+    trusted : (rows,) False where a step of the current lies within the row: instruments read current and voltage some
+    hundredths of a second apart.
     """
 
     data: Measurement
+    trusted: BoolArray
     hold: Hold
     longest_s: float
 
@@ -44,9 +49,13 @@ def thinned(data: Measurement, capacity_ah: float, window_s: float = WINDOW_S) -
     uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > STEADY_SHARE
     if uneven or float(np.mean(steps)) < STEADY_SHARE:
         rows = _log_spaced(data, steps)
-        spacing = float(np.median(np.diff(rows.time_s)))
-        return Thinned(rows, "backward", min(max(spacing, 1.0), 30.0))
-    return Thinned(_windowed(data, window_s), "linear", max(window_s, 1.0))
+        spacing = np.diff(rows.time_s)
+        stepped = np.abs(np.diff(rows.current_a)) > STEP_C_RATE * capacity_ah
+        followed = np.append(spacing[1:], np.inf) < SOON_S
+        trusted = np.concatenate([[True], ~(stepped & followed)])
+        return Thinned(rows, trusted, "backward", min(max(float(np.median(spacing)), 1.0), 30.0))
+    rows = _windowed(data, window_s)
+    return Thinned(rows, np.ones(len(rows), dtype=bool), "linear", max(window_s, 1.0))
 
 
 def _windowed(data: Measurement, window_s: float) -> Measurement:

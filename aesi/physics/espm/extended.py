@@ -7,23 +7,22 @@ kinetics, double layers, plating, and a temperature that is measured or follows 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
-from aesi.physics.cell import Cell, Electrode
+from aesi.physics.cell import Cell
 from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
-    DiffusionTable,
     conductivity_table,
     electrolyte_diffusion,
     ocp_table,
     solid_diffusion,
 )
-from aesi.physics.model import EspmModel, Interface, Plating
+from aesi.physics.model import EspmModel, Plating
 from aesi.records import Hold
 
 NO_PLATING = Plating(0.0, 0.5)
@@ -69,10 +68,10 @@ def general_arguments(model: EspmModel) -> tuple[Any, ...]:
     diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)
     to_current = 1.0 / FARADAY_C_MOL
     return (
-        *_units(model, solids),
+        *particle_units(model),
         _padded([x.psi for x in solids]), np.array([0.0 if x.linear else 1.0 / x.d0 for x in solids]),
         sphere.at, sphere.project,
-        _interface(model), *_ohmic(model),
+        _interface(model), *ohmic_drops(model),
         stack.lam * diffusion.d0, stack.gain * to_current,
         stack.to_nodes, np.ascontiguousarray(stack.project.T), stack.gauss, stack.mean,
         diffusion.psi, 0.0 if diffusion.linear else 1.0 / diffusion.d0,
@@ -83,8 +82,35 @@ def general_arguments(model: EspmModel) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def _units(model: EspmModel, solids: list[DiffusionTable]) -> tuple[Array, ...]:
-    """Particles, region by region from each collector, size by size: see `run_general` for the names."""
+class ParticleUnits(NamedTuple):
+    """Particles, region by region from each collector, size by size, in the order of `run_general`'s arguments.
+
+    place : (units, 2) side (0 negative) and region.  rates, gains : (units, modes) 1/s, and stoichiometry per A s/m2 of
+    cell.  lump : of the means.  share, volume : of the side's reactive area and volume.  exchange : A/m2 of cell.
+    """
+
+    place: Array
+    rates: Array
+    gains: Array
+    lump: Array
+    share: Array
+    volume: Array
+    exchange: Array
+
+    @property
+    def side(self) -> Array:
+        """(units,) 0 in the negative electrode, 1 in the positive."""
+        return self.place[:, 0]
+
+    @property
+    def region(self) -> Array:
+        """(units,) counted from the current collector."""
+        return self.place[:, 1]
+
+
+def particle_units(model: EspmModel) -> ParticleUnits:
+    """The units of a model."""
+    solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
     sides = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))
@@ -105,7 +131,7 @@ def _units(model: EspmModel, solids: list[DiffusionTable]) -> tuple[Array, ...]:
     sums = [sum(v for v, unit in zip(volume, units, strict=True) if unit[0] == side) for side in range(2)]
     fractions = [v / sums[unit[0]] for v, unit in zip(volume, units, strict=True)]
     columns = (rates, gains, lump, share, fractions, exchange)
-    return (np.array(units, dtype=np.int64), *(np.array(c) for c in columns))
+    return ParticleUnits(np.array(units, dtype=np.int64), *(np.array(c) for c in columns))
 
 
 def _padded(tables: list[Array]) -> Array:
@@ -122,18 +148,21 @@ def _interface(model: EspmModel) -> Array:
     return np.array(
         [
             [model.negative.transfer_coefficient, model.positive.transfer_coefficient],
-            [_capacity(model, n, model.negative), _capacity(model, p, model.positive)],
+            [interface_capacity(model, 0), interface_capacity(model, 1)],
             [area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient],
         ]
     )
 
 
-def _capacity(model: EspmModel, electrode: Electrode, interface: Interface) -> float:
+def interface_capacity(model: EspmModel, side: int) -> float:
+    """F/m2 of cell: double layer of one region of an electrode (0 negative, 1 positive)."""
+    cell = model.cell
+    electrode, interface = ((cell.negative, model.negative), (cell.positive, model.positive))[side]
     area = electrode.area_per_volume_1_m * electrode.thickness_m / model.regions
     return interface.double_layer_f_m2 * area
 
 
-def _ohmic(model: EspmModel) -> tuple[Array, Array]:
+def ohmic_drops(model: EspmModel) -> tuple[Array, Array]:
     """Ohm m2 of the solid (2, regions, regions), and of the electrolyte times its conductivity, by region crossed."""
     n, p = model.cell.negative, model.cell.positive
     solid, salt = ohmic_shares(model.regions)
