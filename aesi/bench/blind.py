@@ -21,7 +21,7 @@ from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, plan, small_plan
 from aesi.errors import AesiError
 from aesi.physics import Cell
-from aesi.pipeline.discover import to_json
+from aesi.pipeline.discovery.discover import to_json
 from aesi.tracer import discover
 
 MV = 1e3
