@@ -39,9 +39,7 @@ class Judgement:
     lenient: bool
 
 
-def judge(
-    label: str, also: Sequence[str], neutral: Collection[str], content: Mapping[str, Any]
-) -> Judgement:
+def judge(label: str, also: Sequence[str], neutral: Collection[str], content: Mapping[str, Any]) -> Judgement:
     """Judge an answer.
 
     label : 'none', 'unknown' or effects joined by '+'.  also : answers that the lenient judge takes.  neutral :
@@ -113,24 +111,34 @@ def _assignable(wanted: list[str], stands_for: list[set[str]]) -> bool:
     )
 
 
-def rate(rows: Sequence[Mapping[str, Any]], key: str) -> dict[str, float | int | None]:
-    """Share of rows where `key` is true, in per cent, with its exact 95 % interval and the number of rows."""
-    if not rows:
-        return {"pct": None, "low_pct": None, "high_pct": None, "cases": 0}
+@dataclass(frozen=True)
+class Rate:
+    """A share in per cent with its exact 95 % interval; None where there were no cases."""
+
+    pct: float | None
+    interval_pct: tuple[float, float] | None
+    cases: int
+
+    def named(self, name: str) -> dict[str, Any]:
+        """`name_pct`, `name_95_pct` (low, high) and `name_cases`."""
+        interval = list(self.interval_pct) if self.interval_pct else None
+        return {f"{name}_pct": self.pct, f"{name}_95_pct": interval, f"{name}_cases": self.cases}
+
+
+def rate(rows: Sequence[Mapping[str, Any]], key: str) -> Rate:
+    """Share of rows where `key` is true."""
     return proportion(sum(bool(row[key]) for row in rows), len(rows))
 
 
-def proportion(hits: int, cases: int) -> dict[str, float | int | None]:
-    """hits of cases (at least one) in per cent with the exact 95 % interval."""
+def proportion(hits: int, cases: int) -> Rate:
+    """hits of cases, with the interval."""
     from scipy.stats import binomtest
 
+    if not cases:
+        return Rate(None, None, 0)
     interval = binomtest(hits, cases).proportion_ci(CERTAIN, method="exact")
-    return {
-        "pct": round(100.0 * hits / cases, 1),
-        "low_pct": round(100.0 * float(interval.low), 1),
-        "high_pct": round(100.0 * float(interval.high), 1),
-        "cases": cases,
-    }
+    low, high = (round(100.0 * float(end), 1) for end in (interval.low, interval.high))
+    return Rate(round(100.0 * hits / cases, 1), (low, high), cases)
 
 
 def calibration(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
@@ -142,7 +150,7 @@ def calibration(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         ]
         if part:
             shown = float(np.mean([r["confidence"] for r in part]))
-            found.append({"shown_pct": round(100.0 * shown, 1), **rate(part, "grouped")})
+            found.append({"shown_pct": round(100.0 * shown, 1), **rate(part, "grouped").named("right")})
     return found
 
 

@@ -29,9 +29,7 @@ CELLS: Mapping[str, BlindCell] = {
         "lg_m50_chen2020.bpx.json", "NMC811|graphite-SiOx", "BSD 3-Clause, PyBaMM", 0.7, (0.6, 0.75)
     ),
     "lfp": BlindCell("lfp_prada2013.bpx.json", "LFP|graphite", "BSD 3-Clause, PyBaMM", 1.2, (0.75, 0.9)),
-    "nca": BlindCell(
-        "nca_kim2011.bpx.json", "NCA|graphite power", "BSD 3-Clause, PyBaMM", 1.2, (0.7, 0.85)
-    ),
+    "nca": BlindCell("nca_kim2011.bpx.json", "NCA|graphite power", "BSD 3-Clause, PyBaMM", 1.2, (0.7, 0.85)),
 }
 
 

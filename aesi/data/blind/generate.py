@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
 
 from aesi.data.blind.case import BlindCase, CaseSpec
+from aesi.data.blind.cells import CELLS
 from aesi.data.blind.duty import TESTS, Asked
 from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
@@ -27,6 +28,8 @@ COARSE_POINTS = 15
 model cancels in a difference to within what `CLOSE_ENOUGH` allows."""
 CLOSE_ENOUGH = 0.2
 MOST_TRIES = 4
+SHOWN = 0.6
+"""Of the target, that an effect has to move the voltage by at least."""
 MILLIVOLTS = 1e3
 CHAMBER_K = 15.0
 """A chamber stands at most so far from the reference of the cell file, either way."""
@@ -78,12 +81,10 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     cells : name -> declared BPX file.
     Raises DataError for an unknown cell or recipe; SimulationError where the cell cannot be simulated.
     """
-    rng = np.random.default_rng(spec.seed)
-    bench = _prepare(spec, cells, rng)
-    known = [name for name in spec.recipes if name in RECIPES]
+    bench, sizes, rng = _shown(spec, cells)
+    spec, known = bench.spec, list(sizes)
     strange = [name for name in spec.recipes if name in STRANGERS]
     truth = {f"own.{a.change}.{k}": v for a in bench.own for k, v in a.values.items()}
-    sizes = {name: _scaled(RECIPES[name], bench) for name in known}
     truth.update({f"{RECIPES[n].label}.{k}": v for n, values in sizes.items() for k, v in values.items()})
     traces = _changed(bench, sizes)
     for name in strange:
@@ -99,7 +100,38 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     return BlindCase(spec, measurements, label, also, neutral, soc0, bench.declared, truth)
 
 
-def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator) -> _Bench:
+def _shown(
+    spec: CaseSpec, cells: Mapping[str, Path]
+) -> tuple[_Bench, dict[str, dict[str, float]], np.random.Generator]:
+    """The bench, the values of each recipe, and the generator as it stands, on the first cell that shows all effects.
+
+    That of the specification, or one after it: a particle of 50 nm does not show its diffusivity. The specification's
+    own where none shows them.
+    """
+    _check(spec, cells)
+    after = [*CELLS][[*CELLS].index(spec.cell) + 1 :] + [*CELLS][: [*CELLS].index(spec.cell)]
+    allowed = [n for n in after if all(n in RECIPES[r].cells for r in spec.recipes if r in RECIPES)]
+    tried = []
+    for name in (spec.cell, *allowed):
+        there = spec if name == spec.cell else _moved(spec, name)
+        rng = np.random.default_rng(there.seed)
+        bench = _prepare(there, cells, rng)
+        sizes = {n: _scaled(RECIPES[n], bench) for n in there.recipes if n in RECIPES}
+        tried.append((bench, {n: values for n, (values, _) in sizes.items()}, rng))
+        if all(moved >= SHOWN * spec.target_mv / MILLIVOLTS for _, moved in sizes.values()):
+            return tried[-1]
+    return tried[0]
+
+
+def _moved(spec: CaseSpec, cell: str) -> CaseSpec:
+    """The same case on another cell, as deep in its range of charge and as far up its rates."""
+    old, new = CELLS[spec.cell], CELLS[cell]
+    share = (spec.soc0 - old.soc0[0]) / (old.soc0[1] - old.soc0[0])
+    soc0 = round(new.soc0[0] + share * (new.soc0[1] - new.soc0[0]), 3)
+    return replace(spec, cell=cell, soc0=soc0, rate=round(spec.rate / old.rate * new.rate, 4))
+
+
+def _check(spec: CaseSpec, cells: Mapping[str, Path]) -> None:
     if spec.cell not in cells:
         raise DataError(f"{spec.name}: there is no cell {spec.cell!r}; given are {', '.join(cells)}.")
     for name in spec.recipes:
@@ -107,6 +139,9 @@ def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator
             near = get_close_matches(name, [*RECIPES, *STRANGERS], n=1)
             hint = f"; did you mean {near[0]!r}?" if near else "."
             raise DataError(f"{spec.name}: there is no recipe {name!r}{hint}")
+
+
+def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator) -> _Bench:
     declared = cells[spec.cell]
     capacity = nominal_capacity_ah(declared)
     profiles = []
@@ -125,14 +160,16 @@ def _warmth(spec: CaseSpec, rng: np.random.Generator) -> tuple[Applied, ...]:
     return (chamber, heat) if spec.warmth == "course" else (chamber,)
 
 
-def _scaled(recipe: Recipe, bench: _Bench) -> dict[str, float]:
-    """Values at which the recipe alone moves the voltage by about the target, or its least or most."""
+def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], float]:
+    """Values at which the recipe alone moves the voltage by about the target, or its least or most; and by how much
+    it does, V RMS."""
     target = bench.spec.target_mv / MILLIVOLTS
 
     def values_at(magnitude: float) -> dict[str, float]:
         return recipe.values(magnitude, bench.capacity_ah, bench.spec.soc0)
 
     magnitude = max(1.0, recipe.least)
+    moved = 0.0
     for _ in range(MOST_TRIES):
         moved = _rms(_effect_alone(recipe, values_at(magnitude), bench))
         wanted = magnitude * target / max(moved, 1e-6)
@@ -140,7 +177,7 @@ def _scaled(recipe: Recipe, bench: _Bench) -> dict[str, float]:
         if abs(moved / target - 1) < CLOSE_ENOUGH or another == magnitude:
             break
         magnitude = another
-    return values_at(magnitude)
+    return values_at(magnitude), moved
 
 
 def _effect_alone(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> Array:
@@ -168,7 +205,9 @@ def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> l
 def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]]) -> list[Trace]:
     """The noise-free records of the cell with all its effects."""
     together = [
-        Applied(str(RECIPES[n].change), v) for n, v in sizes.items() if RECIPES[n].change and not RECIPES[n].reference
+        Applied(str(RECIPES[n].change), v)
+        for n, v in sizes.items()
+        if RECIPES[n].change and not RECIPES[n].reference
     ]
     traces = bench.run(tuple(together))
     for name, values in sizes.items():

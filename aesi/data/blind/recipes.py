@@ -114,8 +114,12 @@ RECIPES: dict[str, Recipe] = {
         most=40.0,
         warm=True,
     ),
-    "colder": Recipe("ambient_temperature", lambda m, q, s: {"shift_k": -3.0 * m}, "ambient_temperature", warm=True),
-    "warmer": Recipe("ambient_temperature", lambda m, q, s: {"shift_k": 4.0 * m}, "ambient_temperature", warm=True),
+    "colder": Recipe(
+        "ambient_temperature", lambda m, q, s: {"shift_k": -3.0 * m}, "ambient_temperature", warm=True
+    ),
+    "warmer": Recipe(
+        "ambient_temperature", lambda m, q, s: {"shift_k": 4.0 * m}, "ambient_temperature", warm=True
+    ),
     "series_resistance": Recipe(
         "series_resistance",
         lambda m, q, s: {"resistance_ohm": m * 8e-3 / q},
@@ -136,7 +140,12 @@ RECIPES: dict[str, Recipe] = {
     ),
     "negative_ocp": Recipe(
         "ocp_shape",
-        lambda m, q, s: {"positive_v": 0.0, "negative_v": 8e-3 * m, "centre_soc": s - 0.12, "width_soc": 0.15},
+        lambda m, q, s: {
+            "positive_v": 0.0,
+            "negative_v": 8e-3 * m,
+            "centre_soc": s - 0.12,
+            "width_soc": 0.15,
+        },
         "ocp_shape",
     ),
     "double_layer": Recipe(
@@ -163,13 +172,15 @@ RECIPES: dict[str, Recipe] = {
         most=3.0,
     ),
     "negative_diffusivity": Recipe(
-        "solid_diffusivity", lambda m, q, s: {"negative_factor": 1.5**-m},
+        "solid_diffusivity",
+        lambda m, q, s: {"negative_factor": 1.5**-m},
         "solid_diffusivity",
         least=_beyond("diffusivity", 1.5),
         most=5.0,
     ),
     "positive_diffusivity": Recipe(
-        "solid_diffusivity", lambda m, q, s: {"positive_factor": 1.5**-m},
+        "solid_diffusivity",
+        lambda m, q, s: {"positive_factor": 1.5**-m},
         "solid_diffusivity",
         least=_beyond("diffusivity", 1.5),
         most=5.0,
@@ -191,12 +202,14 @@ RECIPES: dict[str, Recipe] = {
         most=5.0,
     ),
     "slow_negative_kinetics": Recipe(
-        "charge_transfer_kinetics", lambda m, q, s: {"negative_factor": 1.3**-m},
+        "charge_transfer_kinetics",
+        lambda m, q, s: {"negative_factor": 1.3**-m},
         "charge_transfer_kinetics",
         least=_beyond("kinetics", 1.3),
     ),
     "slow_positive_kinetics": Recipe(
-        "charge_transfer_kinetics", lambda m, q, s: {"positive_factor": 1.3**-m},
+        "charge_transfer_kinetics",
+        lambda m, q, s: {"positive_factor": 1.3**-m},
         "charge_transfer_kinetics",
         least=_beyond("kinetics", 1.3),
     ),
@@ -209,7 +222,9 @@ RECIPES: dict[str, Recipe] = {
         radial_points=25,
     ),
     "lithium_inventory_loss": Recipe(
-        "lithium_inventory_loss", lambda m, q, s: {"negative_stoichiometry": 0.02 * m}, "lithium_inventory_loss"
+        "lithium_inventory_loss",
+        lambda m, q, s: {"negative_stoichiometry": 0.02 * m},
+        "lithium_inventory_loss",
     ),
     "active_material_loss_negative": Recipe(
         "active_material_loss_negative",

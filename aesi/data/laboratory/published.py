@@ -5,7 +5,7 @@
 writes `lfp_prada2013.bpx.json` and `nca_kim2011.bpx.json`. PyBaMM is under the BSD 3-Clause licence; the figures are
 those of the articles named in each file. What BPX holds in another form is worked out here from PyBaMM's own
 functions: rate constants j0 = F k sqrt(c_e/c_e0 x (1 - x)), areas 3 eps/r, transport efficiencies eps**b,
-stoichiometries at the limits of voltage, and activation energies over 15 K around the reference.
+effective conductivities of the solid, stoichiometries at the limits of voltage, and activation energies over 15 K around the reference.
 """
 
 from __future__ import annotations
@@ -189,7 +189,7 @@ def _electrode(values: Any, side: str, ocp: str, least: float, most: float) -> d
         "Diffusivity [m2.s-1]": _digits(diffusivity(REFERENCE_K)),
         "OCP [V]": ocp,
         "Entropic change coefficient [V.K-1]": 0.0,
-        "Conductivity [S.m-1]": values[f"{side} electrode conductivity [S.m-1]"],
+        "Conductivity [S.m-1]": _effective_conductivity(values, side),
         "Surface area per unit volume [m-1]": _digits(
             3 * values[f"{side} electrode active material volume fraction"] / radius
         ),
@@ -222,6 +222,13 @@ def _electrolyte(values: Any, published: PublishedSet) -> dict[str, Any]:
 def _efficiency(values: Any, part: str) -> float:
     exponent = values[f"{part} Bruggeman coefficient (electrolyte)"]
     return _digits(values[f"{part} porosity"] ** exponent)
+
+
+def _effective_conductivity(values: Any, side: str) -> float:
+    """Of the solid as it is in the electrode, all that is no pore: BPX applies no exponent to it."""
+    solid = 1 - values[f"{side} electrode porosity"]
+    exponent = values[f"{side} electrode Bruggeman coefficient (electrode)"]
+    return _digits(values[f"{side} electrode conductivity [S.m-1]"] * solid**exponent)
 
 
 def _at(values: Any, name: str, *inputs: float) -> float:
