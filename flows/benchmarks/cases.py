@@ -10,7 +10,7 @@ from typing import Any
 
 from aesi.pipeline.experiment.sections import TrackingConfig
 
-Row = dict[str, Any]
+CaseRow = dict[str, Any]
 
 
 @dataclass(frozen=True)
@@ -25,12 +25,12 @@ class Cases:
     name: str
     seed: int
     specs: Sequence[Any]
-    judge: Callable[[Any], Row]
-    summary: Callable[[list[Row]], Row]
+    judge: Callable[[Any], CaseRow]
+    summary: Callable[[list[CaseRow]], CaseRow]
     shown: tuple[str, ...]
 
 
-def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Iterator[Row]:
+def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Iterator[CaseRow]:
     """One row a case as it is judged, and a last one with `summary`: true.
 
     workers : processes on this machine.  address : of a Dask scheduler, whose workers see the same files.
@@ -63,7 +63,7 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
     yield last
 
 
-def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[Row]:
+def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
     if address is not None:
         yield from _on_dask(cases, address)
     elif workers == 1:
@@ -72,7 +72,7 @@ def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[Row]:
         yield from _in_processes(cases, workers)
 
 
-def _in_processes(cases: Cases, workers: int) -> Iterator[Row]:
+def _in_processes(cases: Cases, workers: int) -> Iterator[CaseRow]:
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
 
@@ -85,7 +85,7 @@ def _in_processes(cases: Cases, workers: int) -> Iterator[Row]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _on_dask(cases: Cases, address: str) -> Iterator[Row]:
+def _on_dask(cases: Cases, address: str) -> Iterator[CaseRow]:
     from distributed import as_completed
 
     from flows.evaluation.dask_pool import connect
@@ -101,7 +101,7 @@ def _on_dask(cases: Cases, address: str) -> Iterator[Row]:
             cluster.close(timeout=10)
 
 
-def _track(tracker: Any, row: Row, shown: tuple[str, ...]) -> None:
+def _track(tracker: Any, row: CaseRow, shown: tuple[str, ...]) -> None:
     parameters = {k: v if isinstance(v, str) else json.dumps(v) for k, v in row.items() if k in shown}
     metrics = {k: float(v) for k, v in row.items() if isinstance(v, bool | float) and k not in shown}
     tracker.nested(f"case:{row['case']}", row["case"], "case", parameters, metrics, seconds=row["ours_s"])

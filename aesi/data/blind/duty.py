@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.blind.case import RecordKind
 from aesi.data.profile import Bench, Profile
 from aesi.numerics.typing import Array
@@ -78,7 +79,7 @@ def pulses(asked: Asked, rng: np.random.Generator) -> Profile:
             bench.rest(60.0),
             bench.pulse(-0.75 * strength, 10.0),
             bench.rest(60.0),
-            bench.pulse(asked.rate, 0.08 * 3600.0 / asked.rate),
+            bench.pulse(asked.rate, 0.08 * SECONDS_PER_HOUR / asked.rate),
             bench.rest(float(rng.integers(120, 300))),
         ]
     return bench.profile("pulses", pieces, asked.soc0)
@@ -89,7 +90,7 @@ def slow(asked: Asked, rng: np.random.Generator) -> Profile:
     bench = Bench(asked.capacity_ah, dt_s=SLOW_DT_S)
     pieces = [
         bench.rest(FIRST_REST_S),
-        bench.pulse(SLOW_C, (asked.soc0 - LEAST_SOC) / SLOW_C * 3600.0),
+        bench.pulse(SLOW_C, (asked.soc0 - LEAST_SOC) / SLOW_C * SECONDS_PER_HOUR),
         bench.rest(1200.0),
     ]
     return bench.profile("slow", pieces, asked.soc0)

@@ -16,7 +16,7 @@ from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Model, Setup, Trace, run
+from aesi.data.laboratory.simulator import Applied, Model, Setup, TrueRun, run
 from aesi.data.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError
@@ -56,7 +56,7 @@ class _Bench:
         model: Model | None = None,
         radial_points: int | None = None,
         profiles: Sequence[Profile] | None = None,
-    ) -> list[Trace]:
+    ) -> list[TrueRun]:
         """The cell with these changes under its tests."""
         setup = Setup(self.declared, model or self.spec.model, (*self.own, *applied), radial_points)
         return [run(setup, profile) for profile in profiles or self.profiles]
@@ -202,7 +202,7 @@ def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> l
     return [c.voltage_v - w.voltage_v for c, w in zip(changed, without, strict=True)]
 
 
-def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]]) -> list[Trace]:
+def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]]) -> list[TrueRun]:
     """The noise-free records of the cell with all its effects."""
     together = [
         Applied(str(RECIPES[n].change), v)
@@ -218,8 +218,8 @@ def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]]) -> list[Trace
 
 
 def _with_stranger(
-    name: str, traces: list[Trace], bench: _Bench, truth: dict[str, float], seed: int
-) -> list[Trace]:
+    name: str, traces: list[TrueRun], bench: _Bench, truth: dict[str, float], seed: int
+) -> list[TrueRun]:
     """The records with a stranger of the size asked for, of the same constants in each."""
     shifts = [
         STRANGERS[name].shift(trace, bench.capacity_ah, np.random.default_rng(seed)) for trace in traces
@@ -229,8 +229,10 @@ def _with_stranger(
     return [_shifted(trace, magnitude * shift) for trace, shift in zip(traces, shifts, strict=True)]
 
 
-def _shifted(trace: Trace, added_v: Array) -> Trace:
-    return Trace(trace.time_s, trace.current_a, trace.voltage_v + added_v, trace.temperature_degc, trace.soc)
+def _shifted(trace: TrueRun, added_v: Array) -> TrueRun:
+    return TrueRun(
+        trace.time_s, trace.current_a, trace.voltage_v + added_v, trace.temperature_degc, trace.soc
+    )
 
 
 def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
@@ -242,9 +244,9 @@ def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
     return "+".join(dict.fromkeys(RECIPES[name].label for name in known)), also
 
 
-def _measured(spec: CaseSpec, written: Written, trace: Trace, rng: np.random.Generator) -> Measurement:
+def _measured(spec: CaseSpec, written: Written, trace: TrueRun, rng: np.random.Generator) -> Measurement:
     instrument = Instrument(spec.voltage_noise_v, spec.current_noise_a)
-    shown = Trace(written.time_s, written.current_a, written.voltage_v, trace.temperature_degc, trace.soc)
+    shown = TrueRun(written.time_s, written.current_a, written.voltage_v, trace.temperature_degc, trace.soc)
     return instrument.write(shown, spec.name, rng, spec.warmth != "none")
 
 

@@ -8,7 +8,7 @@ difference of the two runs is what is added to the base run, so that one effect 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,10 +16,9 @@ import numpy as np
 from aesi.data.blind.case import RecordKind
 from aesi.data.blind.cells import CELLS
 from aesi.data.blind.spread import BEYOND, SPREADS
+from aesi.data.laboratory.changes import Values
 from aesi.data.laboratory.simulator import Applied
 from aesi.numerics.typing import Array
-
-Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,8 @@
 writes `lfp_prada2013.bpx.json` and `nca_kim2011.bpx.json`. PyBaMM is under the BSD 3-Clause licence; the figures are
 those of the articles named in each file. What BPX holds in another form is worked out here from PyBaMM's own
 functions: rate constants j0 = F k sqrt(c_e/c_e0 x (1 - x)), areas 3 eps/r, transport efficiencies eps**b,
-effective conductivities of the solid, stoichiometries at the limits of voltage, and activation energies over 15 K around the reference.
+effective conductivities of the solid, stoichiometries at the limits of voltage, and activation energies over 15 K
+around the reference.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ from typing import Any
 
 import numpy as np
 
-GAS_CONSTANT = 8.314462618
-FARADAY = 96485.33212
+from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, SECONDS_PER_HOUR
+
 REFERENCE_K = 298.15
+CHARGE_AH_MOL = FARADAY_C_MOL / SECONDS_PER_HOUR
 COLDER_K, WARMER_K = 290.65, 305.65
 """7.5 K either side, over which an activation energy is taken."""
 
@@ -141,7 +143,7 @@ def bpx_of(published: PublishedSet) -> dict[str, Any]:
                 "Reference temperature [K]": REFERENCE_K,
                 "Lower voltage cut-off [V]": float(values["Lower voltage cut-off [V]"]),
                 "Upper voltage cut-off [V]": float(values["Upper voltage cut-off [V]"]),
-                "Nominal cell capacity [A.h]": _digits(published.pairs * area * per_area * FARADAY / 3600.0),
+                "Nominal cell capacity [A.h]": _digits(published.pairs * area * per_area * CHARGE_AH_MOL),
                 "Electrode area [m2]": _digits(area),
                 "Number of electrode pairs connected in parallel to make a cell": published.pairs,
                 **published.cell,
@@ -195,7 +197,7 @@ def _electrode(values: Any, side: str, ocp: str, least: float, most: float) -> d
         ),
         "Porosity": values[f"{side} electrode porosity"],
         "Transport efficiency": _efficiency(values, f"{side} electrode"),
-        "Reaction rate constant [mol.m-2.s-1]": _digits(exchange(REFERENCE_K) / (0.5 * FARADAY)),
+        "Reaction rate constant [mol.m-2.s-1]": _digits(exchange(REFERENCE_K) / (0.5 * FARADAY_C_MOL)),
         "Minimum stoichiometry": _digits(least),
         "Maximum stoichiometry": _digits(most),
         "Maximum concentration [mol.m-3]": full,
@@ -243,7 +245,7 @@ def _at(values: Any, name: str, *inputs: float) -> float:
 def _activation(of_kelvin: Any) -> float:
     """J/mol of a quantity between the two temperatures."""
     ratio = np.log(of_kelvin(WARMER_K) / of_kelvin(COLDER_K))
-    return round(float(GAS_CONSTANT * ratio / (1 / COLDER_K - 1 / WARMER_K)), 1)
+    return round(float(GAS_CONSTANT_J_MOL_K * ratio / (1 / COLDER_K - 1 / WARMER_K)), 1)
 
 
 def _digits(value: float) -> float:

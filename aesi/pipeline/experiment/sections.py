@@ -8,7 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from aesi.records import Hold
 
-Range = tuple[float, float]
 Share = Annotated[float, Field(gt=0, lt=1)]
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
@@ -109,8 +108,9 @@ class LibraryConfig(Section):
 
     p_c, d : range of the highest polynomial order and of the total degree; their upper ends make the library.
     factors : most variables in a product.  special : with trigonometric and hyperbolic functions.
-    mixed : and their products with first-order terms.  inputs : None takes the paper's; `aesi.sparse.inputs` names
-    those that can be derived, such as I_next, the current that flows while the predicted error arises.
+    mixed : and their products with first-order terms.
+    inputs : None takes the paper's; `aesi.sparse.terms.inputs` names those that can be derived, such as I_next, the
+    current that flows while the predicted error arises.
     """
 
     p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (0, 3)
@@ -160,7 +160,7 @@ class SearchConfig(Section):
 
     @field_validator("lambda1", "lambda2", "tau")
     @classmethod
-    def _ordered(cls, value: Range) -> Range:
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
         if not value[0] < value[1]:
             raise ValueError(f"the range [{value[0]:g}, {value[1]:g}] is empty; give low < high")
         return value
