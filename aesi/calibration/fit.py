@@ -111,7 +111,7 @@ def calibrate(
     model, notes = problem(cell, records, soc0, temperatures_degc or {}, hold)
     x = descended(model, evaluations)
     jacobian, errors = model.jacobian(x), model.errors(x)
-    weights = np.concatenate([*(_information(model, errors)), np.ones(model.layout.size)])
+    weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
     scaled = jacobian * weights[:, None]
     covariance = np.linalg.inv(scaled.T @ scaled)
     declared = _declared_errors(cell, model)
@@ -154,8 +154,8 @@ def problem(
     placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
     start, typical = with_activation(start)
     ready = prepared(start, placed, soc0, hold)
-    for record in ready:
-        _check_charge(start, record)
+    for one in ready:
+        _check_charge(start, one)
     span = _span_k(start, ready)
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
@@ -179,7 +179,7 @@ def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:
     return np.asarray(found.x, dtype=float)
 
 
-def _information(model: Model, errors: Sequence[Array]) -> list[Array]:
+def information_weights(model: Model, errors: Sequence[Array]) -> list[Array]:
     """Factor on each row's weight that makes a record count as many rows as say something of their own.
 
     What is left after the fit repeats itself: n rows of first autocorrelation rho are n (1 - rho)/(1 + rho).

@@ -23,8 +23,10 @@ INDEPENDENT = 200
 """Rows of a record that say something of their own: what a model misses stays the same over many."""
 OUTLIER_V = 0.015
 """Beyond this an error counts by its size and no longer by its square (pseudo-Huber)."""
-AGEING_SD = 0.02
-"""Of the logarithm of the capacity that a cell has in one record: cells age through a series of tests."""
+AGEING_SD = 0.03
+"""Of the logarithm of the capacity that a cell has lost by the time of a record: cells age between tests."""
+NEWER = 0.1
+"""Deviations that a record's capacity may exceed that of the file by: none, but for the descent to start inside."""
 ZERO_SHARE = 5e-4
 """Of the largest current among the records: what a cycler's zero is uncertain by, 0.1 % of its range being usual."""
 STEP = 0.02
@@ -77,6 +79,8 @@ class Model:
         ]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
+        ages = [self.layout.age(i) for i in range(len(records))]
+        self.high[ages] = NEWER  # a cell ages and does not grow younger
         self.simulations = 0
 
     def cell_at(self, x: Array) -> Cell:

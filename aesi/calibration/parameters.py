@@ -53,7 +53,7 @@ class Free:
         return min(low, -1e-9), max(high, 1e-9)
 
 
-FULLEST = 0.98
+FULLEST = 0.95
 """Stoichiometry of an electrode that is as full as a charged cell's may be: beyond, its kinetics stand still."""
 RATES = "rates of commercial cells of one chemistry scatter by a factor of three either way"
 TORTUOSITY = "scatter of tortuosities, Landesfeind et al. 2016, doi:10.1149/2.1141607jes"
@@ -76,7 +76,7 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
     out = [
         Free("negative.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
         Free("positive.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
-        Free("negative.full_stoichiometry", cell.negative.theta_max, 0.03, "1", HALF_CELLS, high=FULLEST),
+        Free("negative.full_stoichiometry", cell.negative.theta_max, 0.015, "1", HALF_CELLS, high=FULLEST),
         Free("positive.full_stoichiometry", cell.positive.theta_min, 0.03, "1", HALF_CELLS, low=1.0 - FULLEST),
         Free("negative.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("positive.diffusivity", 1.0, 1.2, "factor", RATES, True),

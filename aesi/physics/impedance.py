@@ -3,7 +3,7 @@
     V(w) = -Z(w) I(w)     about a cell at rest, I > 0 on discharge
 
 A particle of stoichiometry x answers to a current y with its surface, through the modes of solid diffusion; the salt
-answers with the modes of the electrolyte; kinetics are a resistance R T/(F j0), a double layer beside it where one is in:
+answers with the modes of the electrolyte; kinetics are a resistance R T/(F j0), with a double layer where one is in:
 
     x_u = -(lump/(jw) + sum gains/(jw + rates)) y_u,      phi_u = U' x_u + R_u y_u,      i_r = sum_u y_u + jw C phi_r
 
@@ -83,7 +83,7 @@ class _Linear:
         units = particle_units(self.model)
         n, regions = len(units.side), self.model.regions
         region = units.side * regions + units.region
-        s = 1j * omega
+        s: ComplexArray = np.asarray(1j * omega, dtype=np.complex128)
         local = self._local(units, s)
         salt = self._salt(s)
         ohm = self._ohm()

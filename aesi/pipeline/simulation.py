@@ -47,7 +47,7 @@ def simulate_file(
     """
     profile = _read(current, columns, sign, say_notes)
     declared = declared_model(cell)
-    active = (*declared.effects, *_activated(effects, effect_files))
+    active = (*declared.effects, *activated(effects, effect_files))
     start = _start(replace(declared, effects=active, hold=hold), profile, current, soc0, say_notes)
     run = simulate(
         declared.cell,
@@ -137,7 +137,7 @@ def _write(path: Path, frame: pd.DataFrame) -> None:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
 
 
-def _activated(
+def activated(
     effects: Sequence[tuple[str, Mapping[str, float]]], files: Sequence[Path]
 ) -> tuple[ActiveEffect, ...]:
     from difflib import get_close_matches

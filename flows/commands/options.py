@@ -11,7 +11,7 @@ import typer
 from aesi.errors import InputError
 
 if TYPE_CHECKING:
-    from aesi.records import Measurement
+    from aesi.records import Measurement, Spectrum
 
 Cell = Annotated[Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")]
 Columns = Annotated[
@@ -55,12 +55,48 @@ def columns(pairs: list[str] | None) -> dict[str, str | None]:
 
 
 def measurements(
-    paths: list[Path], pairs: list[str] | None, sign: Literal["discharge-positive", "charge-positive"]
+    paths: list[Path],
+    pairs: list[str] | None,
+    sign: Literal["discharge-positive", "charge-positive"],
+    to_s: dict[str, float] | None = None,
 ) -> tuple[Measurement, ...]:
-    """The files as measurements."""
+    """The files as measurements.  to_s : seconds up to which a record is read, by its name."""
     from aesi.data import read_measurement
 
-    return tuple(read_measurement(path, columns=columns(pairs), sign=sign) for path in paths)
+    until = dict(to_s or {})
+    out = tuple(
+        read_measurement(path, columns=columns(pairs), sign=sign, stop_s=until.pop(record_name(path), None))
+        for path in paths
+    )
+    if until:
+        raise InputError(f"--to-s {next(iter(until))}=...: no --data file has this name.")
+    return out
+
+
+def record_name(path: str | Path) -> str:
+    """What a record of this file is called."""
+    return Path(path).name.split(".")[0]
+
+
+def by_file(option: str, pairs: list[str] | None) -> dict[str, float]:
+    """`FILE=NUMBER` pairs as numbers by record."""
+    out = {}
+    for pair in pairs or []:
+        file, equals, text = pair.rpartition("=")
+        try:
+            out[record_name(file)] = float(text)
+        except ValueError:
+            equals = ""
+        if not equals or not file:
+            raise InputError(f"{option} {pair}: has to read FILE=NUMBER.")
+    return out
+
+
+def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:
+    """The spectra of impedance files."""
+    from aesi.data import read_spectra
+
+    return tuple(spectrum for path in paths or [] for spectrum in read_spectra(path))
 
 
 def say_notes(notes: Iterable[str]) -> None:

@@ -83,8 +83,8 @@ class CellParameters:
 
     Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no
     thermal data), contact resistance in ohm in series with the whole cell; it falls with
-    temperature as exp(E/R (1/T - 1/T_ref)), E its activation energy in J/mol (nought or below for metals, that of a rate
-    for films).
+    temperature as exp(E/R (1/T - 1/T_ref)), E its activation energy in J/mol (nought or below for metals, that of a
+    rate for films).
     """
 
     negative: Electrode

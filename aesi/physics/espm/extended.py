@@ -142,7 +142,7 @@ def _padded(tables: list[Array]) -> Array:
 
 def _interface(model: EspmModel) -> Array:
     """Rows: transfer coefficients; double-layer capacities F/m2 of cell a region; plating rate and coefficient."""
-    n, p = model.cell.negative, model.cell.positive
+    n = model.cell.negative
     plating = model.negative.plating or NO_PLATING
     area_n = n.area_per_volume_1_m * n.thickness_m / model.regions
     return np.array(
