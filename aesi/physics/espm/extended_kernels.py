@@ -75,7 +75,7 @@ def run_general(  # type: ignore[no-untyped-def]
     t_weights, faster = -1.0, np.ones(3)
     watts, last_j = 0.0, current[0] / area
     before, last_step = np.zeros(n_e), 0.0
-    fault_at, fault = -1, 0
+    fault_at, fault, driest = -1, 0, 1.0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
         parts = min(max(1, math.ceil(whole / substep)), most) if k > 0 else 1
@@ -117,7 +117,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 pred[u] = means[u]
                 for j in range(n_modes):
                     pred[u] += z[u, j]
-            observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt)
+            driest = observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt)
             start_k = t_k
             if given and k > 0:
                 t_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
@@ -191,6 +191,6 @@ def run_general(  # type: ignore[no-untyped-def]
         out[3, k], out[4, k] = c[0], c[m_e - 1]
         out[7, k] = t_k
         out[8, k] = np.mean(plated)
-        if fault_at < 0 and not np.min(c) >= 0.0:
+        if fault_at < 0 and not driest > 0.0:
             fault_at, fault = k, 3
     return fault_at, fault
