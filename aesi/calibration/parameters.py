@@ -64,6 +64,7 @@ KINETIC_ENERGIES = (
 SALT_ENERGIES = (
     "17.1 kJ/mol in Ecker et al. 2015; 12 to 25 over concentration in Landesfeind & Gasteiger 2019"
 )
+FILMS = "25 to 60 kJ/mol for films on graphite, Waldmann et al. 2014, doi:10.1016/j.jpowsour.2014.03.112"
 HALF_CELLS = "scatter of half-cell potentials, tens of millivolts, Chen et al. 2020"
 
 
@@ -97,7 +98,8 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
             Free("positive.rate_energy", p.rate_ea_j_mol, 12e3, "J/mol", KINETIC_ENERGIES, low=0.0),
             Free("electrolyte.conductivity_energy", e.conductivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
             Free("electrolyte.diffusivity_energy", e.diffusivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
-            Free("contact.energy", cell.contact_ea_j_mol, 4e3, "J/mol", "metals: nought; films: as kinetics"),
+            Free("film.resistance", cell.film_resistance_ohm, 0.5 * ohm, "ohm", FILMS, low=0.0),
+            Free("film.energy", cell.film_ea_j_mol or 40e3, 12e3, "J/mol", FILMS, low=0.0),
         ]  # fmt: skip
     return tuple(out)
 
@@ -190,7 +192,8 @@ def moved(cell: Cell, values: Mapping[str, float]) -> Cell:
         positive=replace(p, theta_min=p1, theta_max=p0),
         electrolyte=electrolyte,
         contact_resistance_ohm=values.get("contact.resistance", cell.contact_resistance_ohm),
-        contact_ea_j_mol=values.get("contact.energy", cell.contact_ea_j_mol),
+        film_resistance_ohm=values.get("film.resistance", cell.film_resistance_ohm),
+        film_ea_j_mol=values.get("film.energy", cell.film_ea_j_mol),
     )
 
 

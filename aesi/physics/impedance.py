@@ -107,9 +107,10 @@ class _Linear:
         solved = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
         warmer = arrhenius(cell.electrolyte.conductivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
         gap = cell.separator.thickness_m / cell.separator.transport_efficiency / (self._kappa() * warmer)
-        contact = cell.contact_resistance_ohm / arrhenius(
-            cell.contact_ea_j_mol, self.kelvin, cell.reference_temperature_k
+        film = cell.film_resistance_ohm / arrhenius(
+            cell.film_ea_j_mol, self.kelvin, cell.reference_temperature_k
         )
+        contact = cell.contact_resistance_ohm + film
         return cast(ComplexArray, solved[:, n] - solved[:, n + 1] + gap / cell.total_area_m2 + contact)
 
     def _local(self, units: ParticleUnits, s: ComplexArray) -> ComplexArray:

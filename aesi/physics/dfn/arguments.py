@@ -135,18 +135,19 @@ def _electrodes(model: EspmModel) -> Electrodes:
         heat=_heat(model),
         area=cell.total_area_m2,
         contact=cell.contact_resistance_ohm,
+        film=cell.film_resistance_ohm,
         transference=e.transference,
         reference_k=cell.reference_temperature_k,
     )
 
 
 def _energies(model: EspmModel) -> Array:
-    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, contacts."""
+    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, films."""
     n, p, e = model.cell.negative, model.cell.positive, model.cell.electrolyte
     return np.array(
         [
             n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, model.cell.contact_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, model.cell.film_ea_j_mol,
         ]
     )  # fmt: skip
 

@@ -160,7 +160,7 @@ def voltage_of(s, e, state, phi_n, phi_p, density, t_k):  # type: ignore[no-unty
         for j in range(s.rates.shape[0]):
             salt += s.gap_at[i, j] * state.q[j]
         gap += s.gap_path[i] / lookup(s.kappa, salt / s.top)
-    contact = e.contact / arrhenius(e.energies[6], t_k, e.reference_k)
+    contact = e.contact + e.film / arrhenius(e.energies[6], t_k, e.reference_k)
     return phi_p - phi_n - density * (gap / warmer + contact * e.area)
 
 

@@ -66,7 +66,7 @@ class Electrodes(NamedTuple):
     before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.  ocp, entropic : (2, table).
     alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.  node_share : (places,) weights.
     plating : rate A/m2 of cell at c0, transfer coefficient, c0.
-    plating_to_c : mol/m3 per C/m2.  energies : (7,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
+    plating_to_c : mol/m3 per C/m2.  energies : (7,) J/mol.  heat : (3,).  area : m2.  contact, film : ohm.
     transference : cation transference number.
     """
 
@@ -85,6 +85,7 @@ class Electrodes(NamedTuple):
     heat: Array
     area: float
     contact: float
+    film: float
     transference: float
     reference_k: float
 

@@ -175,12 +175,12 @@ def ohmic_drops(model: EspmModel) -> tuple[Array, Array]:
 
 
 def _energies(cell: Cell) -> Array:
-    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, contacts."""
+    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, films."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     return np.array(
         [
             n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, cell.contact_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, cell.film_ea_j_mol,
         ]
     )  # fmt: skip
 
@@ -206,5 +206,6 @@ def _scalars(model: EspmModel, top: float) -> Array:
             cell.reference_temperature_k,
             model.regions / (FARADAY_C_MOL * cell.negative.thickness_m),
             model.region_contrast,
+            cell.film_resistance_ohm,
         ]
     )

@@ -168,7 +168,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 for r in range(regions):
                     plated[r] = max(plated[r] - plating_to_c * plating_current[r] * dt, 0.0)
             voltage = phi_p - phi_n - j1 * separator / kappa[2 * regions]
-            voltage -= i1 * contact / arrhenius(energies[6], t_k, reference_k)
+            voltage -= i1 * (contact + scalars[9] / arrhenius(energies[6], t_k, reference_k))
             if heat[0] > 0.0:
                 power = -i1 * voltage
                 for u in range(n_units):

@@ -17,9 +17,9 @@ BEYOND_RANGE_V = 10.0
 """Slope (V per unit of stoichiometry) at which open-circuit potentials go on outside [0, 1]."""
 SMALLEST_OCCUPANCY = 1e-9
 NEARLY_DRY = 0.1
-"""Of the salt at rest: below this the reaction withdraws to where there is salt, which one particle an electrode does not
-see. A porous electrode's salt tends to nought where that of a uniform reaction passes it (an LG 18650HG2 under US06 at
-10 degC: 56 mol/m3 against -104 at the wall)."""
+"""Of the salt at rest: below this the reaction withdraws to where there is salt, which one particle an electrode does
+not see. A porous electrode's salt tends to nought where that of a uniform reaction passes it (an LG 18650HG2 under US06
+at 10 degC: 56 mol/m3 against -104 at the wall)."""
 LARGEST_RATIO = 1e12
 
 

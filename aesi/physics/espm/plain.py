@@ -121,6 +121,7 @@ def _scalars(model: EspmModel, temperature: float, top: float) -> Array:
             + s.thickness_m / s.transport_efficiency
             + p.thickness_m / (3.0 * p.transport_efficiency),
             (n.thickness_m / n.conductivity_s_m + p.thickness_m / p.conductivity_s_m) / 3.0,
-            cell.contact_resistance_ohm / arrhenius(cell.contact_ea_j_mol, temperature, reference),
+            cell.contact_resistance_ohm
+            + cell.film_resistance_ohm / arrhenius(cell.film_ea_j_mol, temperature, reference),
         ]
     )

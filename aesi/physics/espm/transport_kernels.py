@@ -107,7 +107,8 @@ def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-u
 def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
     """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
 
-    Returns the mean over rest of the electrode that has less.  contrast : factor of what differs between the regions of an electrode in the logarithm.
+    contrast : factor of what differs between the regions of an electrode in the logarithm.
+    Returns the mean over rest of the electrode that has less.
     """
     for i in range(gauss.shape[0]):
         g = 0.0
