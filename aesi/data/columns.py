@@ -213,10 +213,8 @@ class _Finder:
         self._set_unit(quantity, unit)
         if quantity in QUANTITIES:
             told = self.unit[quantity]
-            from_unit = "" if told == units.SI[quantity] else f", in {told}, converted"
-            self.notes.append(
-                f"{quantity} was taken from column {self._table.header[found[0]]!r}{from_unit}."
-            )
+            converted = "" if told == units.SI[quantity] else f" (converted from {told})"
+            self._of_export.append(f"{quantity} from {self._table.header[found[0]]!r}{converted}")
         return True
 
     def _of_bdf(self, quantity: str) -> bool:
