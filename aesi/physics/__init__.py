@@ -2,6 +2,7 @@
 
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Contribution, Effect, Record, Trace
+from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.model import EspmModel
 from aesi.physics.simulation import simulate
 
@@ -11,8 +12,10 @@ __all__ = [
     "Contribution",
     "Effect",
     "EspmModel",
+    "InitialState",
     "Record",
     "Trace",
     "initial_soc",
+    "initial_state",
     "simulate",
 ]
