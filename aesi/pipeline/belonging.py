@@ -80,8 +80,9 @@ def _check_window(cell: Cell, record: Measurement) -> None:
     if np.any(above):
         row = int(np.argmax(above))
         raise DataError(
-            f"{record.name}, {record.time_s[row]:.6g} s: {record.voltage_v[row]:.3f} V at {record.current_a[row]:.3g} A, "
-            f"but {cell.name} is full at {full_v:.3f} V: the record and the cell file are of different cells."
+            f"{record.name}, {record.time_s[row]:.6g} s: {record.voltage_v[row]:.3f} V at "
+            f"{record.current_a[row]:.3g} A, but {cell.name} is full at {full_v:.3f} V: the record and the cell file are "
+            "of different cells."
         )
 
 
@@ -144,6 +145,4 @@ def _soc_of(cell: Cell, voltage_v: Array) -> Array:
     soc = np.linspace(0.0, 1.0, SOC_GRID)
     ocv = np.maximum.accumulate(cell.rest_voltage_v(soc))
     inside = np.interp(voltage_v, ocv, soc)
-    return np.where(
-        voltage_v < ocv[0], -SOC_MARGIN, np.where(voltage_v > ocv[-1], 1.0 + SOC_MARGIN, inside)
-    )
+    return np.where(voltage_v < ocv[0], -SOC_MARGIN, np.where(voltage_v > ocv[-1], 1.0 + SOC_MARGIN, inside))
