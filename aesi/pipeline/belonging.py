@@ -81,8 +81,8 @@ def _check_window(cell: Cell, record: Measurement) -> None:
         row = int(np.argmax(above))
         raise DataError(
             f"{record.name}, {record.time_s[row]:.6g} s: {record.voltage_v[row]:.3f} V at "
-            f"{record.current_a[row]:.3g} A, but {cell.name} is full at {full_v:.3f} V: the record and the cell file are "
-            "of different cells."
+            f"{record.current_a[row]:.3g} A, but {cell.name} is full at {full_v:.3f} V: the record and the "
+            "cell file are of different cells."
         )
 
 
