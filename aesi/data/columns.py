@@ -15,7 +15,7 @@ from difflib import get_close_matches
 
 from aesi.data import headers, units
 from aesi.data.readers.formats.format import Sign
-from aesi.data.readers.table import Table
+from aesi.data.readers.table import TableFile
 from aesi.errors import DataError
 
 REQUIRED = ("time_s", "current_a", "voltage_v")
@@ -64,7 +64,7 @@ class Mapped:
 
 
 def map_columns(
-    table: Table,
+    table: TableFile,
     columns: Mapping[str, str | None] | None,
     declared: Mapping[str, str] | None = None,
     required: tuple[str, ...] = REQUIRED,
@@ -98,7 +98,7 @@ def map_columns(
 class _Finder:
     """Looks quantities up in one table and keeps what it found."""
 
-    def __init__(self, table: Table, given: dict[str, str | None], declared: dict[str, str]) -> None:
+    def __init__(self, table: TableFile, given: dict[str, str | None], declared: dict[str, str]) -> None:
         self._table, self.given, self._declared = table, given, declared
         self._file = table.path.name
         for quantity in given:

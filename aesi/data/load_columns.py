@@ -9,7 +9,7 @@ import numpy as np
 from aesi.data import units
 from aesi.data.checks import Columns, Context
 from aesi.data.columns import QUANTITIES, Mapped, map_columns
-from aesi.data.readers.table import Table
+from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, bounds
 from aesi.data.state import signs
 from aesi.errors import DataError
@@ -20,7 +20,7 @@ ZERO_SHARE = 0.01
 
 
 def load_columns(
-    table: Table, reading: Reading, required: tuple[str, ...]
+    table: TableFile, reading: Reading, required: tuple[str, ...]
 ) -> tuple[Columns, Context, Mapped, list[str]]:
     """The quantities of a table, where their rows are, how they were found, and what was done to them."""
     mapped = map_columns(table, reading.columns, reading.units, required, reading.selectors)
@@ -41,7 +41,7 @@ def load_columns(
     return data, context, mapped, notes
 
 
-def _numbers(table: Table, mapped: Mapped) -> Columns:
+def _numbers(table: TableFile, mapped: Mapped) -> Columns:
     """All mapped columns but the state, in SI."""
     wanted = [name for name in mapped.position if name != "state"]
     as_text = [name for name in wanted if units.is_text(mapped.unit.get(name, ""))]
@@ -57,7 +57,7 @@ def _numbers(table: Table, mapped: Mapped) -> Columns:
     }
 
 
-def _times(table: Table, mapped: Mapped, name: str) -> Array:
+def _times(table: TableFile, mapped: Mapped, name: str) -> Array:
     unit = mapped.unit[name]
     (cells,) = table.read_text((mapped.position[name],))
     seconds = units.clock_to_s(cells) if unit == units.CLOCK else units.dates_to_s(cells, unit)
@@ -72,7 +72,7 @@ def _times(table: Table, mapped: Mapped, name: str) -> Array:
     return seconds
 
 
-def _orient(table: Table, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
+def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
     """Turn the current of `data` discharge-positive, in place, and say where that took a turn."""
     current = data["current_a"]
     asked = "state" in reading.columns

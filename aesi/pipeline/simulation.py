@@ -13,7 +13,7 @@ from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
-from aesi.physics import Cell, InitialState, initial_state, simulate
+from aesi.physics import Cell, InitialState, ModelName, initial_state, simulate
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -39,6 +39,7 @@ def simulate_file(
     hold: Hold | None = None,
     reading: Reading | None = None,
     say_notes: SayNotes | None = None,
+    model: ModelName = "espm",
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
@@ -46,6 +47,7 @@ def simulate_file(
     soc0 : None takes it from the file's voltage, where it has one (see `initial_state`), else from the saved model.
     hold : None takes straight lines for a profile alone, and what `assumed_hold` says for a measurement.
     say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
+    model : "espm" or "dfn".
     Raises DataError where a measurement cannot be of this cell.
     """
     say = say_notes or _silent
@@ -59,7 +61,14 @@ def simulate_file(
     start = _start(replace(declared, effects=active, hold=taken), record, soc0)
     say([start.sentence, hold_sentence(record.name, taken, hold is not None)])
     run = simulate(
-        declared.cell, profile.time_s, profile.current_a, start.soc, active, profile.temperature_degc, taken
+        declared.cell,
+        profile.time_s,
+        profile.current_a,
+        start.soc,
+        active,
+        profile.temperature_degc,
+        taken,
+        model=model,
     )
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out)

@@ -34,6 +34,13 @@ HoldOption = Annotated[
     ),
 ]
 
+Model = Annotated[
+    Literal["espm", "dfn"],
+    typer.Option(
+        "--model", help="Single particle with electrolyte, or porous electrode (Doyle-Fuller-Newman)."
+    ),
+]
+
 _LIST = list[str] | None
 READING: dict[str, Any] = {
     "column": Annotated[

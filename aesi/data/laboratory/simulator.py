@@ -61,7 +61,7 @@ class Applied:
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class TrueRun:
     """What the cell did, without noise. voltage_v, temperature_degc, soc : (n,)."""
 
     time_s: Array
@@ -85,7 +85,7 @@ class Setup:
         return [(find_change(a.change), find_change(a.change).complete(a.values)) for a in self.applied]
 
 
-def run(setup: Setup, profile: Profile) -> Trace:
+def run(setup: Setup, profile: Profile) -> TrueRun:
     """The trace of a set-up under a profile, from the cache where it is there.
 
     Raises SimulationError where the model stops early or loses charge; DataError for a cell file that cannot
@@ -113,7 +113,9 @@ def run(setup: Setup, profile: Profile) -> Trace:
         }
     )
     kept = remember("laboratory", key, lambda: _simulate(setup, profile))
-    return Trace(profile.time_s, profile.current_a, kept["voltage_v"], kept["temperature_degc"], kept["soc"])
+    return TrueRun(
+        profile.time_s, profile.current_a, kept["voltage_v"], kept["temperature_degc"], kept["soc"]
+    )
 
 
 def edges(profile: Profile) -> Array:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from pathlib import Path
 
-from aesi.data.readers.table import Table
+from aesi.data.readers.table import TableFile
 from aesi.errors import DataError
 
 GZIP_MAGIC = b"\x1f\x8b"
@@ -18,7 +18,7 @@ XLS_MAGIC = b"\xd0\xcf\x11\xe0"
 MATLAB_MAGIC = (b"MATLAB", b"\x89HDF")
 
 
-def open_table(path: str | Path, wanted: Collection[str] = ()) -> Table:
+def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
     """The reader for a file: cyclers' own by their suffix, all others by their first bytes.
 
     wanted : names of columns that the user gave; they tell where a table begins below other lines.

@@ -15,7 +15,7 @@ from aesi.numerics.typing import Array
 
 
 class FrameTable:
-    """Columns in memory; see `aesi.data.readers.table.Table`.
+    """Columns in memory; see `aesi.data.readers.table.TableFile`.
 
     columns : one sequence a column, in the order of `header`.  first_row : number in the file of the first, where
     rows have numbers there.

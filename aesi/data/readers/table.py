@@ -9,7 +9,7 @@ from aesi.data.readers.formats.format import Format
 from aesi.numerics.typing import Array
 
 
-class Table(Protocol):
+class TableFile(Protocol):
     """One table on disk, whatever its format.
 
     format : the maker's, where the names of the columns are those of one.
