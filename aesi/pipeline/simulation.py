@@ -13,14 +13,13 @@ from aesi.data.current import CurrentProfile, read_current
 from aesi.data.read import Sign
 from aesi.errors import DataError, InputError
 from aesi.physics import initial_state, simulate
+from aesi.physics.effects import activated
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, Measurement, Run
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from aesi.physics import ActiveEffect
 
 SayNotes = Callable[[Iterable[str]], None]
 
@@ -45,7 +44,7 @@ def simulate_file(
     """
     profile = _read(current, columns, sign, say_notes)
     declared = declared_model(cell)
-    active = (*declared.effects, *_activated(effects, effect_files))
+    active = (*declared.effects, *activated(effects, effect_files))
     start = _start(replace(declared, effects=active, hold=hold), profile, current, soc0, say_notes)
     run = simulate(
         declared.cell, profile.time_s, profile.current_a, start, active, profile.temperature_degc, hold
@@ -126,24 +125,3 @@ def _write(path: Path, frame: pd.DataFrame) -> None:
         frame.to_csv(path, index=False, float_format="%.9g")
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
-
-
-def _activated(
-    effects: Sequence[tuple[str, Mapping[str, float]]], files: Sequence[Path]
-) -> tuple[ActiveEffect, ...]:
-    from difflib import get_close_matches
-
-    from aesi.physics.effects import CATALOGUE
-
-    known = dict(CATALOGUE)
-    for path in files:
-        from aesi.physics.effects import load_effect
-
-        effect = load_effect(path)
-        known[effect.id] = effect
-    for name, _ in effects:
-        if name not in known:
-            near = get_close_matches(name, list(known), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else "."
-            raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
-    return tuple(known[name].activate(**values) for name, values in effects)
