@@ -147,4 +147,7 @@ def _footer(name: str, runs: Sequence[Any], format: str) -> str:
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {ids}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
+    for run in runs:
+        if "aesi.fallback" in run.data.tags:
+            text = f"{text} {run.data.tags['aesi.fallback']}"
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]

@@ -28,11 +28,13 @@ WITH_UNIT = {
 
 
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded) -> None:
-    """Settings, versions and data of a run."""
-    content = config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
-    tags = {"mlflow.note.content": config.note, "aesi.setting": config.setting}
+    """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
+    content = loaded.config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
+    tags = {"mlflow.note.content": config.note, "aesi.setting": loaded.setting}
+    if loaded.fallback:
+        tags["aesi.fallback"] = loaded.fallback
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
-    tracker.json("experiment.json", config.model_dump(mode="json"))
+    tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
     tracker.datasets(
         [
             {

@@ -69,6 +69,8 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "chosen": published(result.best),
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
+        "data": result.loaded.config.data.kind,
+        "fallback": result.loaded.fallback or None,
         "notes": list(notes(result)),
         "models": rows,
     }
@@ -107,8 +109,8 @@ def hybrid(result: Result) -> HybridModel:
         correction=one.model if isinstance(one.model, SparseModel) else None,
         intervals=one.intervals,
         bands=one.bands,
-        dt_s=result.config.data.dt_s,
-        hold=result.config.data.hold,
+        dt_s=result.loaded.config.data.dt_s,
+        hold=result.loaded.config.data.hold,
         soc0=next(iter(result.loaded.soc0.values()), None),
     )
 
@@ -117,7 +119,6 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
     """What the report shows."""
     counts = result.problem.counts
     genome = result.chosen.genome
-    options = result.problem.options
     return RunView(
         experiment=result.config.name,
         note=result.config.note,
@@ -128,7 +129,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result)),
         bootstrap=BootstrapView(
-            n=counts.shape[1], block=options.block or 0, unique_fraction=(counts > 0).mean(axis=1)
+            n=counts.shape[1], block=result.problem.block, unique_fraction=(counts > 0).mean(axis=1)
         ),
         settings={
             "lambda1": f"{genome.lambda1:.3g}",
@@ -142,6 +143,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
         mlflow_run_id=result.run_id,
         seconds=result.seconds,
+        fallback=result.loaded.fallback,
     )
 
 
