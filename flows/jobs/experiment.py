@@ -60,7 +60,8 @@ def _stages(
     config = loaded.config  # that of the fallback where it fell back to one
     for note in together(loaded.notes):
         console.say(f"  {note}")
-    track_start(tracker, config, loaded)
+    folder = environment.workspace() / "runs" / config.name / tracker.run_id
+    track_start(tracker, config, loaded, folder)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
     follow = CandidateTracker(tracker, config, loaded, problem)
     found = run("search", lambda: run_study(problem, config, console, request.use_cache, follow))
@@ -72,7 +73,6 @@ def _stages(
     )
     fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config))
     evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split))
-    folder = environment.workspace() / "runs" / config.name / tracker.run_id
     seconds = time.monotonic() - started
     rows = found.rows()
     result = Result(
