@@ -67,9 +67,10 @@ def simulate(
     the model already holds.
     """
     check_cell(cell)
-    check_soc(soc0)
     check_choice("hold", hold, Hold)
     check_choice("on_depletion", on_depletion, OnDepletion)
+    if on_depletion == "raise":  # a search may pass by states that no cell has
+        check_soc(soc0)
     time, current = _checked_record(time_s, current_a)
     active = _instruments_first(checked_effects(effects))
     solve = _solver(model)
