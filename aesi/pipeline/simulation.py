@@ -14,6 +14,7 @@ from aesi.data.reading import Reading
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, InitialState, ModelName, initial_state, simulate
+from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -22,8 +23,6 @@ from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from aesi.physics import ActiveEffect
 
 MV = 1e3
 SayNotes = Callable[[Iterable[str]], None]
@@ -54,7 +53,7 @@ def simulate_file(
     profile = read_current(current, reading)
     say(profile.notes)
     declared = declared_model(cell)
-    active = (*declared.effects, *_activated(effects, effect_files))
+    active = (*declared.effects, *activated(effects, effect_files))
     record = _record(profile, current, hold)
     taken = hold or ("linear" if profile.voltage_v is None else assumed_hold(profile.time_s))
     check_belongs(declared.cell, [record])
@@ -194,24 +193,3 @@ def _write(path: Path, frame: pd.DataFrame) -> None:
         frame.to_csv(path, index=False, float_format="%.9g")
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
-
-
-def _activated(
-    effects: Sequence[tuple[str, Mapping[str, float]]], files: Sequence[Path]
-) -> tuple[ActiveEffect, ...]:
-    from difflib import get_close_matches
-
-    from aesi.physics.effects import CATALOGUE
-
-    known = dict(CATALOGUE)
-    for path in files:
-        from aesi.physics.effects import load_effect
-
-        effect = load_effect(path)
-        known[effect.id] = effect
-    for name, _ in effects:
-        if name not in known:
-            near = get_close_matches(name, list(known), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else "."
-            raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
-    return tuple(known[name].activate(**values) for name, values in effects)

@@ -28,11 +28,9 @@ def start(
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
     environment.prepare()
     console = Console()
-    console.say(
-        f"{path}: reading the experiment ..."
-    )  # at once: what follows loads half a minute of libraries
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache)
     config = request.config()  # bad input is refused before anything is started
+    console.say(f"{config.name}: loading the libraries ...")  # at once: on a busy machine they take long
     if use_prefect:
         if not os.environ.get("PREFECT_API_URL"):
             console.say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")

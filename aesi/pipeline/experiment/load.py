@@ -18,8 +18,9 @@ import numpy as np
 from aesi.data.read import read
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
-from aesi.errors import ConfigError, DataAway, DataError
+from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, initial_state, simulate
+from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
@@ -201,12 +202,11 @@ def _split(data: DataConfig, series: dict[str, ErrorSeries], roles: dict[Role, t
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
-    from aesi.physics.effects import CATALOGUE
-
-    unknown = [name for name in config.cell.effects if name not in CATALOGUE]
-    if unknown:
-        raise ConfigError(f"cell.effects: there is no effect {unknown[0]!r}; `aesi effects` lists them.")
-    return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
+    files = [config.path(name) for name in config.cell.effect_files]
+    try:
+        return activated(config.cell.effects.items(), files)
+    except InputError as error:
+        raise ConfigError(f"{config.name}: cell: {error}") from None
 
 
 def cell_path(config: ExperimentConfig) -> Path:

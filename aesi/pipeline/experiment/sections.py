@@ -108,12 +108,14 @@ class CellConfig(Section):
     belongs to the data set.
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
-    effects : id -> parameters, effects added to the declared cell.
+    effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
+    the user's own; they are run, so name only files that you trust.
     """
 
     bpx: str = "catalogue"
     soc0: Annotated[float, Field(ge=0, le=1)] | None = None
     effects: dict[str, dict[str, float]] = {}
+    effect_files: tuple[str, ...] = ()
 
 
 class LibraryConfig(Section):

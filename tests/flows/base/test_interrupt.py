@@ -12,7 +12,8 @@ import pytest
 BUSY = """
 import subprocess, sys, time
 from flows.base.interrupt import ending_soon_on_interrupt
-child = subprocess.Popen([sys.executable, "-c", "import signal, time; signal.signal(2, signal.SIG_IGN); time.sleep(60)"])
+deaf = "import signal, time; signal.signal(2, signal.SIG_IGN); time.sleep(60)"
+child = subprocess.Popen([sys.executable, "-c", deaf])
 with ending_soon_on_interrupt():
     print(child.pid, flush=True)
     try:
