@@ -15,14 +15,14 @@ from flows.commands import options
 def simulate(
     *,
     reading: Any,
-    cell: options.Cell,
+    cell: options.CellOption,
     current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, temperature_degc].")],
     out: Annotated[Path, typer.Option(help="CSV to write: time, current, voltage and states.")],
     soc0: options.Soc0 = None,
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
-    model: options.Model = "espm",
+    model: options.ModelOption = "espm",
 ) -> None:
     """The physics model alone, under a current profile."""
     from aesi.pipeline.simulation import simulate_file
@@ -77,7 +77,7 @@ def predict(
 def calibrate(
     *,
     reading: Any,
-    cell: options.Cell,
+    cell: options.CellOption,
     data: Annotated[list[Path], typer.Option("--data", help="Measurement to fit; may be given again.")],
     out: Annotated[Path, typer.Option(help="BPX file to write; a report is written beside it.")],
     soc0: options.Soc0 = None,

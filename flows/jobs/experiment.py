@@ -19,11 +19,11 @@ from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import working_on
 
 if TYPE_CHECKING:
-    from flows.jobs.stages import Run
+    from flows.jobs.stages import RunStage
     from flows.tracking.tracker import Tracker
 
 
-def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
+def run_experiment(request: RunRequest, run: RunStage, console: Console) -> Path:
     """The flow itself; `run` runs a stage."""
     from flows.tracking.store import Store
 
@@ -42,7 +42,7 @@ def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
 def _stages(
     request: RunRequest,
     tracker: Tracker,
-    run: Run,
+    run: RunStage,
     console: Console,
     started: float,
 ) -> Path:
