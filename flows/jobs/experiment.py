@@ -88,7 +88,7 @@ def _stages(
         failed=len(found.result.trials) - len(rows),
     )
     summary = run("report", lambda: write_outputs(folder, result))
-    track_result(tracker, folder, summary, found.number)
+    track_result(tracker, folder, summary, found.number, fitted)
     return folder
 
 
