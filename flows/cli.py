@@ -13,9 +13,8 @@ import typer
 
 from aesi.errors import AesiError
 from flows.base import environment
+from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt
 from flows.commands import bench, cell, data, effects, experiment
-
-INTERRUPTED = 130  # what shells return for a process that Ctrl-C ended
 
 app = typer.Typer(
     name="aesi",
@@ -54,7 +53,8 @@ def main() -> NoReturn:
     """Entry point of the `aesi` script."""
     environment.prepare()
     try:
-        app(args=repeated(sys.argv[1:]))
+        with ending_soon_on_interrupt():
+            app(args=repeated(sys.argv[1:]))
     except AesiError as error:
         _fail(str(error), error.exit_code)
     except MemoryError:
