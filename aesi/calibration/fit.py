@@ -18,7 +18,7 @@ from aesi.errors import DataError, FitError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
-from aesi.records import Hold, Measurement
+from aesi.records import Measurement
 
 EVALUATIONS = 40
 GAIN = 1e-4
@@ -97,18 +97,16 @@ def calibrate(
     *,
     soc0: float | None = None,
     temperatures_degc: Mapping[str, float] | None = None,
-    hold: Hold | None = None,
     evaluations: int = EVALUATIONS,
 ) -> Calibration:
     """Capacities, stoichiometry windows, potential, diffusion, kinetics, electrolyte and contacts, with temperature.
 
     records : at least one, of any temperatures: their column, or `temperatures_degc` by name, or the cell file's.
-    soc0 : of every record that its voltage does not contradict.  hold : how the current runs between rows, where a
-    record is slow enough to be fitted as it is.
+    soc0 : of every record that its voltage does not contradict.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
-    model, notes = problem(cell, records, soc0, temperatures_degc or {}, hold)
+    model, notes = problem(cell, records, soc0, temperatures_degc or {})
     x = descended(model, evaluations)
     jacobian, errors = model.jacobian(x), model.errors(x)
     weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
@@ -142,7 +140,6 @@ def problem(
     records: Sequence[Measurement],
     soc0: float | None,
     temperatures_degc: Mapping[str, float],
-    hold: Hold | None,
 ) -> tuple[Model, tuple[str, ...]]:
     """What is fitted, and sentences on how it was set up."""
     if not records:
@@ -153,7 +150,7 @@ def problem(
     kept = [one_branch(start, data) for data in records]
     placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
     start, typical = with_activation(start)
-    ready = prepared(start, placed, soc0, hold)
+    ready = prepared(start, placed, soc0)
     for one in ready:
         _check_charge(start, one)
     span = _span_k(start, ready)

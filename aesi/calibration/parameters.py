@@ -92,10 +92,10 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
     if span_k > SPAN_K:
         n, p, e = cell.negative, cell.positive, cell.electrolyte
         out += [
-            Free("negative.diffusivity_energy", n.diffusivity_ea_j_mol, 15e3, "J/mol", ENERGIES, low=0.0),
-            Free("positive.diffusivity_energy", p.diffusivity_ea_j_mol, 15e3, "J/mol", ENERGIES, low=0.0),
-            Free("negative.rate_energy", n.rate_ea_j_mol, 12e3, "J/mol", KINETIC_ENERGIES, low=0.0),
-            Free("positive.rate_energy", p.rate_ea_j_mol, 12e3, "J/mol", KINETIC_ENERGIES, low=0.0),
+            Free("negative.diffusivity_energy", n.diffusivity_ea_j_mol, 20e3, "J/mol", ENERGIES, low=0.0),
+            Free("positive.diffusivity_energy", p.diffusivity_ea_j_mol, 20e3, "J/mol", ENERGIES, low=0.0),
+            Free("negative.rate_energy", n.rate_ea_j_mol, 20e3, "J/mol", KINETIC_ENERGIES, low=0.0),
+            Free("positive.rate_energy", p.rate_ea_j_mol, 20e3, "J/mol", KINETIC_ENERGIES, low=0.0),
             Free("electrolyte.conductivity_energy", e.conductivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
             Free("electrolyte.diffusivity_energy", e.diffusivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
             Free("film.resistance", cell.film_resistance_ohm, 0.5 * ohm, "ohm", FILMS, low=0.0),

@@ -55,24 +55,22 @@ class Prepared:
         return None if self.kelvin is None else float(self.kelvin.mean())
 
 
-def prepared(
-    cell: Cell, records: Sequence[Measurement], soc0: float | None, hold: Hold | None
-) -> tuple[Prepared, ...]:
+def prepared(cell: Cell, records: Sequence[Measurement], soc0: float | None) -> tuple[Prepared, ...]:
     """Every record with its rows and its initial state.  soc0 : of all that their voltage does not contradict."""
-    return tuple(_prepared(cell, data, soc0, hold, len(records) > 1) for data in records)
+    return tuple(_prepared(cell, data, soc0, len(records) > 1) for data in records)
 
 
-def _prepared(cell: Cell, data: Measurement, soc0: float | None, hold: Hold | None, shared: bool) -> Prepared:
+def _prepared(cell: Cell, data: Measurement, soc0: float | None, shared: bool) -> Prepared:
     window_s = max(1.0, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
     thin = thinned(data, cell.capacity_ah, window_s)
-    start = initial_state(cell, data, soc0, hold or "backward", shared=shared)
+    start = initial_state(cell, data, soc0, data.hold or "backward", shared=shared)
     sd = start.sd if start.basis == "given" else max(start.sd, SOC_SD)
     temperature = thin.data.temperature_degc
     current = np.abs(thin.data.current_a)
     return Prepared(
         data=data,
         rows=thin.data,
-        hold=hold if hold is not None and thin.data is data else thin.hold,
+        hold=data.hold if data.hold is not None and thin.data is data else thin.hold,
         longest_s=thin.longest_s,
         kelvin=None if temperature is None else np.ascontiguousarray(temperature + ZERO_CELSIUS_K),
         start=start,

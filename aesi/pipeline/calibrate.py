@@ -12,10 +12,11 @@ import numpy as np
 
 from aesi.calibration import Calibration, calibrate
 from aesi.calibration.posterior import Posterior, sampled
+from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import Hold, Measurement, Spectrum
+from aesi.records import Measurement, Spectrum
 
 SCHEMA = "aesi.calibration/2"
 MV = 1e3
@@ -31,7 +32,6 @@ class Request:
 
     soc0: float | None = None
     temperatures_degc: Mapping[str, float] | None = None
-    hold: Hold | None = None
     impedance: tuple[Spectrum, ...] = ()
     posterior: int = 0
     seed: int = 0
@@ -46,12 +46,13 @@ def calibrate_files(
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
     asked = request or Request()
+    declared = declared_model(cell).cell
+    check_belongs(declared, measurements)
     found = calibrate(
-        declared_model(cell).cell,
+        declared,
         measurements,
         soc0=asked.soc0,
         temperatures_degc=asked.temperatures_degc,
-        hold=asked.hold,
     )
     if asked.title is not None:
         found = replace(found, cell=replace(found.cell, name=asked.title, description=_made_from(found)))

@@ -13,8 +13,9 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics import Cell, impedance
 from aesi.physics.effect import ActiveEffect
+from aesi.physics.effects import activated
 from aesi.pipeline.product.declared import declared_model
-from aesi.pipeline.simulation import activated, write_table
+from aesi.pipeline.simulation import write_table
 from aesi.records import Spectrum
 
 BAND_HZ = (0.01, 100.0)

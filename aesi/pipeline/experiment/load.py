@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.data import read_measurement
+from aesi.data.read import read
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
-from aesi.errors import ConfigError, DataAway, DataError
+from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, initial_state, simulate
+from aesi.physics.effects import activated
+from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
@@ -129,6 +131,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     soc0: dict[str, float] = {}
     notes: list[str] = []
     for name, (measurement, known_soc0) in sources.records.items():
+        check_belongs(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, config.data.hold, effects)
         soc0[name] = start.soc
@@ -167,8 +170,7 @@ def _sources(config: ExperimentConfig) -> _Sources:
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
-        name: (read_measurement(where(name), data.columns or None, data.sign), None)
-        for name in dict.fromkeys(names)
+        name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
     }
     return _Sources(records, roles)
 
@@ -200,12 +202,11 @@ def _split(data: DataConfig, series: dict[str, ErrorSeries], roles: dict[Role, t
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
-    from aesi.physics.effects import CATALOGUE
-
-    unknown = [name for name in config.cell.effects if name not in CATALOGUE]
-    if unknown:
-        raise ConfigError(f"cell.effects: there is no effect {unknown[0]!r}; `aesi effects` lists them.")
-    return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
+    files = [config.path(name) for name in config.cell.effect_files]
+    try:
+        return activated(config.cell.effects.items(), files)
+    except InputError as error:
+        raise ConfigError(f"{config.name}: cell: {error}") from None
 
 
 def cell_path(config: ExperimentConfig) -> Path:
