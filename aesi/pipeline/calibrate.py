@@ -12,6 +12,7 @@ import numpy as np
 
 from aesi.calibration import Calibration, calibrate
 from aesi.calibration.posterior import Posterior, sampled
+from aesi.calibration.start import sized
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
@@ -47,7 +48,7 @@ def calibrate_files(
     """
     asked = request or Request()
     declared = declared_model(cell).cell
-    check_belongs(declared, measurements)
+    check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     found = calibrate(
         declared,
         measurements,
