@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from aesi.physics.dfn.local_kernels import COMPILED, equilibrium, row_lookup
+from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
 from aesi.physics.dfn.newton_kernels import GAS_OVER_FARADAY
 from aesi.physics.dfn.step_kernels import advance, hold_layers, settle
 from aesi.physics.dfn.transport_kernels import renew, salt_forcing
@@ -18,7 +18,7 @@ DIFFUSIONS = (0, 1, 4)
 """Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
 
 
-@njit(**COMPILED)
+@compiled
 def run_porous(  # type: ignore[no-untyped-def]
     time,
     current,
@@ -143,7 +143,7 @@ def run_porous(  # type: ignore[no-untyped-def]
     return fault_at, fault
 
 
-@njit(**COMPILED)
+@compiled
 def start(p, s, state, t, half, theta0):  # type: ignore[no-untyped-def]
     """Rest: uniform particles, uniform salt, no reaction."""
     state.c.fill(s.c0)
@@ -173,7 +173,7 @@ def set_rates(e, t, t_k):  # type: ignore[no-untyped-def]
         t.rates[i] = arrhenius(e.energies[i], t_k, e.reference_k)
 
 
-@njit(**COMPILED)
+@compiled
 def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untyped-def]
     """Terminal voltage: both collectors, less the drop in the separator and the contacts."""
     gap = 0.0
@@ -183,7 +183,7 @@ def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untype
     return phi_p - phi_n - density * (gap / t.rates[5] + e.contact * e.area)
 
 
-@njit(**COMPILED)
+@compiled
 def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-untyped-def]
     """Heat released (W): what the reaction gives, with its entropy, less what leaves as electric power."""
     power = -current * voltage
@@ -195,7 +195,7 @@ def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-unt
     return power
 
 
-@njit(**COMPILED)
+@compiled
 def record(p, e, state, half, out, k):  # type: ignore[no-untyped-def]
     """Averages of the electrodes, salt at the collectors, plated lithium."""
     for row in range(1, 7):

@@ -13,11 +13,9 @@ Where it goes to and fro, at the edges of potentials, its steps are halved until
 
 import math
 
-from numba import njit
-
 from aesi.physics.dfn.local_kernels import (
-    COMPILED,
     SMALLEST_SALT,
+    compiled,
     equilibrium,
     kinetic_drop,
     occupancy,
@@ -42,7 +40,7 @@ LOST_V = 1e-3
 """A solution is found where what is left of the equations is below this, though Newton's steps do not end."""
 
 
-@njit(**COMPILED)
+@compiled
 def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt, plated, plating):  # type: ignore[no-untyped-def]
     """Currents y of all units (A per m2 of cell); returns the collectors' potentials and the number of steps, negative
     where none solves the equations.
@@ -97,7 +95,7 @@ def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt, p
     return phi_n, phi_p, MOST_STEPS if merit < LOST_V else -MOST_STEPS
 
 
-@njit(**COMPILED)
+@compiled
 def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
     """Salt at the places; potential of every unit, its slopes in y and in the salt; what they come to at a place."""
     places, half = psi.shape[0], psi.shape[0] // 2
@@ -132,7 +130,7 @@ def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, give
         n.shift[r] += n.by_salt[u] * part
 
 
-@njit(**COMPILED)
+@compiled
 def add_side_currents(p, e, t, n, thermal, y, psi, given, salt, plated, plating):  # type: ignore[no-untyped-def]
     """Double layers and plating of each place, into `given` and the conductance."""
     half = psi.shape[0] // 2
@@ -151,7 +149,7 @@ def add_side_currents(p, e, t, n, thermal, y, psi, given, salt, plated, plating)
             n.conductance[r] += ((1.0 - e.plating[1]) * up + e.plating[1] * down) / thermal
 
 
-@njit(**COMPILED)
+@compiled
 def distance(p, t, n, chi, psi, given, salt, phi_n, phi_p):  # type: ignore[no-untyped-def]
     """Largest of what is left of the equations (V)."""
     places, half = psi.shape[0], psi.shape[0] // 2
@@ -167,7 +165,7 @@ def distance(p, t, n, chi, psi, given, salt, phi_n, phi_p):  # type: ignore[no-u
     return worst
 
 
-@njit(**COMPILED)
+@compiled
 def newton_direction(p, t, n, spread, chi, total, psi, given, salt, half):  # type: ignore[no-untyped-def]
     """Newton's step: d_given, d_psi, d_y, d_salt, and the new potentials of both collectors."""
     places = 2 * half
@@ -213,7 +211,7 @@ def newton_direction(p, t, n, spread, chi, total, psi, given, salt, half):  # ty
     return phi_n, phi_p
 
 
-@njit(**COMPILED)
+@compiled
 def eliminate_three(matrix, rhs, n):  # type: ignore[no-untyped-def]
     """Solve in place for three right-hand sides (n, 3); resistances dominate the diagonal, so no rows are swapped."""
     for k in range(n):

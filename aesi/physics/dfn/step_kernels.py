@@ -2,7 +2,7 @@
 
 from numba import njit
 
-from aesi.physics.dfn.local_kernels import COMPILED
+from aesi.physics.dfn.local_kernels import compiled
 from aesi.physics.dfn.newton_kernels import solve_reaction
 from aesi.physics.dfn.transport_kernels import (
     calm_particles,
@@ -26,7 +26,7 @@ SURFACE_TOLERANCE = 1e-6
 PASSES = 6
 
 
-@njit(**COMPILED)
+@compiled
 def find_reaction(p, s, e, state, t, newton, spread, total, t_k):  # type: ignore[no-untyped-def]
     """Solve for the reaction, with the conductivity at the salt `t.salt`; returns as `solve_reaction`."""
     half = s.at.shape[0] // 2
@@ -39,7 +39,7 @@ def find_reaction(p, s, e, state, t, newton, spread, total, t_k):  # type: ignor
     )  # fmt: skip
 
 
-@njit(**COMPILED)
+@compiled
 def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-untyped-def]
     """The reaction at an instant: particles and salt stay as they are, the current has jumped by `change` (2,)."""
     half = s.at.shape[0] // 2
@@ -57,7 +57,7 @@ def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-un
     return find_reaction(p, s, e, state, t, newton, t.no_spread, total, t_k)
 
 
-@njit(**COMPILED)
+@compiled
 def hold_layers(e, state, t, dt, thermal):  # type: ignore[no-untyped-def]
     """Double layers over a step as a conductance and a current; exact for one that relaxes by its own kinetics."""
     for r in range(e.capacity.shape[0]):
@@ -68,7 +68,7 @@ def hold_layers(e, state, t, dt, thermal):  # type: ignore[no-untyped-def]
             t.layer_old[r] = t.layer_c[r] * state.psi[r] + (1.0 - weight) / weight * state.layer[r]
 
 
-@njit(**COMPILED)
+@compiled
 def advance(  # type: ignore[no-untyped-def]
     p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k
 ):  # fmt: skip

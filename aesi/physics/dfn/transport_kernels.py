@@ -10,11 +10,11 @@ this without y1.
 
 from numba import njit
 
-from aesi.physics.dfn.local_kernels import COMPILED
+from aesi.physics.dfn.local_kernels import compiled
 from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights
 
 
-@njit(**COMPILED)
+@compiled
 def renew(p, s, faster, dt, w, taken, w_salt, spread):  # type: ignore[no-untyped-def]
     """Weights of one step length and of factors `faster` (3,) of diffusion (negative, positive, salt).
 
@@ -36,7 +36,7 @@ def renew(p, s, faster, dt, w, taken, w_salt, spread):  # type: ignore[no-untype
             spread[r, v] = spread[v, r] = s.supply * total / s.c0
 
 
-@njit(**COMPILED)
+@compiled
 def calm_particles(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
     """Modes, means and surfaces of all particles without what the reaction at the end of the step does."""
     for u in range(p.place.shape[0]):
@@ -68,7 +68,7 @@ def end_mean(p, t, u, y, dt):  # type: ignore[no-untyped-def]
     return t.calm_mean[u] - 1.5 * p.scale[u] * dt * y
 
 
-@njit(**COMPILED)
+@compiled
 def calm_salt(s, state, t, faster, w):  # type: ignore[no-untyped-def]
     """Modes, and salt over rest at the places, without what the reaction at the end of the step does."""
     strength = s.strength * faster
@@ -98,7 +98,7 @@ def end_salt(s, t, given, w):  # type: ignore[no-untyped-def]
             t.c[i] += s.to_nodes[i, j] * t.q[j]
 
 
-@njit(**COMPILED)
+@compiled
 def salt_at_places(s, q, salt):  # type: ignore[no-untyped-def]
     """salt (places,) over rest."""
     for r in range(s.at.shape[0]):
@@ -108,7 +108,7 @@ def salt_at_places(s, q, salt):  # type: ignore[no-untyped-def]
         salt[r] = 1.0 + value / s.c0
 
 
-@njit(**COMPILED)
+@compiled
 def salt_forcing(s, c, forcing):  # type: ignore[no-untyped-def]
     """forcing[j] : mode j of the integral psi of the diffusivity's variable part, at concentrations c of the nodes."""
     forcing[:] = 0.0
@@ -118,7 +118,7 @@ def salt_forcing(s, c, forcing):  # type: ignore[no-untyped-def]
             forcing[j] += s.project[i, j] * value
 
 
-@njit(**COMPILED)
+@compiled
 def drops(kappa, path, before, after, solid, ohm):  # type: ignore[no-untyped-def]
     """ohm[r, v] (ohm m2): drop from the collector to place r and on to the separator, per current at point v.
 
