@@ -14,7 +14,7 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
-Layout = Literal["aesi", "bdf"]
+WrittenLayout = Literal["aesi", "bdf"]
 BDF_NAMES = {
     "time_s": "Test Time / s",
     "voltage_v": "Voltage / V",
@@ -24,7 +24,7 @@ BDF_NAMES = {
 
 
 def convert_file(
-    path: Path, out: Path, reading: Reading | None = None, layout: Layout = "aesi"
+    path: Path, out: Path, reading: Reading | None = None, layout: WrittenLayout = "aesi"
 ) -> Measurement:
     """Read `path`, check it as every command does, and write it whole to `out`; returns what was written.
 

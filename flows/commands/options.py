@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from aesi.data.reading import Reading
     from aesi.records import Hold, Measurement
 
-Cell = Annotated[Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")]
+CellOption = Annotated[
+    Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
+]
 Soc0 = Annotated[
     float | None, typer.Option("--soc0", min=0.0, max=1.0, help="State of charge at the first row.")
 ]
@@ -34,7 +36,7 @@ HoldOption = Annotated[
     ),
 ]
 
-Model = Annotated[
+ModelOption = Annotated[
     Literal["espm", "dfn"],
     typer.Option(
         "--model", help="Single particle with electrolyte, or porous electrode (Doyle-Fuller-Newman)."
@@ -141,6 +143,11 @@ def measurements(paths: list[Path], reading: Reading, hold: Hold | None = None) 
     from aesi.data.read import read
 
     return tuple(read(path, reading).held(hold) for path in paths)
+
+
+def say_reading(paths: Iterable[Path]) -> None:
+    """The first line of a long command, before the libraries load."""
+    typer.echo(f"Reading {', '.join(path.name for path in paths)} ...", err=True)
 
 
 def say_notes(notes: Iterable[str]) -> None:

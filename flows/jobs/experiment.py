@@ -19,11 +19,11 @@ from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import working_on
 
 if TYPE_CHECKING:
-    from flows.jobs.stages import Run
+    from flows.jobs.stages import RunStage
     from flows.tracking.tracker import Tracker
 
 
-def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
+def run_experiment(request: RunRequest, run: RunStage, console: Console) -> Path:
     """The flow itself; `run` runs a stage."""
     from flows.tracking.store import Store
 
@@ -42,10 +42,11 @@ def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
 def _stages(
     request: RunRequest,
     tracker: Tracker,
-    run: Run,
+    run: RunStage,
     console: Console,
     started: float,
 ) -> Path:
+    from aesi.pipeline.experiment.comparison import comparison
     from aesi.pipeline.experiment.conformalise import conformalise
     from aesi.pipeline.experiment.evaluate import evaluate
     from aesi.pipeline.experiment.fit import build_problem, final_models
@@ -88,7 +89,8 @@ def _stages(
         failed=len(found.result.trials) - len(rows),
     )
     summary = run("report", lambda: write_outputs(folder, result))
-    track_result(tracker, folder, summary, found.number)
+    tracker.json("comparison.json", comparison(result))
+    track_result(tracker, folder, summary, found.number, fitted)
     return folder
 
 

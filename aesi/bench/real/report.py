@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-Row = dict[str, Any]
+from aesi.bench import CaseRow
+
 WIDTH, HEIGHT, MARGIN = 760, 220, 48
 WORST = 5
 COLOURS = {"before": "#999999", "recalibrated": "#d98c1f", "after": "#1f6fb2"}
@@ -20,7 +21,7 @@ STYLE = (
 )
 
 
-def write_report(path: Path, rows: Sequence[Row], summary: Mapping[str, Any]) -> Path:
+def write_report(path: Path, rows: Sequence[CaseRow], summary: Mapping[str, Any]) -> Path:
     """Write the page; rows as `judged` gives them, with their residuals."""
     worst = sorted((r for r in rows if r.get("after_test_mv") is not None), key=lambda r: -r["after_test_mv"])
     parts = [
@@ -61,7 +62,7 @@ def _confusion(matrix: Mapping[str, Mapping[str, int]]) -> str:
     return f"<table><tr><th>right</th><th>said (cases)</th></tr>{''.join(lines)}</table>"
 
 
-def _scatter(rows: Sequence[Row]) -> str:
+def _scatter(rows: Sequence[CaseRow]) -> str:
     """One point a case at (number, found / true), the parameter in its title."""
     if not rows:
         return "<p>No size was found.</p>"
@@ -78,7 +79,7 @@ def _scatter(rows: Sequence[Row]) -> str:
     return _svg(line + dots)
 
 
-def _residual(row: Row) -> str:
+def _residual(row: CaseRow) -> str:
     name = escape(row["case"])
     if "residual" not in row:
         return f"<p>{name}</p>"
@@ -105,7 +106,7 @@ def _svg(content: str) -> str:
     return f"<svg viewBox='0 0 {WIDTH} {HEIGHT}' width='100%' role='img'>{content}</svg>"
 
 
-def _table(rows: Sequence[Row]) -> str:
+def _table(rows: Sequence[CaseRow]) -> str:
     keys = (
         "case",
         "answer",

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from aesi.bench import CaseRow
 from aesi.bench.scoring import rate
 
-Row = dict[str, Any]
 NEAR_K = 2.0
 
 
-def summary(rows: Sequence[Row]) -> Row:
+def summary(rows: Sequence[CaseRow]) -> CaseRow:
     """Rates of all cases that ran; those of the cases that chose nothing stand under `reported`."""
     ran = [r for r in rows if r["verdict"] != "not run"]
     return {
@@ -27,8 +26,8 @@ def summary(rows: Sequence[Row]) -> Row:
     }
 
 
-def _rates(rows: Sequence[Row]) -> Row:
-    def of(group: str) -> list[Row]:
+def _rates(rows: Sequence[CaseRow]) -> CaseRow:
+    def of(group: str) -> list[CaseRow]:
         return [r for r in rows if r["group"] == group]
 
     withheld = [r for r in of("withheld") if "ambient_temperature" in r["answer"][:1]]
@@ -55,11 +54,11 @@ def _rates(rows: Sequence[Row]) -> Row:
     }
 
 
-def _errors(row: Row) -> bool:
+def _errors(row: CaseRow) -> bool:
     return row.get("after_test_mv") is not None and row.get("recalibrated_test_mv") is not None
 
 
-def _at_most(row: Row, times: float) -> bool:
+def _at_most(row: CaseRow, times: float) -> bool:
     """Whether the error on unseen data is at most so many times the better of declared and recalibrated."""
     better = min(row["before_test_mv"], row["recalibrated_test_mv"])
     if times < 1:
@@ -71,7 +70,7 @@ def _median(values: Sequence[float]) -> float | None:
     return float(np.median(values)) if values else None
 
 
-def _confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
+def _confusion(rows: Sequence[CaseRow]) -> dict[str, dict[str, int]]:
     """Answer -> what was said -> cases."""
     out: dict[str, Counter[str]] = {}
     for row in rows:
