@@ -13,9 +13,8 @@ import typer
 
 from aesi.errors import AesiError
 from flows.base import environment
+from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt
 from flows.commands import bench, cell, data, effects, experiment
-
-INTERRUPTED = 130  # what shells return for a process that Ctrl-C ended
 
 app = typer.Typer(
     name="aesi",
@@ -31,10 +30,13 @@ app.command("discover", short_help="Find what physics a model lacks, and add it.
 app.command("calibrate", short_help="Fit the physics model's own parameters.")(cell.calibrate)
 app.command("simulate")(cell.simulate)
 app.command("predict")(cell.predict)
+app.command("export", short_help="A cell and what was found, as BPX or for PyBaMM.")(cell.export)
 app.command("tables", short_help="The paper's tables, from tracked runs alone.")(experiment.tables)
 app.command("effects", short_help="The catalogue of effects.")(effects.effects)
 app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")
 app.command("worker", short_help="One more process on a shared study.")(experiment.worker)
+app.command("compare", short_help="Tracked runs side by side on one page.")(experiment.compare)
+app.command("candidate", short_help="A tracked candidate made again, with its model.")(experiment.candidate)
 app.command("ui")(experiment.ui)
 app.command("bench", short_help="Time the project against its peers.")(bench.bench)
 
@@ -52,7 +54,8 @@ def main() -> NoReturn:
     """Entry point of the `aesi` script."""
     environment.prepare()
     try:
-        app(args=repeated(sys.argv[1:]))
+        with ending_soon_on_interrupt():
+            app(args=repeated(sys.argv[1:]))
     except AesiError as error:
         _fail(str(error), error.exit_code)
     except MemoryError:

@@ -88,7 +88,7 @@ class Electrodes(NamedTuple):
     reference_k: float
 
 
-class State(NamedTuple):
+class DfnState(NamedTuple):
     """What a step changes.
 
     z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y leaves its share of
@@ -114,7 +114,7 @@ class State(NamedTuple):
     plating: Array
 
 
-class Trial(NamedTuple):
+class DfnTrial(NamedTuple):
     """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` is its start.
 
     reach, give : (units,) surface = reach - give y.  force (units, modes + 1), forcing (salt modes,) : at the end.
@@ -155,7 +155,7 @@ class Trial(NamedTuple):
     faster: Array
 
 
-class Newton(NamedTuple):
+class NewtonScratch(NamedTuple):
     """Scratch of Newton's method: by unit pot, slope, by_salt, d_y; by place the others; d_phi of both collectors."""
 
     pot: Array

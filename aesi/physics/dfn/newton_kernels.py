@@ -45,7 +45,7 @@ def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt, p
     """Currents y of all units (A per m2 of cell); returns the collectors' potentials and the number of steps, negative
     where none solves the equations.
 
-    p, e, t, n : Particles, Electrodes, Trial and Newton, see `layout`.  spread : (places, places) m2/A.
+    p, e, t, n : Particles, Electrodes, DfnTrial and NewtonScratch, see `layout`.  spread : (places, places) m2/A.
     total : (2,) current of each electrode, delithiation positive.  t_k : K.
     y, psi : start values in, solution out.  theta, given (Y), salt (over rest), plating (places,) : out.
     """

@@ -7,7 +7,7 @@ import numpy as np
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
-from aesi.physics.dfn.layout import Electrodes, Newton, Particles, Stack, State, Trial, Weights
+from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
 from aesi.physics.espm.kernels import CACHE_SLOTS
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
@@ -45,7 +45,7 @@ def run_porous_electrode(
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
 
 
-def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[State, Trial, Newton, Weights]:
+def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, NewtonScratch, Weights]:
     """State and scratch at rest."""
     units, modes, kinds = len(p.place), len(p.gains), len(p.side)
     places, salt_modes = s.at.shape
@@ -54,12 +54,12 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[State, Trial, Newton
     def of(*shape: int) -> Array:
         return np.zeros(shape)
 
-    state = State(
+    state = DfnState(
         z=of(units, modes), mean=of(units), y=of(units), trend=of(units), theta=of(units), force=of(units, modes + 1),
         q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), given=of(places), psi=of(places), salt=np.ones(places),
         layer=of(places), plated=of(places), plating=of(places),
     )  # fmt: skip
-    trial = Trial(
+    trial = DfnTrial(
         calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
         reach=of(units), give=of(units), y_start=of(units), given_start=of(places),
         force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
@@ -68,7 +68,7 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[State, Trial, Newton
         no_spread=of(places, places), z_end=of(modes), rates=np.ones(6),
         total=of(2), before=of(2), change=of(2), faster=np.ones(3),
     )  # fmt: skip
-    newton = Newton(
+    newton = NewtonScratch(
         pot=of(units), slope=of(units), by_salt=of(units), slack=of(places), shift=of(places), conductance=of(places),
         d_y=of(units), d_psi=of(places), d_given=of(places), d_salt=of(places), d_phi=of(2),
         matrix=of(places, places), rhs=of(places, 3),
