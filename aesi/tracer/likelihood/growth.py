@@ -1,0 +1,179 @@
+"""A hypothesis and one effect more: the effect's parameters by Gauss-Newton, all others to first order.
+
+    min over u of  min over z  |W (e(u) - J z)|^2 + |x + z|^2 + |u|^2        u of the effect, x + z of the parent      (1)
+
+The inner minimum is a projection (variable projection, Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413), so that a
+step costs as many simulations as the effect has parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from aesi.numerics.bounded import descend
+from aesi.numerics.typing import Array, IntArray
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.free_parameter import FreeParameter, of_effect, starts, values_of
+from aesi.tracer.case.problem import InverseProblem, Values
+from aesi.tracer.likelihood.fit import EFFECT_STEP, GAIN_NATS, Fit
+from aesi.tracer.likelihood.gaussian import (
+    Linearised,
+    PredictiveScore,
+    best_over_sizes,
+    block_sums,
+    score_at,
+    whitened,
+)
+from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
+
+SCREEN_STEPS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Parent:
+    """A fitted hypothesis as what grows from it needs it: whitened once at each size of the model error."""
+
+    problem: InverseProblem
+    blocks: Blocks
+    fit: Fit
+
+    @cached_property
+    def white(self) -> dict[float, tuple[Array, Array]]:
+        """Size -> whitened sensitivities (n, m) and log|C| (n,)."""
+        return {
+            delta: whitened(self.problem, self.blocks, self.fit.point.jacobian_v, delta) for delta in SIZES_V
+        }
+
+    @cached_property
+    def movable(self) -> IntArray:
+        """Parameters that are not on a bound, which a linear form cannot see."""
+        bounds = np.array([f.bounds for f in self.fit.free])
+        x = self.fit.point.x
+        return np.flatnonzero((x > bounds[:, 0] + 1e-9) & (x < bounds[:, 1] - 1e-9))
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """A parent and one effect: its parameters fitted, the rest to first order.
+
+    free, point : of what may move.  delta_v : size of the model error during the fit.
+    """
+
+    hypothesis: tuple[str, ...]
+    free: tuple[FreeParameter, ...]
+    point: Linearised
+    score: PredictiveScore
+    simulations: int
+
+    @property
+    def placed(self) -> dict[tuple[str, str], float]:
+        """(owner, name) -> value, with the first-order change of the rest."""
+        x = self.point.x + self.score.shift
+        return {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
+
+
+class _Growth:
+    def __init__(self, parent: Parent, effect: str, delta_v: float) -> None:
+        self.parent, self.effect, self.delta_v = parent, effect, delta_v
+        self.problem, fit = parent.problem, parent.fit
+        self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
+        self.added = tuple(of_effect(effect, self.problem.effects[effect].parameters))
+        bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
+        self.low, self.high = bounds[:, 0], bounds[:, 1]
+        self.held: Values = {o: v for o, v in fit.values.items() if o != effect}
+        self.simulations = 0
+        basis = np.vstack([parent.white[delta_v][0][:, self.rest], np.eye(len(self.rest))])
+        self.q = np.linalg.qr(basis)[0]
+        self._last: tuple[bytes, Array | None] = (b"", None)
+
+    def residual(self, u: Array) -> Array | None:
+        key = u.tobytes()
+        if self._last[0] != key:
+            self.simulations += 1
+            values = {**self.held, **values_of(self.added, u)}
+            predicted = self.problem.predict(values)
+            self._last = (key, None if predicted is None else self.problem.measured - predicted)
+        return self._last[1]
+
+    def jacobian(self, u: Array, e: Array) -> Array | None:
+        out = np.zeros((len(e), len(u)))
+        for j in range(len(u)):
+            size = min(EFFECT_STEP, 0.25 * (self.high[j] - self.low[j]))
+            for h in (size, -size) if u[j] + size <= self.high[j] else (-size, size):
+                moved = u.copy()
+                moved[j] += h
+                if not self.low[j] <= moved[j] <= self.high[j]:
+                    continue
+                self.simulations += 1
+                predicted = self.problem.predict({**self.held, **values_of(self.added, moved)})
+                if predicted is not None:
+                    out[:, j] = (e - (self.problem.measured - predicted)) / h
+                    break
+            else:
+                return None
+        return out
+
+    def projected(self, columns: Array, tail: Array) -> Array:
+        white = whitened(self.problem, self.parent.blocks, columns, self.delta_v)[0]
+        stacked = np.vstack([white, tail])
+        return stacked - self.q @ (self.q.T @ stacked)
+
+    def cost(self, u: Array) -> float:
+        e = self.residual(u)
+        if e is None:
+            return np.inf
+        tail = -self.parent.fit.point.x[self.rest][:, None]
+        return 0.5 * float(np.sum(self.projected(e[:, None], tail) ** 2) + u @ u)
+
+    def linearise(self, u: Array) -> tuple[Array, Array] | None:
+        e = self.residual(u)
+        jacobian = None if e is None else self.jacobian(u, e)
+        if e is None or jacobian is None:
+            return None
+        x = self.parent.fit.point.x[self.rest]
+        tail = np.column_stack([-x, np.zeros((len(x), len(u)))])
+        table = self.projected(np.column_stack([e, -jacobian]), tail)
+        return np.concatenate([table[:, 0], u]), np.vstack([table[:, 1:], np.eye(len(u))])
+
+
+def grow(parent: Parent, effect: str, delta_v: float, warm: Sequence[Array] = ()) -> Grown | None:
+    """The parent and one effect more, from several starts; None where it cannot be simulated.
+
+    delta_v : one of the tried sizes, at which the effect's parameters are fitted.  warm : further starts.
+    """
+    growth = _Growth(parent, effect, delta_v)
+    best: tuple[float, Array] | None = None
+    for start in (*warm, *starts(growth.added)):
+        u0 = np.clip(start, growth.low, growth.high)
+        end = descend(growth.linearise, growth.cost, u0, growth.low, growth.high, SCREEN_STEPS, GAIN_NATS)
+        if np.isfinite(end.cost) and (best is None or end.cost < best[0]):
+            best = end.cost, end.x
+    if best is None:
+        return None
+    u = best[1]
+    e = growth.residual(u)
+    jacobian = None if e is None else growth.jacobian(u, e)
+    if e is None or jacobian is None:
+        return None
+    return _scored(growth, u, e, jacobian)
+
+
+def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
+    parent, fit = growth.parent, growth.parent.fit
+    x = np.concatenate([fit.point.x[growth.rest], u])
+    prior, out = PRIORS[growth.problem.trust], []
+    own_columns = np.column_stack([e, jacobian])
+    for delta in SIZES_V:
+        known, _ = parent.white[delta]
+        new, log_det = whitened(growth.problem, parent.blocks, own_columns, delta)
+        table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
+        sums = block_sums(parent.blocks, table, log_det)
+        out.append(score_at(growth.problem, parent.blocks, sums, x, delta, prior.log_density(delta)))
+    hypothesis = (*fit.hypothesis, growth.effect)
+    free = (*(fit.free[j] for j in growth.rest), *growth.added)
+    point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian]))
+    return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations)
