@@ -25,7 +25,7 @@ from aesi.physics import Cell
 from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.records import Failed, Split
 from aesi.sparse import Genome, Options, Problem, evaluate
-from aesi.sparse.fold_models import fold_models, with_leverage
+from aesi.sparse.search.fold_models import fold_models, with_leverage
 
 ALPHA = 0.1
 HORIZONS_S = (1.0, 10.0, 60.0)

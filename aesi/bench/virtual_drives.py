@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.polynomial.chebyshev import chebval
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.profile import Bench, Profile, paper_profiles
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
@@ -108,7 +109,7 @@ def _in_turn(
     bench = Bench(capacity_ah, DT_S)
     once = bench.drive("wltc_3b")
     drives = [(test if k + 1 in TEST_REPEATS else train)(once) for k in range(N_REPEATS)]
-    share = float(np.sum(drives)) * DT_S / 3600 / capacity_ah
+    share = float(np.sum(drives)) * DT_S / SECONDS_PER_HOUR / capacity_ah
     scale = (SOC_START - SOC_END) / share
     pieces = [bench.rest(60.0), *(scale * drive for drive in drives)]
     return {"record": (bench.profile("drive", pieces, SOC_START),)}

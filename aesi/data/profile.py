@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.drive import schedule
 from aesi.data.vehicle import Pack, Vehicle
 from aesi.numerics.typing import Array
-
-SECONDS_PER_HOUR = 3600.0
 
 
 @dataclass(frozen=True, eq=False)

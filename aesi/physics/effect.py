@@ -84,11 +84,6 @@ class Effect:
     infers: Measurable | None = None
     refines: Refinement | None = None
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        from aesi.physics.effects import find_effect
-
-        return find_effect, (self.id, self.file)
-
     def activate(self, **values: float) -> ActiveEffect:
         """This effect with the given parameters, defaults elsewhere.
 
@@ -153,15 +148,8 @@ class ActiveEffect:
         return self.effect.id, self.effect.file, self.values
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-ready; `from_dict` gives it back."""
+        """JSON-ready; `aesi.physics.effects.active_effect` gives it back."""
         out: dict[str, Any] = {"effect": self.effect.id, "parameters": self.parameters}
         if self.effect.file is not None:
             out["file"] = self.effect.file
         return out
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> ActiveEffect:
-        """Inverse of `to_dict`.  Raises InputError for an unknown effect, ParameterError for its values."""
-        from aesi.physics.effects import find_effect
-
-        return find_effect(str(content["effect"]), content.get("file")).activate(**content["parameters"])

@@ -15,11 +15,11 @@ from typing import Literal
 
 import numpy as np
 
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
-from aesi.physics.constants import ZERO_CELSIUS_K
 from aesi.physics.effect import ActiveEffect, Record, Trace
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel

@@ -42,7 +42,7 @@ def run(
     """
     from aesi.pipeline.experiment.fit import build_problem
     from aesi.pipeline.experiment.load import load
-    from flows import environment
+    from flows.base import environment
 
     environment.prepare()
     config = read_experiment(experiment, overrides)
@@ -73,7 +73,7 @@ def _genomes(problem: Problem, candidates: int) -> list[Genome]:
 
 def _measured(config: ExperimentConfig, genomes: Sequence[Genome], workers: int) -> tuple[float, list[float]]:
     """Wall seconds of all candidates, and the processor seconds of each worker."""
-    from flows.dask_pool import DaskPool
+    from flows.evaluation.dask_pool import DaskPool
 
     pool = DaskPool(config.model_dump_json(), str(config.base), None, workers, config.search.timeout_s)
     try:

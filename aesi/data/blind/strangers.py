@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.simulator import Trace
 from aesi.numerics.typing import Array
-
-SECONDS_PER_HOUR = 3600.0
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.cache import key_of, remember
 from aesi.data.laboratory.changes import CONTACT_RESISTANCE, Change, find_change
 from aesi.data.profile import Profile
@@ -27,7 +28,6 @@ Model = Literal["SPMe", "DFN"]
 VERSION = 4
 """Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
 
-SECONDS_PER_HOUR = 3600.0
 EDGE_SHARE = 0.15
 """A change of the current between two rows by this share of its range is an edge."""
 MOST_EDGES = 400

@@ -8,17 +8,22 @@ from typing import Any
 
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
-from aesi.physics.cell.cell import Cell, Electrode, Electrolyte, Separator, require_positive
+from aesi.physics.cell.parts import (
+    CONTACT_RESISTANCE,
+    CellParameters,
+    Electrode,
+    Electrolyte,
+    Separator,
+    require_positive,
+)
 from aesi.physics.cell.relations import Constant, Relation, relation
 
-CONTACT_RESISTANCE = "Contact resistance [Ohm]"
-"""A field of the user-defined section: BPX itself has none for it."""
 DEFAULT_TEMPERATURE_K = 298.15
 
 Fields = Mapping[str, Any]
 
 
-def read_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> Cell:
+def read_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> CellParameters:
     """See `Cell.from_bpx`."""
     v1, where = load_bpx(source)
     try:
@@ -27,7 +32,7 @@ def read_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> Cell:
         raise CellError(f"{where}: the field {error.args[0]!r} is missing, which this model needs.") from None
 
 
-def _cell(v1: dict[str, Any], where: str) -> Cell:
+def _cell(v1: dict[str, Any], where: str) -> CellParameters:
     parts = v1["Parameterisation"]
     fields, header = parts["Cell"], v1["Header"]
     state = v1.get("State") or {}
@@ -35,7 +40,7 @@ def _cell(v1: dict[str, Any], where: str) -> Cell:
     thermal = state.get("Thermal environment") or {}
     reference = float(fields.get("Reference temperature [K]") or DEFAULT_TEMPERATURE_K)
     user = parts.get("User-defined") or {}
-    cell = Cell(
+    cell = CellParameters(
         negative=_electrode(parts["Negative electrode"], f"{where}: Negative electrode"),
         separator=_separator(parts["Separator"]),
         positive=_electrode(parts["Positive electrode"], f"{where}: Positive electrode"),
@@ -114,7 +119,7 @@ def _electrolyte(fields: Fields, initial: Fields, what: str) -> Electrolyte:
     )
 
 
-def _check_values(cell: Cell, where: str) -> None:
+def _check_values(cell: CellParameters, where: str) -> None:
     for label, electrode in (("Negative electrode", cell.negative), ("Positive electrode", cell.positive)):
         require_positive(
             f"{where}: {label}",

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from aesi.physics.cell.bpx_read import CONTACT_RESISTANCE
-from aesi.physics.cell.cell import Cell, Electrode
+from aesi.physics.cell.parts import CONTACT_RESISTANCE, CellParameters, Electrode
 from aesi.physics.cell.relations import to_bpx
 
 BPX_VERSION = "1.1.0"
 ELECTROLYTE_TABLE_MOL_M3 = (1.0, 4000.0)
 
 
-def write_bpx(cell: Cell) -> dict[str, Any]:
+def write_bpx(cell: CellParameters) -> dict[str, Any]:
     """See `Cell.to_bpx`."""
     header = {"BPX": BPX_VERSION, "Title": cell.name, "Model": "DFN"}
     if cell.description:

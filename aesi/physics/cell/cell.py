@@ -1,4 +1,4 @@
-"""A cell as its BPX file declares it: frozen, in SI units, hashable by value.
+"""A cell and its BPX file, and the state of charge that a rest voltage tells.
 
 Sign convention of the whole package: current is positive on discharge.
 """
@@ -6,170 +6,33 @@ Sign convention of the whole package: current is positive on discharge.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
-from aesi.errors import CellError
-from aesi.numerics.typing import Array
-from aesi.physics.cell.relations import Constant, Relation
-from aesi.physics.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
-
-NO_ENTROPY = Constant(0.0)
+from aesi.errors import SimulationError
+from aesi.physics.cell.bpx_read import read_bpx
+from aesi.physics.cell.bpx_write import write_bpx
+from aesi.physics.cell.parts import CellParameters
 
 
 @dataclass(frozen=True)
-class Electrode:
-    """A porous electrode of one active material.
-
-    Lengths in m, concentrations in mol/m3, diffusivity in m2/s at stoichiometry x, open-circuit potential in
-    V against Li/Li+, entropic coefficient in V/K, effective solid conductivity in S/m, rate constant in
-    mol/(m2 s) so that the exchange current density is F K sqrt(c_e/c_e0 x (1 - x)), activation energies in
-    J/mol.
-    """
-
-    thickness_m: float
-    particle_radius_m: float
-    area_per_volume_1_m: float
-    porosity: float
-    transport_efficiency: float
-    conductivity_s_m: float
-    theta_min: float
-    theta_max: float
-    c_max_mol_m3: float
-    diffusivity: Relation
-    ocp: Relation
-    rate_constant: float
-    entropic: Relation = NO_ENTROPY
-    diffusivity_ea_j_mol: float = 0.0
-    rate_ea_j_mol: float = 0.0
-    ocp_lithiation: Relation | None = None
-    ocp_delithiation: Relation | None = None
-    hysteresis_decay: float | None = None
-
-    @property
-    def active_fraction(self) -> float:
-        """Volume fraction of active material, a R / 3."""
-        return self.area_per_volume_1_m * self.particle_radius_m / 3.0
-
-
-@dataclass(frozen=True)
-class Separator:
-    """Thickness in m; porosity and transport efficiency are fractions."""
-
-    thickness_m: float
-    porosity: float
-    transport_efficiency: float
-
-
-@dataclass(frozen=True)
-class Electrolyte:
-    """Concentration in mol/m3, conductivity in S/m and diffusivity in m2/s as functions of concentration."""
-
-    c0_mol_m3: float
-    transference: float
-    conductivity: Relation
-    diffusivity: Relation
-    conductivity_ea_j_mol: float = 0.0
-    diffusivity_ea_j_mol: float = 0.0
-
-
-@dataclass(frozen=True)
-class Cell:
-    """Everything a simulation needs to know about a cell.
-
-    Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no
-    thermal data), contact resistance in ohm in series with the whole cell.
-    """
-
-    negative: Electrode
-    separator: Separator
-    positive: Electrode
-    electrolyte: Electrolyte
-    electrode_area_m2: float
-    electrode_pairs: int
-    nominal_capacity_ah: float
-    lower_voltage_v: float
-    upper_voltage_v: float
-    reference_temperature_k: float = 298.15
-    initial_temperature_k: float = 298.15
-    ambient_temperature_k: float = 298.15
-    density_kg_m3: float | None = None
-    specific_heat_j_kg_k: float | None = None
-    volume_m3: float | None = None
-    surface_area_m2: float | None = None
-    contact_resistance_ohm: float = 0.0
-    name: str = "cell"
-    description: str = ""
-    references: str = ""
+class Cell(CellParameters):
+    """A cell as a BPX file declares it; its fields are those of `CellParameters`."""
 
     @classmethod
-    def from_bpx(cls, source: str | PathLike[str] | Mapping[str, Any]) -> Cell:
+    def from_bpx(cls, source: str | PathLike[str] | Mapping[str, Any]) -> Self:
         """Read a BPX file (a path) or what it holds (a dict), versions 0.x and 1.x.
 
         Raises CellError, one sentence, for a file that fails the schema or lacks a field this model needs.
         """
-        from aesi.physics.cell.bpx_read import read_bpx
-
-        return read_bpx(source)
+        return cls(**vars(read_bpx(source)))
 
     def to_bpx(self) -> dict[str, Any]:
         """The cell as a BPX 1.x dict; `Cell.from_bpx` gives the cell back."""
-        from aesi.physics.cell.bpx_write import write_bpx
-
         return write_bpx(self)
-
-    @property
-    def total_area_m2(self) -> float:
-        """Area of all electrode pairs."""
-        return self.electrode_area_m2 * self.electrode_pairs
-
-    def electrode_capacity_ah(self, electrode: Electrode) -> float:
-        """Charge that takes an electrode from stoichiometry 0 to 1."""
-        volume = self.total_area_m2 * electrode.thickness_m
-        return FARADAY_C_MOL * electrode.active_fraction * volume * electrode.c_max_mol_m3 / SECONDS_PER_HOUR
-
-    @property
-    def capacity_ah(self) -> float:
-        """Charge between the stoichiometry limits of the negative electrode."""
-        window = self.negative.theta_max - self.negative.theta_min
-        return window * self.electrode_capacity_ah(self.negative)
-
-    @property
-    def heat_capacity_j_k(self) -> float | None:
-        """Density times specific heat times volume, or None where one of them is not declared."""
-        if self.density_kg_m3 is None or self.specific_heat_j_kg_k is None or self.volume_m3 is None:
-            return None
-        return self.density_kg_m3 * self.specific_heat_j_kg_k * self.volume_m3
-
-    def stoichiometries(self, soc: float) -> tuple[float, float]:
-        """Rest stoichiometries (negative, positive) at a state of charge, by the declared limits."""
-        n, p = self.negative, self.positive
-        theta_n = n.theta_min + soc * (n.theta_max - n.theta_min)
-        theta_p = p.theta_max - soc * (p.theta_max - p.theta_min)
-        return theta_n, theta_p
-
-    def rest_voltage_v(self, soc: float | Array) -> Array:
-        """(n,) V, the open-circuit voltage at the reference temperature."""
-        z = np.atleast_1d(np.asarray(soc, dtype=float))
-        n, p = self.negative, self.positive
-        theta_n = n.theta_min + z * (n.theta_max - n.theta_min)
-        theta_p = p.theta_max - z * (p.theta_max - p.theta_min)
-        return p.ocp(theta_p) - n.ocp(theta_n)
-
-    def with_negative(self, **changes: Any) -> Cell:
-        """A copy with fields of the negative electrode replaced."""
-        return replace(self, negative=replace(self.negative, **changes))
-
-    def with_positive(self, **changes: Any) -> Cell:
-        """A copy with fields of the positive electrode replaced."""
-        return replace(self, positive=replace(self.positive, **changes))
-
-    def with_electrolyte(self, **changes: Any) -> Cell:
-        """A copy with fields of the electrolyte replaced."""
-        return replace(self, electrolyte=replace(self.electrolyte, **changes))
 
 
 SOC_GRID = 4001
@@ -182,8 +45,6 @@ def initial_soc(cell: Cell, voltage_v: float) -> float:
     Voltages up to 2 % of state of charge beyond the declared limits are accepted (a full cell relaxes to
     slightly above or below its nominal voltage). Raises SimulationError outside, naming the range.
     """
-    from aesi.errors import SimulationError
-
     soc = np.linspace(-SOC_MARGIN, 1.0 + SOC_MARGIN, SOC_GRID)
     limits = [(e.theta_min, e.theta_max) for e in (cell.negative, cell.positive)]
     inside = np.ones(SOC_GRID, dtype=bool)
@@ -205,10 +66,3 @@ def initial_soc(cell: Cell, voltage_v: float) -> float:
             "starts at rest and belongs to this cell, or give soc0."
         )
     return float(np.interp(voltage_v, ocv, soc))
-
-
-def require_positive(what: str, **values: float) -> None:
-    """Raise CellError for the first value that is not a positive number."""
-    for name, value in values.items():
-        if not value > 0 or not np.isfinite(value):
-            raise CellError(f"{what}: {name} = {value:g} has to be a positive number.")

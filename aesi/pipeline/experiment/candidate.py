@@ -15,7 +15,7 @@ from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import ErrorSeries, Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
-from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.search.genome_space import GenomeSpace
 
 CALIBRATION_RESIDUALS = 26_000
 """What a candidate's intervals are calibrated on. Thinned to pieces that each lose their first window, this leaves

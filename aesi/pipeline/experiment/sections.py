@@ -109,8 +109,9 @@ class LibraryConfig(Section):
 
     p_c, d : range of the highest polynomial order and of the total degree; their upper ends make the library.
     factors : most variables in a product.  special : with trigonometric and hyperbolic functions.
-    mixed : and their products with first-order terms.  inputs : None takes the paper's; `aesi.sparse.inputs` names
-    those that can be derived, such as I_next, the current that flows while the predicted error arises.
+    mixed : and their products with first-order terms.
+    inputs : None takes the paper's; `aesi.sparse.terms.inputs` names those that can be derived, such as I_next, the
+    current that flows while the predicted error arises.
     """
 
     p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (0, 3)

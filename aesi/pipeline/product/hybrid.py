@@ -17,6 +17,7 @@ from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics.effects import active_effect
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.initial_state import rest_soc
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
@@ -101,7 +102,7 @@ class HybridModel:
         try:
             return HybridModel(
                 cell=Cell.from_bpx(part_file(folder, "cell.bpx")),
-                effects=tuple(ActiveEffect.from_dict(content) for content in parts.get("effects", ())),
+                effects=tuple(active_effect(content) for content in parts.get("effects", ())),
                 correction=SparseModel.from_dict(correction) if correction else None,
                 intervals=calibrated_from_dict(intervals) if intervals else None,
                 bands=FreeRunBands.from_dict(bands) if bands else None,

@@ -17,10 +17,10 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
-from aesi.sparse.inputs import with_inputs
-from aesi.sparse.judge import memory_of
-from aesi.sparse.problem import Problem
-from aesi.sparse.scaling import Scaling
+from aesi.sparse.search.judge import memory_of
+from aesi.sparse.search.problem import Problem
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.scaling import Scaling
 
 _ITERATIONS = 200
 

@@ -1,0 +1,173 @@
+"""One candidate of the search: fit on all resamples, judge, combine. Pure in problem and genome."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.numerics.metrics import pearson
+from aesi.numerics.typing import Array, IntArray
+from aesi.records import Failed
+from aesi.sparse.ensemble import Ensemble, best_members, combine
+from aesi.sparse.model import SparseModel
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.judge import FoldRuns, fold_runs, on_validation
+from aesi.sparse.search.out_of_bag import out_of_bag
+from aesi.sparse.search.problem import Problem
+from aesi.sparse.stridge import STRidge
+
+
+@dataclass(frozen=True)
+class FitnessWeights:
+    """gamma of the paper's loss; each loss is made comparable first (see `Candidate`).
+
+    The paper gives none. Validation counts most by default: it is a free run over whole records or long
+    pieces, as in use, while the out-of-bag loss runs for one block; sparsity decides between equals.
+    """
+
+    oob: float = 0.25
+    valid: float = 0.70
+    sparse: float = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class HonestResiduals:
+    """Errors that a model left which had not seen them, for calibration.
+
+    one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
+    by models fitted on all rows but the piece around each.
+    """
+
+    record: str
+    one_step_v: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """What became of a genome.
+
+    loss_oob, loss_valid : mean squared error over that of the bare physics model on the same samples, in the
+    problem's regime (1 is no better than none). loss_oob is the mean over the members, see out_of_bag.py.
+    loss_valid is the mean over both ensembles, on the validation records; where there are none, on the left-out
+    pieces, by fits of all and of the stable terms.
+    loss_sparse : number of active terms of AESI I.
+    fitness : 1 - (g1 loss_oob + g2 loss_valid + g3 loss_sparse / library size).
+    pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run (on training
+    rows, started anew with each fold).
+    free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (of the fold models
+    on the folds where there are none).
+    """
+
+    genome: Genome
+    loss_oob: float
+    loss_valid: float
+    loss_sparse: int
+    fitness: float
+    pearson_train: float
+    pearson_valid: float
+    free_run_valid_mser_pct: float
+    one_step_valid_rmse_v: float
+    bagging: SparseModel
+    stability: SparseModel
+    residuals: tuple[HonestResiduals, ...]
+    oob_by_resample: Array
+
+    @property
+    def losses(self) -> tuple[float, float, float]:
+        """The three objectives, all to be minimised."""
+        return self.loss_oob, self.loss_valid, float(self.loss_sparse)
+
+
+def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = None) -> Candidate | Failed:
+    """Fit, judge and combine one candidate.
+
+    Returns Failed, with the reason, where no term is admitted, thresholding leaves none, every resample
+    diverges in free run, no term is stable, or the combined models diverge on the validation data.
+    """
+    active = np.flatnonzero(genome.active(problem.library))
+    if not len(active):
+        return Failed(
+            f"no term is left within p_c = {genome.p_c}, d = {genome.d}, feedback = {genome.feedback}"
+        )
+    solver = STRidge(genome.lambda1, genome.lambda2)
+    columns = np.append(active, len(problem.library))
+    fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.factors])
+    alive = fits.any(axis=1)
+    if not alive.any():
+        return Failed(f"every coefficient is below lambda2 = {genome.lambda2:g} in every resample")
+    losses = np.full(len(fits), np.inf)
+    losses[alive] = out_of_bag(problem, active, fits[alive], np.flatnonzero(alive))
+    best = best_members(losses, problem.options.best)
+    if not len(best):
+        return Failed("every resample diverges in free run")
+    ensemble = combine(fits[best], problem.full_factor[:, columns], genome.tau, solver)
+    if not ensemble.stability.any():
+        return Failed(
+            f"no term reaches an inclusion probability of tau = {genome.tau:g}, or survives the refit"
+        )
+    fold_fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.fold_factors])
+    stable = np.append(ensemble.stability != 0, True)
+    refits = np.zeros_like(fold_fits)
+    refits[:, stable[:-1]] = [
+        solver.fit_factor(factor[:, columns[stable]]) for factor in problem.fold_factors
+    ]
+    runs, memory = fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
+    bagging, stability = (
+        sparse_model(problem, active, coefficients, memory, name, ensemble)
+        for name, coefficients in (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
+    )
+    valid = on_validation(problem, runs, (bagging, stability))
+    if not np.isfinite(valid.loss):
+        return Failed("the model diverges in free run on the validation data")
+    weights = weights or FitnessWeights()
+    loss_oob = float(losses[best].mean())
+    count = int(np.count_nonzero(ensemble.bagging))
+    return Candidate(
+        genome=genome,
+        loss_oob=loss_oob,
+        loss_valid=valid.loss,
+        loss_sparse=count,
+        fitness=fitness((loss_oob, valid.loss, count), len(problem.library), weights),
+        pearson_train=pearson(problem.target, runs.free_run[:, 2]),
+        pearson_valid=valid.pearson,
+        free_run_valid_mser_pct=valid.mser_pct,
+        one_step_valid_rmse_v=valid.one_step_rmse_v,
+        bagging=bagging,
+        stability=stability,
+        residuals=_honest(problem, runs),
+        oob_by_resample=losses,
+    )
+
+
+def fitness(losses: tuple[float, float, float], library_size: int, weights: FitnessWeights) -> float:
+    """The paper's scalar fitness, equation (24), from the three losses of a candidate."""
+    oob, valid, sparse = losses
+    return 1.0 - (weights.oob * oob + weights.valid * valid + weights.sparse * sparse / library_size)
+
+
+def _honest(problem: Problem, runs: FoldRuns) -> tuple[HonestResiduals, ...]:
+    one_step = problem.scaling.error_volts_per_unit * (problem.target - runs.one_step[:, 0])
+    return tuple(
+        HonestResiduals(record.name, one_step[a:b])
+        for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)
+    )
+
+
+def sparse_model(
+    problem: Problem,
+    active: IntArray,
+    coefficients: Array,
+    memory: float,
+    name: str,
+    ensemble: Ensemble | None = None,
+) -> SparseModel:
+    """The model of the coefficients (m,) of the active terms that are not zero, with their spread if known."""
+    kept = np.flatnonzero(coefficients)
+    model = SparseModel(
+        name, problem.library.take(active[kept]), coefficients[kept], problem.scaling, problem.dt_s, memory
+    )
+    if ensemble is None:
+        return model
+    spread = ensemble.inclusion[kept], ensemble.low[kept], ensemble.high[kept]
+    return replace(model, inclusion=spread[0], low=spread[1], high=spread[2])

@@ -1,0 +1,67 @@
+"""A plain evolutionary search by one number, for what needs no front: baselines and benchmarks of designs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from aesi.errors import FitError
+from aesi.records import Failed
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.genome_space import GenomeSpace
+
+
+class Scored(Protocol):
+    """What an evaluation gives: its genome, and how fit it is."""
+
+    @property
+    def genome(self) -> Genome:
+        """What was evaluated."""
+        ...
+
+    @property
+    def fitness(self) -> float:
+        """More is better."""
+        ...
+
+
+T = TypeVar("T", bound=Scored)
+
+
+def fittest(
+    space: GenomeSpace,
+    evaluate: Callable[[Genome], T | Failed],
+    candidates: int,
+    population: int,
+    rng: np.random.Generator,
+) -> T:
+    """The fittest of `candidates` genomes, bred in generations of `population`, the better half of all as parents.
+
+    The first ones are the plain starts of the space. Raises FitError where none survives.
+    """
+    alive: list[T] = []
+    starts = list(space.plain_starts())
+    reason = ""
+    for begun in range(0, candidates, population):
+        for _ in range(min(population, candidates - begun)):
+            outcome = evaluate(starts.pop(0) if starts else _proposal(space, alive, population, rng))
+            if isinstance(outcome, Failed):
+                reason = outcome.reason
+            else:
+                alive.append(outcome)
+        alive.sort(key=lambda scored: -scored.fitness)
+    if not alive:
+        raise FitError(f"none of {candidates} candidates survives (the last one: {reason}).")
+    return alive[0]
+
+
+def _proposal(
+    space: GenomeSpace, alive: Sequence[Scored], population: int, rng: np.random.Generator
+) -> Genome:
+    parents = alive[: population // 2]
+    if len(parents) < 2:
+        return space.random(rng)
+    one, other = rng.choice(len(parents), size=2, replace=False)
+    return space.child(parents[one].genome, parents[other].genome, rng)

@@ -1,0 +1,69 @@
+"""The models behind free-run residuals: each fitted on all training rows but one long piece, and that piece.
+
+The search may judge candidates on shorter pieces (`Options.fold`); a free run shows what it drifts by only over
+a long one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from aesi.numerics.blocks import leave_out_weights, pieces
+from aesi.numerics.typing import IntArray
+from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
+from aesi.records import ErrorSeries
+from aesi.sparse.leverage import Leverage
+from aesi.sparse.model import SparseModel
+from aesi.sparse.search.evaluate import Candidate, sparse_model
+from aesi.sparse.search.problem import Problem
+from aesi.sparse.stridge import STRidge
+
+N_PIECES = 12
+"""Long enough to drift, short enough that the models without them are nearly the one that is judged."""
+
+
+def fold_models(problem: Problem, candidate: Candidate) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
+    """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
+
+    One for every piece; folds in which no term survives are left out.
+    """
+    genome = candidate.genome
+    active = np.flatnonzero(genome.active(problem.library))
+    solver = STRidge(genome.lambda1, genome.lambda2)
+    n = len(problem.target)
+    cut = pieces(problem.spans, max(1, n // N_PIECES))
+    augmented = np.empty((n, len(active) + 1), order="F")
+    augmented[:, :-1] = problem.theta(active).T
+    augmented[:, -1] = problem.target
+    augmented *= np.sqrt(problem.row_weights)[:, None]
+    q_rows, r = orthonormal(augmented)
+    factors = triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
+    for (a, b), factor in zip(cut, factors, strict=True):
+        coefficients = solver.fit_factor(factor)
+        if not coefficients.any():
+            continue
+        kept = np.flatnonzero(coefficients)
+        seen = np.r_[0:a, b:n]
+        model = replace(
+            sparse_model(problem, active, coefficients, candidate.bagging.memory, "left-out piece"),
+            leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
+        )
+        yield model, *_samples(problem, a, b)
+
+
+def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
+    """The model with the leverage of a fit of its terms to all training rows."""
+    number = {term: j for j, term in enumerate(problem.library.terms)}
+    which: IntArray = np.array([number[term] for term in model.library.terms])
+    return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))
+
+
+def _samples(problem: Problem, a: int, b: int) -> tuple[ErrorSeries, slice]:
+    """The record that training rows a to b - 1 come from, and the samples they predict: row k, sample k + 1."""
+    for record, (first, last) in zip(problem.split.train, problem.spans, strict=True):
+        if first <= a < last:
+            return record, slice(a - first + 1, b - first + 1)
+    raise IndexError(f"row {a} belongs to no training record")

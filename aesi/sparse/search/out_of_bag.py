@@ -1,0 +1,80 @@
+"""What the members of an ensemble leave on rows they did not draw, made comparable.
+
+Every resample leaves out other rows, so a member whose rows happen to be easy would win. The rows are cut into
+pieces of a block; s[p, b] is the squared error of member b on the u[p, b] rows of piece p that it did not draw, each
+row counting as in the fits. A member's error is set against what the members typically leave on the same pieces:
+
+    L_b = [ sum_p s[p, b] / sum_p m_p u[p, b] ] [ sum_p m_p n_p / sum_p n_p ] / bare
+    m_p = median over b of s[p, b] / u[p, b]                                                            (1)
+
+n_p is the number of rows of the piece and `bare` the mean squared error of the physics model: (1) estimates what the
+member would have left, relative to the physics, had it drawn none of the rows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from aesi.numerics.typing import Array, BoolArray, IntArray
+from aesi.sparse.search.judge import drive_of, free_predictions, one_step_predictions
+from aesi.sparse.search.problem import Problem
+
+_ROWS_AT_ONCE = 1024
+
+
+def out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
+    """(models,) equation (1) of the fits (models, m) of these resamples; infinite where one diverges."""
+    unseen_rows = problem.unseen_rows[:, resamples]
+    squares = _squares(problem, active, fits, resamples)
+    bare = float(problem.row_weights @ (problem.target - problem.zero) ** 2) / len(problem.target)
+    return comparable(squares, unseen_rows, problem.unseen_sizes) / bare
+
+
+def comparable(squares: Array, rows: Array, sizes: Array) -> Array:
+    """(models,) mean squared error of each model on all rows, as estimated from those it was judged on.
+
+    squares : (pieces, models) summed over the `rows` (pieces, models) on which a model is judged; `sizes`
+    (pieces,) are all rows of a piece. Pieces on which no model with finite errors is judged are left out.
+    """
+    judged = (rows > 0) & np.isfinite(squares)
+    mean = np.full(squares.shape, np.nan)
+    np.divide(squares, rows, out=mean, where=judged)
+    some = judged.any(axis=1)
+    if not some.any():
+        return np.full(squares.shape[1], np.inf)
+    typical = np.nanmedian(mean[some], axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        ratio = squares[some].sum(axis=0) / (typical @ rows[some])
+    losses = ratio * float(typical @ sizes[some]) / float(sizes[some].sum())
+    return np.where(np.isfinite(squares).all(axis=0) & np.isfinite(losses), losses, np.inf)
+
+
+def _squares(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:
+    """(pieces, models) squared error on the rows that each model has not seen, weighted as in the fits."""
+    squares = np.zeros((len(problem.unseen_sizes), len(fits)))
+    state = np.zeros(len(fits))
+    every = len(resamples) == problem.unseen.shape[1]
+    for a in range(0, len(problem.target), _ROWS_AT_ONCE):
+        rows = slice(a, min(a + _ROWS_AT_ONCE, len(problem.target)))
+        drive, functions = drive_of(problem, active, fits, rows)
+        if problem.options.regime == "free_run":
+            prediction = free_predictions(problem, drive, functions, rows, problem.restart[rows], state)
+        else:
+            prediction = one_step_predictions(problem, drive, functions, rows)
+        unseen = problem.unseen[rows] if every else problem.unseen[rows][:, resamples]
+        weights, pieces = problem.row_weights[rows], problem.piece_of_row[rows]
+        _add_squares(problem.target[rows], prediction, weights, unseen, pieces, squares)
+    return squares
+
+
+@njit(cache=True)
+def _add_squares(
+    target: Array, prediction: Array, weights: Array, unseen: BoolArray, pieces: IntArray, squares: Array
+) -> None:
+    """Add weights * (target - prediction)**2 of the unseen rows to the pieces they belong to."""
+    for k in range(len(target)):
+        at = squares[pieces[k]]
+        for j in range(prediction.shape[1]):
+            if unseen[k, j]:
+                at[j] += weights[k] * (target[k] - prediction[k, j]) ** 2

@@ -1,0 +1,317 @@
+"""Everything that a whole search shares, computed once: library, resamples, triangular factors.
+
+All candidates of a search are judged on the same resamples (common random numbers), so their Gram matrices
+can be computed once for the whole library and sliced. Three kinds of row weights are fitted:
+
+- moving-block bootstrap resamples, for the ensemble and its out-of-bag loss;
+- folds: all rows but one contiguous piece, for honest residuals, and for the validation loss where there
+  are no validation records;
+- all rows, for the refit after stability selection.
+
+Out-of-bag and validation losses are taken in free run inside pieces of `horizon` rows, each started from its
+measured error (`regime="one_step"` for the loss as the paper prints it). One-step losses cannot tell a good
+simulator from a good echo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.blocks import (
+    CountArray,
+    Span,
+    leave_out_weights,
+    moving_block_weights,
+    pieces,
+    starts_mask,
+)
+from aesi.numerics.typing import Array, BoolArray, IntArray
+from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
+from aesi.records import ErrorSeries, Split
+from aesi.sparse.terms.basis import FUNCTIONS, values
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.library import Library, evaluate_terms
+from aesi.sparse.terms.scaling import Outside, Scaling
+
+Regime = Literal["free_run", "one_step"]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a problem is set up.
+
+    inputs : names of the inputs (default: those of the records).
+    p_c, d, factors, special, mixed : extent of the library, see `Library.build`.
+    resamples, block : bootstrap resamples, and rows in a block (default: 500, or a tenth of the rows where
+    there are fewer than 5,000).
+    best : share of resamples that enters the ensemble.  horizon : rows of a free run (default: the block).
+    fold : rows of a left-out piece (default: an eighth of the rows).
+    regime : what the losses measure.  outside : what happens beyond the trained range.
+    balance : let every record count alike, in fits and losses, whatever the size of its error. Otherwise one
+    record near the end of discharge, where the error is largest, decides the model for all others.
+    """
+
+    inputs: tuple[str, ...] | None = None
+    p_c: int = 5
+    d: int = 5
+    factors: int = 3
+    special: bool = True
+    mixed: bool = True
+    resamples: int = 100
+    block: int | None = None
+    best: float = 0.1
+    horizon: int | None = None
+    fold: int | None = None
+    regime: Regime = "free_run"
+    outside: Outside = "clip"
+    balance: bool = True
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Training rows k -> k + 1 of all records, numbered through, and what was computed from them.
+
+    products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
+    error_functions : (12, n) the functions of the fed-back error.  error, target : (n,) scaled e[k] and
+    e[k + 1].
+    counts : (resamples, n) how often each resample holds a row.
+    row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
+    factors : (resamples, m + 1, m + 1), fold_factors likewise, and
+    full_factor (m + 1, m + 1): F with F' F = [Theta y]' W [Theta y], W the row weights times the counts.
+    notes : what was left out of the library, and why, one sentence each.
+    """
+
+    options: Options
+    split: Split
+    library: Library
+    scaling: Scaling
+    dt_s: float
+    spans: tuple[Span, ...]
+    products: Array
+    which: IntArray
+    error_functions: Array
+    error: Array
+    target: Array
+    counts: CountArray
+    row_weights: Array
+    restart: BoolArray
+    folds: tuple[Span, ...]
+    factors: Array
+    fold_factors: Array
+    full_factor: Array
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def build(cls, split: Split, options: Options | None = None, library: Library | None = None) -> Problem:
+        """Set up a search over the training records of `split`; `split.test` is not looked at.
+
+        Raises DataError where there is nothing to learn from: no records, records of different sampling, an
+        error or all inputs constant, NaN, or fewer rows than library terms.
+        """
+        options = options or Options()
+        train, valid, notes = _prepared(split, options, library)
+        inputs = train[0].input_names
+        library = library or Library.build(
+            inputs, options.p_c, options.d, options.factors, options.special, options.mixed
+        )
+        scaling = Scaling.of([_variables(record) for record in train], options.outside)
+        scaled = [scaling.apply(_variables(record)[:-1]) for record in train]
+        rows = np.vstack(scaled)
+        target = np.concatenate([scaling.error_to_scaled(record.error_v[1:]) for record in train])
+        n = len(target)
+        if n <= len(library):
+            raise DataError(
+                f"a library of {len(library)} terms needs more than the {n} training samples there are; "
+                "lower p_c and d, leave out mixed terms, or give more data."
+            )
+        spans = spans_of([len(block) for block in scaled])
+        parts, which = library.input_products
+        products = evaluate_terms(parts, rows)
+        error_functions = np.stack(
+            [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
+        )
+        block = options.block or default_block(n)
+        cut = tuple(pieces(spans, options.fold or default_fold(n)))
+        weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
+        augmented = np.empty((n, len(library) + 1), order="F")
+        for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
+            augmented[:, j] = products[product] * error_functions[q]
+        augmented[:, -1] = target
+        if not np.isfinite(augmented).all():
+            raise DataError(_not_finite(library, augmented))
+        zero = float(scaling.error_to_scaled(np.array(0.0)))
+        row_weights = balanced_weights(spans, target - zero) if options.balance else np.ones(n)
+        augmented *= np.sqrt(row_weights)[:, None]
+        q_rows, r = orthonormal(augmented)
+        every = triangular_factors(weighted_grams(q_rows, np.vstack([weights, leave_out_weights(cut, n)])), r)
+        return cls(
+            options=options,
+            split=replace(split, train=train, valid=valid),
+            library=library,
+            scaling=scaling,
+            dt_s=train[0].dt_s,
+            spans=spans,
+            products=products,
+            which=which,
+            error_functions=error_functions,
+            error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
+            target=target,
+            counts=weights,
+            row_weights=row_weights,
+            restart=starts_mask(pieces(spans, options.horizon or block), n),
+            folds=cut,
+            factors=every[: len(weights)],
+            fold_factors=every[len(weights) :],
+            full_factor=r,
+            notes=notes,
+        )
+
+    @property
+    def zero(self) -> float:
+        """The scaled error at which the physics model is exact."""
+        return float(self.scaling.error_to_scaled(np.array(0.0)))
+
+    @property
+    def block(self) -> int:
+        """Rows of a bootstrap block."""
+        return self.options.block or default_block(len(self.target))
+
+    @cached_property
+    def unseen(self) -> BoolArray:
+        """(n, resamples) the out-of-bag rows of each resample."""
+        return np.ascontiguousarray(self.counts.T == 0)
+
+    @cached_property
+    def piece_of_row(self) -> IntArray:
+        """(n,) the piece, of about a block, on which out-of-bag errors are compared."""
+        lengths = [b - a for a, b in pieces(self.spans, self.block)]
+        return np.repeat(np.arange(len(lengths)), lengths)
+
+    @cached_property
+    def unseen_sizes(self) -> Array:
+        """(pieces,) rows of each piece."""
+        return np.bincount(self.piece_of_row).astype(float)
+
+    @cached_property
+    def unseen_rows(self) -> Array:
+        """(pieces, resamples) how many rows of each piece are out of bag."""
+        first = np.flatnonzero(np.diff(self.piece_of_row, prepend=-1))
+        return np.add.reduceat(self.unseen, first, axis=0, dtype=float)
+
+    def weights(self, resample: int) -> Array:
+        """(n,) what each row counts in a resample."""
+        return self.counts[resample] * self.row_weights
+
+    def theta(self, which: IntArray) -> Array:
+        """(n_terms, n) the given terms along the training rows."""
+        return np.asarray(
+            self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
+        )
+
+
+def default_block(n: int) -> int:
+    """Rows of a block where none is asked for: the paper's 500, or a tenth of fewer than 5,000 rows."""
+    return min(500, max(10, n // 10))
+
+
+def default_fold(n: int) -> int:
+    """Rows of a left-out piece where none is asked for: an eighth."""
+    return max(10, n // 8)
+
+
+LEAST_SHARE = 0.1
+"""A record whose bare error is smaller than this share of the mean counts as if it were this large: a record on
+which the physics is all but exact should not rule the fit."""
+
+
+def balanced_weights(spans: Sequence[Span], bare: Array) -> Array:
+    """(n,) mean 1: a weight a row, by which every record's bare error (n,) adds the same to a sum of squares."""
+    squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans])
+    sizes = np.array([b - a for a, b in spans])
+    each = 1.0 / np.maximum(squares, LEAST_SHARE * squares.mean())
+    weights: Array = np.repeat(each, sizes)
+    return weights / weights.mean()
+
+
+def _prepared(
+    split: Split, options: Options, library: Library | None
+) -> tuple[tuple[ErrorSeries, ...], tuple[ErrorSeries, ...], tuple[str, ...]]:
+    if not split.train:
+        raise DataError("there are no training records.")
+    notes: tuple[str, ...] = ()
+    names = options.inputs or split.train[0].input_names
+    if library is not None:
+        names = library.variables[1:]
+    train = [with_inputs(record, names) for record in split.train]
+    for record in train:
+        _check(record, train[0].dt_s)
+    if np.ptp(np.concatenate([record.error_v for record in train])) == 0:
+        raise DataError("the voltage error is constant over the training records: there is nothing to learn.")
+    if library is None:
+        names, notes = _useful_inputs(train)
+    return (
+        tuple(with_inputs(record, names) for record in train),
+        tuple(with_inputs(record, names) for record in split.valid),
+        notes,
+    )
+
+
+def _check(record: ErrorSeries, dt_s: float) -> None:
+    if len(record) < 3:
+        raise DataError(f"{record.name}: {len(record)} samples are too few; a record needs at least 3.")
+    if abs(record.dt_s / dt_s - 1.0) > 0.01:
+        raise DataError(
+            f"{record.name} is sampled every {record.dt_s:g} s, the first record every {dt_s:g} s."
+        )
+    for name, column in zip(("error_v", *record.input_names), _variables(record).T, strict=True):
+        if not np.isfinite(column).all():
+            k = int(np.flatnonzero(~np.isfinite(column))[0])
+            raise DataError(f"{record.name}: {name} is not a number at sample {k}; cut or repair the record.")
+
+
+def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of inputs that vary and do not repeat an earlier one up to scaling; notes on the others."""
+    columns = np.vstack([record.inputs for record in train])
+    kept: dict[str, Array] = {}
+    notes = []
+    for name, column in zip(train[0].input_names, columns.T, strict=True):
+        spread = np.ptp(column)
+        if spread <= 1e-12 * np.abs(column).max():
+            notes.append(f"{name} is constant over the training records; its terms were left out.")
+            continue
+        unit = (column - column.min()) / spread
+        twin = next(
+            (other for other, known in kept.items() if np.allclose(unit, known, rtol=0, atol=1e-12)), None
+        )
+        if twin is not None:
+            notes.append(f"{name} repeats {twin} up to scale; its terms were left out.")
+            continue
+        kept[name] = unit
+    if not kept:
+        raise DataError("every input is constant over the training records: there is nothing to learn from.")
+    return tuple(kept), tuple(notes)
+
+
+def _variables(record: ErrorSeries) -> Array:
+    return np.column_stack([record.error_v, record.inputs])
+
+
+def spans_of(lengths: Sequence[int]) -> tuple[Span, ...]:
+    """Row ranges of records of these lengths, put one after the other."""
+    edges = np.concatenate([[0], np.cumsum(lengths)])
+    return tuple((int(a), int(b)) for a, b in pairwise(edges))
+
+
+def _not_finite(library: Library, theta: Array) -> str:
+    j = int(np.flatnonzero(~np.isfinite(theta).all(axis=0))[0])
+    k = int(np.flatnonzero(~np.isfinite(theta[:, j]))[0])
+    name = (*library.names, "the target")[j]
+    return f"{name} is not a number at training row {k}; keep scaled inputs within [-1, 1] (outside='clip')."
