@@ -17,7 +17,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from aesi.bench.virtual_drives import Layout, virtual_splits
+from aesi.bench.virtual_drives import SplitLayout, virtual_splits
 from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.numerics.typing import Array
@@ -95,7 +95,7 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
     cells: int = 40,
-    layouts: Sequence[Layout] = get_args(Layout),
+    layouts: Sequence[SplitLayout] = get_args(SplitLayout),
     seed: int = 0,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:

@@ -102,7 +102,7 @@ class Laboratory:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class VirtualExperiment:
     """Records by role; soc0 : state of charge at the first row, by record name."""
 
     train: tuple[Measurement, ...]
@@ -111,7 +111,9 @@ class Experiment:
     soc0: dict[str, float]
 
 
-def paper_experiment(laboratory: Laboratory, dt_s: float = 0.1, pulse_c: float = PULSE_C) -> Experiment:
+def paper_experiment(
+    laboratory: Laboratory, dt_s: float = 0.1, pulse_c: float = PULSE_C
+) -> VirtualExperiment:
     """The paper's experiment: 88,200 training rows at the default 10 Hz, 8,820 at 1 Hz.
 
     Raises DataError or SimulationError as `Laboratory.measure` does.
@@ -122,7 +124,7 @@ def paper_experiment(laboratory: Laboratory, dt_s: float = 0.1, pulse_c: float =
         return tuple(laboratory.measure(profile) for profile in profiles[role])
 
     soc0 = {profile.name: profile.soc0 for role in profiles.values() for profile in role}
-    return Experiment(measured("train"), measured("valid"), measured("test"), soc0)
+    return VirtualExperiment(measured("train"), measured("valid"), measured("test"), soc0)
 
 
 def nominal_capacity_ah(bpx: Path) -> float:

@@ -14,7 +14,7 @@ from aesi.data.blind.duty import duty
 from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Setup, Trace, run
+from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, run
 from aesi.data.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError
@@ -42,9 +42,9 @@ class _Bench:
     profile: Profile
     capacity_ah: float
     tolerance: tuple[Applied, ...]
-    base: Trace
+    base: TrueRun
 
-    def run(self, applied: tuple[Applied, ...], radial_points: int | None = None) -> Trace:
+    def run(self, applied: tuple[Applied, ...], radial_points: int | None = None) -> TrueRun:
         """The cell with these changes under the duty."""
         setup = Setup(self.declared, self.spec.model, (*self.tolerance, *applied), radial_points)
         return run(setup, self.profile)
@@ -184,7 +184,7 @@ def _label(spec: CaseSpec, known: list[str], strange: list[str]) -> tuple[str, t
 
 def _measured(spec: CaseSpec, written: Written, warmth: Array, rng: np.random.Generator) -> Measurement:
     instrument = Instrument(spec.voltage_noise_v, spec.current_noise_a)
-    trace = Trace(written.time_s, written.current_a, written.voltage_v, warmth, np.empty(0))
+    trace = TrueRun(written.time_s, written.current_a, written.voltage_v, warmth, np.empty(0))
     return instrument.write(trace, spec.name, rng, spec.temperature)
 
 

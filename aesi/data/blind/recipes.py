@@ -7,17 +7,16 @@ difference of the two runs is what is added to the base run, so that one effect 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from aesi.data.blind.duty import duty, fast_charge
+from aesi.data.laboratory.changes import Values
 from aesi.data.laboratory.simulator import Applied
 from aesi.data.profile import Profile
 from aesi.numerics.typing import Array
-
-Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)

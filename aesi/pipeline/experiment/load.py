@@ -17,17 +17,16 @@ import numpy as np
 from aesi.data import read_measurement
 from aesi.data.resample import to_even
 from aesi.errors import ConfigError, DataError
-from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics import ActiveEffect, Cell, initial_state, simulate
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.error_series import error_series
-from aesi.pipeline.product.initial_state import rest_soc
 from aesi.records import ROLES, ErrorSeries, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
-    from aesi.data.virtual import Experiment
+    from aesi.data.virtual import VirtualExperiment
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +101,9 @@ def _load(config: ExperimentConfig) -> Loaded:
     notes: list[str] = []
     for name, (measurement, known_soc0) in sources.records.items():
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        soc0[name] = rest_soc(cell, measurement) if declared is None else declared
+        start = initial_state(cell, measurement, declared, config.data.hold, effects)
+        soc0[name] = start.soc
+        notes.append(start.sentence)
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         run = simulate(
@@ -142,7 +143,7 @@ def _sources(config: ExperimentConfig) -> _Sources:
     return _Sources(records, roles)
 
 
-def virtual_experiment(config: ExperimentConfig, cell: Path) -> Experiment:
+def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
     """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
     from aesi.data.virtual import DEFAULT_MIX, Laboratory, paper_experiment
 

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.evaluate import Evaluation
+from aesi.pipeline.experiment.evaluate import EvaluatedModels
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import tables, write_figures, write_run_report
 from aesi.pipeline.report.figures import paper_figures
-from aesi.pipeline.report.views import BootstrapView, RunView, Trace
+from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
@@ -43,7 +43,7 @@ class Result:
     chosen: Candidate
     candidates: Sequence[Mapping[str, Any]]
     fitted: Sequence[Fitted]
-    evaluation: Evaluation
+    evaluation: EvaluatedModels
     run_id: str
     seconds: float
     failed: int = 0
@@ -94,7 +94,7 @@ def published(name: str) -> str:
     return name if name == PHYSICS else f"{PHYSICS} + {name}"
 
 
-def _published_trace(trace: Trace) -> Trace:
+def _published_trace(trace: RecordTrace) -> RecordTrace:
     return replace(trace, predictions={published(name): each for name, each in trace.predictions.items()})
 
 

@@ -8,7 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from aesi.records import Hold
 
-Range = tuple[float, float]
 Share = Annotated[float, Field(gt=0, lt=1)]
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
@@ -161,7 +160,7 @@ class SearchConfig(Section):
 
     @field_validator("lambda1", "lambda2", "tau")
     @classmethod
-    def _ordered(cls, value: Range) -> Range:
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
         if not value[0] < value[1]:
             raise ValueError(f"the range [{value[0]:g}, {value[1]:g}] is empty; give low < high")
         return value
