@@ -11,6 +11,7 @@ import numpy as np
 
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array
+from aesi.parameters import Parameter
 from aesi.physics import simulate
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
@@ -22,12 +23,14 @@ from aesi.tracer.case.free_parameter import (
     own,
     state_of_charge,
 )
-from aesi.tracer.records import Record
+from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.stepping import stepping
 
-Trust = Literal["tight", "loose"]
-"""How far the declared parameters are believed: as a careful parametrisation of this very cell, or as one of a cell of
-its make."""
+Trust = Literal["exact", "tight", "loose"]
+"""How far the declared parameters are believed: as fitted to this very cell by this very model, as a careful
+parametrisation of it, or as one of a cell of its make."""
+EXACT_SHARE = 0.1
+"""Of the tight spread of a declared parameter, where the file is believed exactly."""
 
 Values = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
@@ -58,7 +61,7 @@ class InverseProblem:
     """
 
     cell: Cell
-    records: tuple[Record, ...]
+    records: tuple[PreparedRecord, ...]
     effects: Mapping[str, Effect]
     fixed: tuple[ActiveEffect, ...] = ()
     trust: Trust = "tight"
@@ -76,18 +79,28 @@ class InverseProblem:
             if effect.id in hypothesis or effect.refines is not None:
                 continue
             for name, p in effect.parameters.items():
-                sd = None if p.spread is None else getattr(p.spread, self.trust)
-                if p.spread is not None and sd is not None:
-                    scale = self.cell.nominal_capacity_ah if p.spread.ohmic else 1.0
-                    out.append(own(effect.id, name, p, sd / scale))
+                sd = self._spread(effect, p)
+                if sd is not None:
+                    out.append(own(effect.id, name, p, sd))
         if self.reduction is not None:
             out.append(own(self.reduction.effect.id, self.reduction.name, self._strength, 1.0))
         for effect_id in hypothesis:
             out += of_effect(effect_id, self.effects[effect_id].parameters)
         return tuple(out)
 
+    def _spread(self, effect: Effect, p: Parameter) -> float | None:
+        """Standard deviation of an own parameter at this trust, None where nothing is open."""
+        if p.spread is None:
+            return None
+        sd = p.spread.loose if self.trust == "loose" else p.spread.tight
+        if sd is None:
+            return None
+        if self.trust == "exact" and effect.kind == "parameter":
+            sd *= EXACT_SHARE
+        return sd / self.cell.nominal_capacity_ah if p.spread.ohmic else sd
+
     @property
-    def _strength(self):  # type: ignore[no-untyped-def]
+    def _strength(self) -> Parameter:
         assert self.reduction is not None
         return self.reduction.effect.parameters[self.reduction.name]
 
@@ -169,7 +182,7 @@ class InverseProblem:
     @cached_property
     def white_v(self) -> Array:
         """(n,) V, standard deviation of the sensors' noise in each row."""
-        return np.concatenate([np.full(r.n_fit, r.noise_v) for r in self.records])
+        return np.concatenate([r.white_v[: r.n_fit] for r in self.records])
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
@@ -137,7 +136,9 @@ class Fitter:
             table = whitened(self.problem, self.blocks, np.column_stack([e, -jacobian]), delta_v)[0]
             return np.concatenate([table[:, 0], at]), np.vstack([table[:, 1:], np.eye(len(at))])
 
-        return descend(linearise, cost, np.clip(x, self.low, self.high), self.low, self.high, steps, GAIN_NATS).x
+        return descend(
+            linearise, cost, np.clip(x, self.low, self.high), self.low, self.high, steps, GAIN_NATS
+        ).x
 
     def finished(self, x: Array) -> Fit | None:
         """The fit at a point, scored."""

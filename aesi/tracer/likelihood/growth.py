@@ -1,20 +1,20 @@
 """A hypothesis and one effect more: the effect's parameters by Gauss-Newton, all others to first order.
 
-    min over u of  min over z  |W (e(u) - J z)|^2 + |x + z|^2 + |u|^2        u of the effect, x + z of the parent      (1)
+    min over u of  min over z  |W (e(u) - J z)|^2 + |x + z|^2 + |u|^2        u of the effect, x + z of the parent   (1)
 
-The inner minimum is a projection (variable projection, Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413), so that a
-step costs as many simulations as the effect has parameters.
+The inner minimum is a projection (variable projection, Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413), so that
+a step costs as many simulations as the effect has parameters.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from aesi.numerics.bounded import descend
+from aesi.numerics.bounded import Minimum, descend
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import FreeParameter, of_effect, starts, values_of
@@ -30,7 +30,9 @@ from aesi.tracer.likelihood.gaussian import (
 )
 from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
 
-SCREEN_STEPS = 8
+FIRST_STEPS = 2
+FURTHER_STEPS = 5
+"""Of a descent: from each start, and on from the best."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ class Parent:
 class Grown:
     """A parent and one effect: its parameters fitted, the rest to first order.
 
-    free, point : of what may move.  delta_v : size of the model error during the fit.
+    free, point : of what may move, on no bound.  on_bounds : value of what is.  u : coordinates of the effect alone.
     """
 
     hypothesis: tuple[str, ...]
@@ -68,12 +70,15 @@ class Grown:
     point: Linearised
     score: PredictiveScore
     simulations: int
+    on_bounds: Mapping[tuple[str, str], float]
+    u: Array
 
     @property
     def placed(self) -> dict[tuple[str, str], float]:
         """(owner, name) -> value, with the first-order change of the rest."""
         x = self.point.x + self.score.shift
-        return {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
+        moved = {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
+        return {**self.on_bounds, **moved}
 
 
 class _Growth:
@@ -129,6 +134,11 @@ class _Growth:
         tail = -self.parent.fit.point.x[self.rest][:, None]
         return 0.5 * float(np.sum(self.projected(e[:, None], tail) ** 2) + u @ u)
 
+    def descended(self, u: Array, steps: int) -> Minimum:
+        """Where a descent from `u` ends, within the bounds."""
+        start = np.clip(u, self.low, self.high)
+        return descend(self.linearise, self.cost, start, self.low, self.high, steps, GAIN_NATS)
+
     def linearise(self, u: Array) -> tuple[Array, Array] | None:
         e = self.residual(u)
         jacobian = None if e is None else self.jacobian(u, e)
@@ -140,21 +150,21 @@ class _Growth:
         return np.concatenate([table[:, 0], u]), np.vstack([table[:, 1:], np.eye(len(u))])
 
 
-def grow(parent: Parent, effect: str, delta_v: float, warm: Sequence[Array] = ()) -> Grown | None:
+def grow(parent: Parent, effect: str, delta_v: float, known: Array | None = None) -> Grown | None:
     """The parent and one effect more, from several starts; None where it cannot be simulated.
 
-    delta_v : one of the tried sizes, at which the effect's parameters are fitted.  warm : further starts.
+    delta_v : one of the tried sizes, at which the effect's parameters are fitted.
+    known : coordinates of the effect's parameters where an earlier descent ended.
     """
     growth = _Growth(parent, effect, delta_v)
-    best: tuple[float, Array] | None = None
-    for start in (*warm, *starts(growth.added)):
-        u0 = np.clip(start, growth.low, growth.high)
-        end = descend(growth.linearise, growth.cost, u0, growth.low, growth.high, SCREEN_STEPS, GAIN_NATS)
-        if np.isfinite(end.cost) and (best is None or end.cost < best[0]):
-            best = end.cost, end.x
-    if best is None:
-        return None
-    u = best[1]
+    if known is not None:
+        u = known
+    else:
+        ends = [growth.descended(start, FIRST_STEPS) for start in starts(growth.added)]
+        best = min(ends, key=lambda end: end.cost)
+        if not np.isfinite(best.cost):
+            return None
+        u = growth.descended(best.x, FURTHER_STEPS).x if best.steps == FIRST_STEPS else best.x
     e = growth.residual(u)
     jacobian = None if e is None else growth.jacobian(u, e)
     if e is None or jacobian is None:
@@ -164,9 +174,10 @@ def grow(parent: Parent, effect: str, delta_v: float, warm: Sequence[Array] = ()
 
 def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
-    x = np.concatenate([fit.point.x[growth.rest], u])
+    inside = (u > growth.low + 1e-9) & (u < growth.high - 1e-9)  # a linear form cannot see a bound
+    x = np.concatenate([fit.point.x[growth.rest], u[inside]])
     prior, out = PRIORS[growth.problem.trust], []
-    own_columns = np.column_stack([e, jacobian])
+    own_columns = np.column_stack([e, jacobian[:, inside]])
     for delta in SIZES_V:
         known, _ = parent.white[delta]
         new, log_det = whitened(growth.problem, parent.blocks, own_columns, delta)
@@ -174,6 +185,7 @@ def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
         sums = block_sums(parent.blocks, table, log_det)
         out.append(score_at(growth.problem, parent.blocks, sums, x, delta, prior.log_density(delta)))
     hypothesis = (*fit.hypothesis, growth.effect)
-    free = (*(fit.free[j] for j in growth.rest), *growth.added)
-    point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian]))
-    return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations)
+    free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
+    point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]]))
+    on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
+    return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations, on_bounds, u)

@@ -28,10 +28,14 @@ class SizePrior:
         return -0.5 * (float(np.log(delta_v / self.median_v)) / self.sd) ** 2 - float(np.log(self.sd))
 
 
-PRIORS: dict[Trust, SizePrior] = {"tight": SizePrior(2e-4, 0.7), "loose": SizePrior(4e-3, 0.7)}
-"""tight : what this model and an independent solver of the same cell leave of each other. loose : what calibrated
-measured cells leave."""
-SIZES_V = tuple(float(v) for v in 1e-3 * np.geomspace(0.1, 25.6, 9))
+PRIORS: dict[Trust, SizePrior] = {
+    "exact": SizePrior(2e-4, 0.7),
+    "tight": SizePrior(2e-4, 0.7),
+    "loose": SizePrior(4e-3, 0.7),
+}
+"""exact, tight : what this model and an independent solver of the same cell leave of each other.
+loose : what calibrated measured cells leave."""
+SIZES_V = tuple(float(v) for v in 1e-3 * np.geomspace(0.2, 25.6, 8))
 """Sizes that are tried, a factor of two apart."""
 
 
