@@ -10,7 +10,7 @@ from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps
-from aesi.tracer.decide.search import Explanation, Path, Report, base_of, searched
+from aesi.tracer.decide.search import Explanation, Path, Report, base_of, refitted, searched
 from aesi.tracer.decide.verdict import Thresholds, Verdict, judged, noise_v, structured_v, tolerance_v
 from aesi.tracer.likelihood.fit import Fit
 from aesi.tracer.states import ModelState
@@ -62,16 +62,18 @@ def gathered(
             paths[trust] = found
         return paths[trust]
 
-    path = path_of("exact")
+    path = path_of("tight")
     verdict = judged(path, thresholds)
-    if verdict.word != "none":
-        other = path_of("tight")
-        path, verdict = _believed(path, verdict, other, judged(other, thresholds))
+    if verdict.word == "found":
+        path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
+    elif verdict.word == "none":
+        exact = path_of("exact")
+        path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
     verdict = _with_confidence(verdict)
     recalibrated = _recalibrated(problem, archive)
     if verdict.word != "unknown":
         return _adopted(path, paths, verdict, recalibrated)
-    loose = path_of("loose") if _left_far(path, thresholds) else None
+    loose = path_of("loose") if len(problem.records) > 1 else None
     return _best_carried(path, loose, paths, verdict, recalibrated)
 
 
@@ -98,6 +100,18 @@ def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tupl
     return tight, second
 
 
+def _sharpened(
+    problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
+) -> tuple[Path, Verdict]:
+    """The same finding with the own parameters believed exactly, where that says more of unseen data."""
+    exact = replace(problem, trust="exact")
+    found = refitted(exact, path, archive)
+    if found is None or found.chosen.score.total < path.chosen.score.total:
+        return path, verdict
+    left, allowed = structured_v(found, found.chosen), tolerance_v(noise_v(found), thresholds)
+    return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
+
+
 def _with_confidence(verdict: Verdict) -> Verdict:
     return replace(verdict, confidence=frequency_maps()[verdict.word].frequency(verdict.margin))
 
@@ -105,10 +119,6 @@ def _with_confidence(verdict: Verdict) -> Verdict:
 def _recalibrated(problem: InverseProblem, archive: Archive) -> tuple[InverseProblem, Fit] | None:
     based = base_of(replace(problem, trust="loose"), archive)
     return None if based is None else (based[0], based[2])
-
-
-def _left_far(path: Path, thresholds: Thresholds) -> bool:
-    return structured_v(path, path.base) > tolerance_v(noise_v(path), thresholds)
 
 
 def _adopted(

@@ -29,6 +29,8 @@ FINALIST_NATS = 15.0
 """Effects that are fitted with the whole model: at most so many, within so much of the best."""
 BEAM = 2
 """Hypotheses that a further effect is tried on."""
+HOPELESS_SHARE = 0.7
+"""Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
 ADMITTED_NATS = 12.0
 """What an effect has to say more of unseen data than the hypothesis without it."""
 LEAST_V = 1e-4
@@ -147,10 +149,29 @@ def searched(
         steps.append(step)
         if step.admitted is None:
             break
+        left = [_beyond_noise(problem, blocks, fit) for fit in (chosen, step.admitted)]
         chosen = step.admitted
+        if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
+            break
         others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
+
+
+def _beyond_noise(problem: InverseProblem, blocks: Blocks, fit: Fit) -> float:
+    """V**2 beyond the noise on unseen data."""
+    return max(unseen_rmse_v(blocks, fit) ** 2 - float(np.mean(problem.white_v**2)), 0.0)
+
+
+def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | None:
+    """The chosen hypothesis of a path at another trust in the declared parameters, with nothing else tried."""
+    based = base_of(problem, archive)
+    if based is None:
+        return None
+    problem, blocks, base = based
+    start, size = path.chosen.placed, path.chosen.score.delta_v
+    fit = _fitted(problem, blocks, path.chosen.hypothesis, start, size, BASE_STEPS, archive)
+    return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
 
 
 def _step(
