@@ -21,6 +21,27 @@ Hold = Literal["linear", "backward"]
 """How the current runs between samples: straight lines, or constant since the row before (as loggers do)."""
 
 
+SLOW_SAMPLING_S = 5.0
+"""Rows further apart than this are a logger's, which writes at the end of an interval; closer ones hardly differ."""
+
+
+def assumed_hold(time_s: Array) -> Hold:
+    """How the current runs between rows where nobody says: constant since the row before where rows are far apart."""
+    return "backward" if float(np.diff(time_s).max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
+
+
+def hold_sentence(name: str, hold: Hold, declared: bool) -> str:
+    """What was taken, for a reader."""
+    words = {
+        "linear": "in straight lines between rows",
+        "backward": "constant since the row before, as loggers write",
+    }
+    other = {"linear": "backward", "backward": "linear"}[hold]
+    return f"{name}: the current is taken {words[hold]}" + (
+        " as declared." if declared else f"; --hold {other} takes it otherwise."
+    )
+
+
 def digest(*arrays: Array | None) -> str:
     """SHA-256 of the bytes of the arrays, 16 hexadecimal digits; None counts as an empty array."""
     sha = hashlib.sha256()
@@ -36,6 +57,7 @@ class Measurement:
     time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V.
     temperature_degc : (n,) degC, or None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
+    hold : how the current runs between rows, where it was declared; else `assumed_hold` tells.
     """
 
     time_s: Array
@@ -45,6 +67,7 @@ class Measurement:
     name: str = "measurement"
     source: str = ""
     notes: tuple[str, ...] = ()
+    hold: Hold | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time_s)
@@ -60,6 +83,10 @@ class Measurement:
     def digest(self) -> str:
         """Content hash of the four columns."""
         return digest(self.time_s, self.current_a, self.voltage_v, self.temperature_degc)
+
+    def held(self, hold: Hold | None) -> Measurement:
+        """The record with how its current was declared to run between rows."""
+        return replace(self, hold=hold)
 
     def take(self, rows: slice | Array) -> Measurement:
         """The given rows, as a measurement of the same name."""

@@ -35,6 +35,7 @@ app.command("tables", short_help="The paper's tables, from tracked runs alone.")
 app.command("effects", short_help="The catalogue of effects.")(effects.effects)
 app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")
 app.command("worker", short_help="One more process on a shared study.")(experiment.worker)
+app.command("candidate", short_help="A tracked candidate made again, with its model.")(experiment.candidate)
 app.command("ui")(experiment.ui)
 app.command("bench", short_help="Time the project against its peers.")(bench.bench)
 

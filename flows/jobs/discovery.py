@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, catalogue, run_case, write_discovery
+from aesi.physics.effects import known_effects
+from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, run_case, write_discovery
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
 from flows.base import environment
@@ -36,7 +37,7 @@ def discover(
     """
     environment.prepare()
     declared_model(case.cell)
-    catalogue(case.effect_files)
+    known_effects(case.effect_files)
     if use_prefect or (use_prefect is None and os.environ.get("PREFECT_API_URL")):
         return _as_flow(case, out, experiment)
     from flows.jobs.stages import plainly
@@ -84,7 +85,7 @@ def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) ->
     if (out / ARCHIVE).exists():
         console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
     tracker = _tracker(case, experiment, console)
-    follow = Follow(tracker, console, len(catalogue(case.effect_files)))
+    follow = Follow(tracker, console, len(known_effects(case.effect_files)))
     try:
         found = run("hypotheses", lambda: run_case(case, out, follow))
         content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))

@@ -13,18 +13,17 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import working_on
 
 if TYPE_CHECKING:
-    from flows.jobs.stages import Run
+    from flows.jobs.stages import RunStage
     from flows.tracking.tracker import Tracker
 
 
-def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
+def run_experiment(request: RunRequest, run: RunStage, console: Console) -> Path:
     """The flow itself; `run` runs a stage."""
     from flows.tracking.store import Store
 
@@ -33,7 +32,7 @@ def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
     console.say(f"{config.name}: {config.note}" if config.note else config.name)
     store = Store(config.tracking.uri)
     with working_on(request, store, console) as tracker:
-        folder = _stages(config, request, tracker, run, console, started)
+        folder = _stages(request, tracker, run, console, started)
     console.say(f"Finished in {duration(time.monotonic() - started)}.")
     console.say(f"Report: {_shown(folder / 'report.html')}")
     console.say(f"Runs:   aesi ui        Tables: aesi tables {config.name}")
@@ -41,10 +40,9 @@ def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
 
 
 def _stages(
-    config: ExperimentConfig,
     request: RunRequest,
     tracker: Tracker,
-    run: Run,
+    run: RunStage,
     console: Console,
     started: float,
 ) -> Path:
@@ -58,10 +56,12 @@ def _stages(
     from flows.search.study import run_study
     from flows.tracking.experiment_log import CandidateTracker, track_result, track_start
 
-    loaded = run("data and physics", lambda: load(config), retries=2)
+    loaded = run("data and physics", lambda: load(request.config()), retries=2)
+    config = loaded.config  # that of the fallback where it fell back to one
     for note in together(loaded.notes):
         console.say(f"  {note}")
-    track_start(tracker, config, loaded)
+    folder = environment.workspace() / "runs" / config.name / tracker.run_id
+    track_start(tracker, config, loaded, folder)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
     follow = CandidateTracker(tracker, config, loaded, problem)
     found = run("search", lambda: run_study(problem, config, console, request.use_cache, follow))
@@ -73,7 +73,6 @@ def _stages(
     )
     fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config))
     evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split))
-    folder = environment.workspace() / "runs" / config.name / tracker.run_id
     seconds = time.monotonic() - started
     rows = found.rows()
     result = Result(

@@ -57,14 +57,12 @@ def _memory(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Arr
 
 def _loose_contact(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
     """A contact that opens a little at random for tens of seconds."""
-    n = len(trace.time_s)
-    bad = np.zeros(n)
-    start = 0
-    while start < n:
-        start += int(rng.exponential(250)) + 1
-        stop = start + int(rng.exponential(60)) + 5
-        bad[start:stop] = rng.uniform(0.5, 1.5)
-        start = stop
+    bad = np.zeros(len(trace.time_s))
+    now_s = 0.0
+    while now_s < trace.time_s[-1]:
+        opens_s = now_s + rng.exponential(250) + 1.0
+        now_s = opens_s + rng.exponential(60) + 5.0
+        bad[(opens_s <= trace.time_s) & (trace.time_s < now_s)] = rng.uniform(0.5, 1.5)
     return -0.03 * bad * trace.current_a / capacity_ah
 
 

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.errors import InputError
-from aesi.physics.effects import CATALOGUE, Effect, load_effect
+from aesi.physics.effects import CATALOGUE, known_effects
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -48,15 +47,6 @@ class Case:
     effect_files: tuple[Path, ...] = ()
 
 
-def catalogue(files: Sequence[Path]) -> dict[str, Effect]:
-    """The catalogue and the user's own effects.  Raises InputError for a file that holds none."""
-    own = [load_effect(file) for file in files]
-    names = [effect.id for effect in own]
-    if len(set(names)) < len(names):
-        raise InputError(f"two effect files define the same id: {', '.join(names)}; rename one.")
-    return dict(CATALOGUE) | {effect.id: effect for effect in own}
-
-
 def run_case(case: Case, out: Path, progress: Progress | None = None) -> Discovery:
     """Trace one case; fits are kept in `out`, so that the same case goes on where it was interrupted."""
     given = declared_model(case.cell)
@@ -69,7 +59,7 @@ def run_case(case: Case, out: Path, progress: Progress | None = None) -> Discove
         holdout=case.holdout,
         max_effects=case.max_effects,
         seed=case.seed,
-        effects=catalogue(case.effect_files),
+        effects=known_effects(case.effect_files),
         given=given.effects,
         archive=out / ARCHIVE,
         progress=progress,

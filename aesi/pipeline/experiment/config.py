@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 
-ModelName = Literal["ESPM", "AESI I", "AESI II", "SINDy-C", "ridge", "gradient boosting"]
+ComparedModel = Literal["ESPM", "AESI I", "AESI II", "SINDy-C", "ridge", "gradient boosting"]
 
 
 class ExperimentConfig(Section):
@@ -51,7 +51,7 @@ class ExperimentConfig(Section):
     library: LibraryConfig = LibraryConfig()
     search: SearchConfig = SearchConfig()
     conformal: ConformalConfig = ConformalConfig()
-    models: tuple[ModelName, ...] = get_args(ModelName)
+    models: tuple[ComparedModel, ...] = get_args(ComparedModel)
     tracking: TrackingConfig = TrackingConfig()
     runner: RunnerConfig = RunnerConfig()
     discover: DiscoverConfig | None = None

@@ -6,6 +6,7 @@ the states that its history gave it.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -14,10 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.data import read_measurement
+from aesi.data.read import read
 from aesi.data.resample import to_even
-from aesi.errors import ConfigError, DataError
+from aesi.data.virtual import DEFAULT_MIX
+from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, initial_state, simulate
+from aesi.physics.effects import activated
+from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
 class Loaded:
     """What an experiment works on.
 
+    config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
     """
@@ -44,6 +49,14 @@ class Loaded:
     soc0: dict[str, float]
     digests: dict[str, str]
     notes: tuple[str, ...]
+    config: ExperimentConfig
+    fallback: str = ""
+
+    @property
+    def setting(self) -> str:
+        """Hash of what was run and on which data, without the seed: runs that share it differ by chance alone."""
+        data = "".join(f"|{name} {digest}" for name, digest in sorted(self.digests.items()))
+        return hashlib.sha256(f"{self.config.setting}{data}".encode()).hexdigest()[:16]
 
 
 def load(config: ExperimentConfig) -> Loaded:
@@ -62,9 +75,27 @@ def load(config: ExperimentConfig) -> Loaded:
         fallback = config.model_copy(
             update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None}
         )
-        note = f"Fallback: {error} The same job runs on the bundled virtual cell instead."
+        why = (
+            "no copy on this machine and no network"
+            if isinstance(error, DataAway)
+            else str(error).rstrip(".")
+        )
+        reason = (
+            f"The data set {config.data.set} cannot be had ({why}), so this is the same job on {_called(fallback)}; "
+            "it says nothing about the measured cell."
+        )
         loaded = _load(fallback)
-        return replace(loaded, notes=(note, *loaded.notes))
+        return replace(loaded, notes=(reason, *loaded.notes), fallback=reason)
+
+
+def _called(config: ExperimentConfig) -> str:
+    """What the data of an experiment are, as a person says it."""
+    if config.data.kind != "virtual":
+        return str(config.data.set or config.cell.bpx)
+    virtual = config.data.virtual
+    effects = DEFAULT_MIX if virtual.effects is None else virtual.effects
+    mix = ", ".join(effects) or "nothing added"
+    return f"a virtual cell ({virtual.model} of {Path(config.cell.bpx).name} with {mix})"
 
 
 def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
@@ -100,6 +131,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     soc0: dict[str, float] = {}
     notes: list[str] = []
     for name, (measurement, known_soc0) in sources.records.items():
+        check_belongs(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, config.data.hold, effects)
         soc0[name] = start.soc
@@ -120,6 +152,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         soc0=soc0,
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
+        config=config,
     )
 
 
@@ -137,20 +170,19 @@ def _sources(config: ExperimentConfig) -> _Sources:
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
-        name: (read_measurement(where(name), data.columns or None, data.sign), None)
-        for name in dict.fromkeys(names)
+        name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
     }
     return _Sources(records, roles)
 
 
 def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
     """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
-    from aesi.data.virtual import DEFAULT_MIX, Laboratory, paper_experiment
+    from aesi.data.virtual import Laboratory, paper_experiment
 
     wanted = config.data.virtual
     effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
     laboratory = Laboratory(cell, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
-    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c)
+    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c, wanted.other_load)
 
 
 def _virtual(config: ExperimentConfig, cell: Path) -> _Sources:
@@ -170,12 +202,11 @@ def _split(data: DataConfig, series: dict[str, ErrorSeries], roles: dict[Role, t
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
-    from aesi.physics.effects import CATALOGUE
-
-    unknown = [name for name in config.cell.effects if name not in CATALOGUE]
-    if unknown:
-        raise ConfigError(f"cell.effects: there is no effect {unknown[0]!r}; `aesi effects` lists them.")
-    return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
+    files = [config.path(name) for name in config.cell.effect_files]
+    try:
+        return activated(config.cell.effects.items(), files)
+    except InputError as error:
+        raise ConfigError(f"{config.name}: cell: {error}") from None
 
 
 def cell_path(config: ExperimentConfig) -> Path:

@@ -50,11 +50,15 @@ class Result:
 
     @property
     def best(self) -> str:
-        """The ensemble with the lower free-run error on the validation records; the test chooses nothing."""
-        rows = [row for row in self.evaluation.rows if row["name"] in ENSEMBLES]
-        if not rows:
-            return str(self.evaluation.rows[-1]["name"])
-        return str(max(rows, key=lambda row: row["free_run"].get("valid_mser_pct", float("-inf")))["name"])
+        """The ensemble of the lower validation loss, or the last model where that one is not judged.
+
+        Without validation records the loss is that on the left-out pieces; the test chooses nothing.
+        """
+        names = [str(row["name"]) for row in self.evaluation.rows]
+        judged = [name for name in ENSEMBLES if name in names]
+        if len(judged) < len(ENSEMBLES):
+            return judged[0] if judged else names[-1]
+        return self.chosen.better.name
 
 
 def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
@@ -69,6 +73,8 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "chosen": published(result.best),
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
+        "data": result.loaded.config.data.kind,
+        "fallback": result.loaded.fallback or None,
         "notes": list(notes(result)),
         "models": rows,
     }
@@ -107,8 +113,8 @@ def hybrid(result: Result) -> HybridModel:
         correction=one.model if isinstance(one.model, SparseModel) else None,
         intervals=one.intervals,
         bands=one.bands,
-        dt_s=result.config.data.dt_s,
-        hold=result.config.data.hold,
+        dt_s=result.loaded.config.data.dt_s,
+        hold=result.loaded.config.data.hold,
         soc0=next(iter(result.loaded.soc0.values()), None),
     )
 
@@ -117,7 +123,6 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
     """What the report shows."""
     counts = result.problem.counts
     genome = result.chosen.genome
-    options = result.problem.options
     return RunView(
         experiment=result.config.name,
         note=result.config.note,
@@ -128,7 +133,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result)),
         bootstrap=BootstrapView(
-            n=counts.shape[1], block=options.block or 0, unique_fraction=(counts > 0).mean(axis=1)
+            n=counts.shape[1], block=result.problem.block, unique_fraction=(counts > 0).mean(axis=1)
         ),
         settings={
             "lambda1": f"{genome.lambda1:.3g}",
@@ -142,6 +147,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
         mlflow_run_id=result.run_id,
         seconds=result.seconds,
+        fallback=result.loaded.fallback,
     )
 
 

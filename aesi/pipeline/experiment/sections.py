@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from aesi.data.reading import Reading
 from aesi.records import Hold
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -43,13 +44,15 @@ class VirtualConfig(Section):
     """How a virtual measurement is made (kind: virtual): the paper's profiles on a cell that has more than the ESPM.
 
     effects : what the cell has beyond its declared parameters; None for the laboratory's default mix.
-    magnitude : 1 is typical.  pulse_c : C-rate of the charge pulse after each schedule.
+    magnitude : 1 is typical.  pulse_c : C-rate of the charge pulse after each training schedule.
+    other_load : times the vehicle's current in the validation and test schedules; 2 takes them to 3.1C.
     """
 
     model: Literal["DFN", "SPMe"] = "DFN"
     effects: tuple[str, ...] | None = None
     magnitude: Positive = 1.0
     pulse_c: Annotated[float, Field(ge=0)] = 5.0
+    other_load: Positive = 2.0
     seed: int = 0
 
 
@@ -58,6 +61,8 @@ class DataConfig(Section):
 
     files: paths of measurement files; catalogue: names of records of the data set `set`; virtual: the paper's
     profiles, which have their roles already. `repeats` cuts the one file or record `record`.
+    columns, units, sign, state_words, duplicates : what files do not say themselves, see `aesi.data.reading.Reading`;
+    `columns: {state: NAME}` is the column that gives a current its sign.
     """
 
     kind: Literal["files", "catalogue", "virtual"]
@@ -70,7 +75,10 @@ class DataConfig(Section):
     dt_s: Positive = 1.0
     hold: Hold = "backward"
     columns: dict[str, str | None] = {}
-    sign: Literal["discharge-positive", "charge-positive"] = "discharge-positive"
+    units: dict[str, str] = {}
+    sign: Literal["discharge-positive", "charge-positive"] | None = None
+    state_words: dict[str, Literal["charge", "discharge", "rest"]] = {}
+    duplicates: Literal["refuse", "first", "last"] | None = None
     virtual: VirtualConfig = VirtualConfig()
 
     @model_validator(mode="after")
@@ -85,6 +93,11 @@ class DataConfig(Section):
         return self
 
     @property
+    def reading(self) -> Reading:
+        """How the files are read."""
+        return Reading(self.columns, self.units, self.sign, self.state_words, duplicates=self.duplicates)
+
+    @property
     def has_roles(self) -> bool:
         """Whether there is something to train on and something to test on."""
         return self.kind == "virtual" or self.repeats is not None or bool(self.train and self.test)
@@ -95,12 +108,14 @@ class CellConfig(Section):
     belongs to the data set.
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
-    effects : id -> parameters, effects added to the declared cell.
+    effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
+    the user's own; they are run, so name only files that you trust.
     """
 
     bpx: str = "catalogue"
     soc0: Annotated[float, Field(ge=0, le=1)] | None = None
     effects: dict[str, dict[str, float]] = {}
+    effect_files: tuple[str, ...] = ()
 
 
 class LibraryConfig(Section):

@@ -70,6 +70,7 @@ class RunView:
     candidates : rows with oob, valid, terms and, where known, fitness, number, feasible, front, chosen.
     terms : rows with term and, where known, importance (SVD), bagging, stability, inclusion.
     settings : what the search picked (lambda1, lambda2, tau, ...), as text.
+    fallback : why the run is not on the data that were asked for; empty where it is.
     """
 
     experiment: str
@@ -87,6 +88,7 @@ class RunView:
     mlflow_run_id: str = ""
     seconds: float | None = None
     physics: str = "ESPM"
+    fallback: str = ""
 
     def of(self, role: Role) -> tuple[RecordTrace, ...]:
         """The records of one role, in order."""

@@ -44,7 +44,7 @@ def evaluate_single(
     fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
     runs, memory = fold_runs(problem, active, fits, fits, coefficients)
     model = sparse_model(problem, active, coefficients, memory, name)
-    folds, valid = runs.judge(problem, 0), on_validation(problem, runs, (model,))
+    folds, (valid,) = runs.judge(problem, 0), on_validation(problem, runs, (model,))
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")
     losses = (folds.loss, valid.loss, int(np.count_nonzero(coefficients)))
