@@ -1,6 +1,6 @@
 """White noise on top of a slowly wandering model error: whitening and log-determinant in one pass.
 
-    y_k = a_k sum_j x_j(t_k) + w_k v_k,   x_j Ornstein-Uhlenbeck of unit variance / m and correlation length tau_j      (1)
+    y_k = a_k sum_j x_j(t_k) + w_k v_k,   x_j Ornstein-Uhlenbeck of unit variance / m and correlation length tau_j   (1)
 
 a (n,) and w (n,) are the standard deviations of the model error and of the white noise in each row. Equal shares over
 correlation lengths a decade apart stand for a spectrum that falls as one over the frequency between them. The Kalman

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from aesi.tracer.decide.search import Explanation, Path
+from aesi.tracer.decide.search import Path
 from aesi.tracer.decide.verdict import Verdict
-from aesi.tracer.likelihood.fit import Fit
+from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.growth import Explanation
 
 NINETY = 1.645
 """Standard deviations either side of a 90 % interval."""
@@ -70,7 +71,7 @@ def ranking(
 
 def _remark(path: Path, one: Explanation) -> str:
     rest = path.chosen.score.total
-    if isinstance(one, Fit) and one.at_bounds:
+    if isinstance(one, FittedHypothesis) and one.at_bounds:
         return f"ends on a bound: {', '.join(one.at_bounds)}"
     return f"says {one.score.total - rest:.1f} nats more of unseen data than what was chosen"
 

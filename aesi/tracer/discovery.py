@@ -21,10 +21,10 @@ from aesi.tracer.case.reduction import with_fine_numerics
 from aesi.tracer.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.decide.archive import Archive, context_of
 from aesi.tracer.decide.evidence import Evidence, gathered
-from aesi.tracer.decide.search import Explanation
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.explain import explain
-from aesi.tracer.outcome import FileOutcome, outcomes, test_rmse_v
+from aesi.tracer.likelihood.growth import Explanation
+from aesi.tracer.outcome import FileOutcome, States, outcomes, test_rmse_v
 from aesi.tracer.states import ModelState
 from aesi.tracer.tell_apart import experiment
 from aesi.tracer.yardstick import Yardstick, measure
@@ -169,7 +169,7 @@ def _told(
     problem, verdict = evidence.path.problem, evidence.verdict
     records = problem.records
     declared = ModelState(problem)
-    states = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
+    states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
     kinds = {name: str(effect.kind) for name, effect in problem.effects.items()}
     cell, model_effects, soc0 = evidence.after.settled()

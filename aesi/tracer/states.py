@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from aesi.errors import AesiError
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
-from aesi.physics.simulation import model_with
 from aesi.physics.model import EspmModel
+from aesi.physics.simulation import model_with
 from aesi.records import Run
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
-from aesi.tracer.case.problem import InverseProblem, Values
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 from aesi.tracer.case.records import PreparedRecord
-from aesi.tracer.decide.search import Explanation, linear_values
+from aesi.tracer.likelihood.growth import Explanation, linear_values
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +25,7 @@ class ModelState:
     """
 
     problem: InverseProblem
-    values: Values | None = None
+    values: ValuesByOwner | None = None
     hypothesis: tuple[str, ...] = ()
 
     @classmethod
@@ -88,6 +87,3 @@ def _cell_of(cell: Cell, active: ActiveEffect) -> Cell | None:
         return None
     changed = model_with(cell, (active,))
     return changed.cell if replace(changed, cell=cell) == EspmModel(cell) else None
-
-
-States = Mapping[str, ModelState]

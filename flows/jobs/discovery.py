@@ -113,7 +113,9 @@ class Follow:
         self._console.progress("hypotheses", self._done, total, self._started, name)
         if self._tracker is None:
             return
-        parameters = {f"{owner}.{key}": v for owner, given in tried.values.items() for key, v in given.items()}
+        parameters = {
+            f"{owner}.{key}": v for owner, given in tried.values.items() for key, v in given.items()
+        }
         metrics = {
             "gain_nats": tried.gain_nats,
             "fit/rmse_mv": MV * tried.rmse_v,

@@ -21,11 +21,23 @@ TWICE = (
 )
 PARAMETERS = {
     "conductivity_factor": Parameter(
-        0.6, "dimensionless", (0.2, 5.0), RANGE, log=True, neutral=1.0, description="factor of kappa",
+        0.6,
+        "dimensionless",
+        (0.2, 5.0),
+        RANGE,
+        log=True,
+        neutral=1.0,
+        description="factor of kappa",
         spread=Spread(0.027, 0.3, TWICE),
     ),
     "diffusivity_factor": Parameter(
-        0.6, "dimensionless", (0.2, 5.0), RANGE, log=True, neutral=1.0, description="factor of D_e",
+        0.6,
+        "dimensionless",
+        (0.2, 5.0),
+        RANGE,
+        log=True,
+        neutral=1.0,
+        description="factor of D_e",
         spread=Spread(0.35, 0.6, TWICE),
     ),
 }

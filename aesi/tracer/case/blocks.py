@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -49,11 +50,11 @@ def blocks_of(problem: InverseProblem) -> Blocks:
         starts += edges.tolist()
         record += [i] * pieces
     bounds = np.array([*starts, total])
-    rows_of = [slice(int(a), int(b)) for a, b in zip(bounds[:-1], bounds[1:], strict=True)]
+    rows_of = [slice(int(a), int(b)) for a, b in pairwise(bounds)]
     current = np.concatenate([m.current_a for m in problem.seen])
     rate = np.array([np.sqrt(np.mean(current[r] ** 2)) for r in rows_of])
     charge = np.array([np.mean(problem.declared_soc[r]) for r in rows_of])
-    folds = {"block": tuple((b,) for b in range(len(record)))}
+    folds: dict[str, tuple[tuple[int, ...], ...]] = {"block": tuple((b,) for b in range(len(record)))}
     if len(problem.records) > 1:
         folds["record"] = tuple(
             tuple(b for b, i in enumerate(record) if i == k) for k in range(len(problem.records))

@@ -32,7 +32,7 @@ parametrisation of it, or as one of a cell of its make."""
 EXACT_SHARE = 0.1
 """Of the tight spread of a declared parameter, where the file is believed exactly."""
 
-Values = Mapping[str, Mapping[str, float]]
+ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
 
 
@@ -104,13 +104,13 @@ class InverseProblem:
         assert self.reduction is not None
         return self.reduction.effect.parameters[self.reduction.name]
 
-    def active(self, values: Values) -> tuple[ActiveEffect, ...]:
+    def active(self, values: ValuesByOwner) -> tuple[ActiveEffect, ...]:
         """The effects to simulate with.  One under test is in even at its neutral point: some say the same of a cell in
         other words there (windows by voltages), and a fit must not see a step."""
         owners = [owner for owner in values if owner != STATE_OF_CHARGE]
         return (*self.fixed, *(self.effects[owner].activate(**values[owner]) for owner in owners))
 
-    def predict(self, values: Values, only: int | None = None) -> Array | None:
+    def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
         """(n,) V over the fit parts of all records, or of one; None where the model fails."""
         strength = 0.0
         if self.reduction is not None:

@@ -16,7 +16,7 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import Basis, initial_state
-from aesi.records import Hold, Measurement
+from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
 
 THIN_STEP_S = 1.0
 """Fits see at most one sample a second: nothing in the catalogue is faster than a sample and slower than
@@ -30,7 +30,6 @@ UNEVEN_SHARE = 0.01
 FIRST_STEP_S = 0.5
 STEP_GROWTH = 0.25
 """Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
-SLOW_SAMPLING_S = 5.0
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 SMALLEST_NOISE_V = 5e-5
@@ -128,7 +127,7 @@ def prepare(
     Raises DataError where the record is too short or its initial state cannot be known.
     """
     gaps = np.diff(data.time_s)
-    hold: Hold = "backward" if float(gaps.max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
+    hold: Hold = data.hold or assumed_hold(data.time_s)
     duration = float(data.time_s[-1] - data.time_s[0])
     steps = _current_steps(cell, data)
     typical = float(np.median(gaps))
@@ -142,14 +141,14 @@ def prepare(
     n_fit = int(np.searchsorted(thin.time_s, until))
     start = initial_state(cell, data, soc0, hold, given, shared=shared)
     notes = () if start.basis == "given" and not start.contradicted else (start.sentence,)
-    notes = (*notes, *_temperature_noted(data))
+    notes = (*notes, hold_sentence(data.name, hold, data.hold is not None), *_temperature_noted(data))
     noise_full = noise_floor_v(data.voltage_v, data.current_a)
     if rows is None:
         noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
         white = np.full(len(thin), noise)
     else:  # what lies between rows that far apart is no noise
         white = np.maximum(noise_full / np.sqrt(rows), SMALLEST_NOISE_V)
-    return PreparedRecord(  # fmt: skip
+    return PreparedRecord(
         data,
         thin,
         n_fit,

@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.physics.effect import Effect
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
-from aesi.tracer.case.problem import InverseProblem, ReductionError, Values
+from aesi.tracer.case.problem import InverseProblem, ReductionError, ValuesByOwner
 
 NOTABLE_SHARE = 0.1
 """Of the noise: an approximation that moves the voltage by more than this is taken back in every hypothesis."""
@@ -33,7 +33,7 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
     return replace(problem, fixed=effects) if shift > NOTABLE_SHARE * _noise_v(problem) else problem
 
 
-def with_reduction_error(problem: InverseProblem, values: Values) -> InverseProblem:
+def with_reduction_error(problem: InverseProblem, values: ValuesByOwner) -> InverseProblem:
     """The problem with what the declared porous electrode has beyond the reduced model, at these values, as a column;
     as it was where that is not notable."""
     effect = _refining(problem.effects, "reduction")

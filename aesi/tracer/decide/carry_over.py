@@ -7,16 +7,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.errors import AesiError
-from aesi.numerics.typing import Array
-from aesi.physics.cell import Cell
 from aesi.constants import SECONDS_PER_HOUR
+from aesi.errors import AesiError
+from aesi.numerics.typing import Array, BoolArray
+from aesi.physics.cell import Cell
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import coordinates_of
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.decide.search import Explanation
-from aesi.tracer.likelihood.fit import Fitter
+from aesi.tracer.likelihood.fit import HypothesisFitter
+from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.states import ModelState
 
 REFIT_STEPS = 4
@@ -87,7 +87,7 @@ def _with(problem: InverseProblem, records: tuple, kept: Sequence[int]) -> Inver
 
 
 def _refitted(part: InverseProblem, one: Explanation) -> ModelState | None:
-    fitter = Fitter(part, blocks_of(part), one.hypothesis)
+    fitter = HypothesisFitter(part, blocks_of(part), one.hypothesis)
     x = fitter.descend(coordinates_of(fitter.free, dict(one.placed)), one.score.delta_v, REFIT_STEPS)
     fit = fitter.finished(x)
     return None if fit is None else ModelState.of(part, fit)
@@ -139,5 +139,5 @@ def _fault(state: ModelState, rate: float, temperature: float | None) -> str | N
     )
 
 
-def _beyond_limit(cell: Cell, rate: float, voltage_v: Array) -> Array:
+def _beyond_limit(cell: Cell, rate: float, voltage_v: Array) -> BoolArray:
     return voltage_v < cell.lower_voltage_v if rate > 0 else voltage_v > cell.upper_voltage_v

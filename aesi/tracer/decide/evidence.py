@@ -10,9 +10,10 @@ from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps
-from aesi.tracer.decide.search import Explanation, Path, Report, base_of, refitted, searched
+from aesi.tracer.decide.search import Path, Report, base_of, refitted, searched
 from aesi.tracer.decide.verdict import Thresholds, Verdict, judged, noise_v, structured_v, tolerance_v
-from aesi.tracer.likelihood.fit import Fit
+from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.states import ModelState
 
 SIMPLER_NATS = 3.0
@@ -78,7 +79,7 @@ def gathered(
 
 
 def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[..., bool]:
-    def enough(path_blocks: object, fit: Fit) -> bool:
+    def enough(path_blocks: object, fit: FittedHypothesis) -> bool:
         from aesi.tracer.decide.search import unseen_rmse_v
 
         white = float((problem.white_v**2).mean())
@@ -116,13 +117,18 @@ def _with_confidence(verdict: Verdict) -> Verdict:
     return replace(verdict, confidence=frequency_maps()[verdict.word].frequency(verdict.margin))
 
 
-def _recalibrated(problem: InverseProblem, archive: Archive) -> tuple[InverseProblem, Fit] | None:
+def _recalibrated(
+    problem: InverseProblem, archive: Archive
+) -> tuple[InverseProblem, FittedHypothesis] | None:
     based = base_of(replace(problem, trust="loose"), archive)
     return None if based is None else (based[0], based[2])
 
 
 def _adopted(
-    path: Path, paths: dict[Trust, Path], verdict: Verdict, recalibrated: tuple[InverseProblem, Fit] | None
+    path: Path,
+    paths: dict[Trust, Path],
+    verdict: Verdict,
+    recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
 ) -> Evidence:
     """What was found, or the bare model; not where it cannot be simulated over the declared range."""
     chosen = ModelState.of(path.problem, path.chosen)
@@ -137,7 +143,7 @@ def _best_carried(
     loose: Path | None,
     paths: dict[Trust, Path],
     verdict: Verdict,
-    recalibrated: tuple[InverseProblem, Fit] | None,
+    recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
 ) -> Evidence:
     """Nothing explains the data: the model that leaves least on parts left out, and that can be simulated over the
     declared range, no worse on any of them than the declared and the recalibrated one."""
@@ -148,7 +154,10 @@ def _best_carried(
         problem, fit = recalibrated
         other = ModelState.of(problem, fit)
         basic.append(Option(other, left_out_errors(problem, fit), fit))
-    tried: list[tuple[InverseProblem, Fit]] = [(path.problem, path.base), (path.problem, path.chosen)]
+    tried: list[tuple[InverseProblem, FittedHypothesis]] = [
+        (path.problem, path.base),
+        (path.problem, path.chosen),
+    ]
     if loose is not None:
         tried.append((loose.problem, loose.chosen))
     more = [

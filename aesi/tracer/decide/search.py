@@ -18,8 +18,8 @@ from aesi.tracer.case.free_parameter import coordinates_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import with_reduction_error
 from aesi.tracer.decide.archive import Archive, fit_name
-from aesi.tracer.likelihood.fit import Fit, Fitter, held_out_residual
-from aesi.tracer.likelihood.growth import Grown, Parent, grow
+from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter, held_out_residual
+from aesi.tracer.likelihood.growth import Explanation, Grown, Parent, grow
 from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
 
 BASE_STEPS = 8
@@ -36,17 +36,15 @@ ADMITTED_NATS = 12.0
 LEAST_V = 1e-4
 """And what it has to take off the error on unseen data: less is within what two solvers of one model differ by."""
 
-Explanation = Fit | Grown
-
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """One step: what the parents grew, best first, and what was fitted in full."""
 
-    parents: tuple[Fit, ...]
+    parents: tuple[FittedHypothesis, ...]
     grown: tuple[Grown, ...]
-    fitted: tuple[Fit, ...]
-    admitted: Fit | None
+    fitted: tuple[FittedHypothesis, ...]
+    admitted: FittedHypothesis | None
 
     @property
     def best_gain(self) -> float:
@@ -62,16 +60,17 @@ class Path:
 
     problem: InverseProblem
     blocks: Blocks
-    base: Fit
+    base: FittedHypothesis
     steps: tuple[Step, ...]
-    chosen: Fit
+    chosen: FittedHypothesis
     notes: tuple[str, ...] = ()
 
     def explanations(self) -> list[Explanation]:
         """All that was tried, each at its best: fits with the whole model before first-order ones."""
         best: dict[frozenset[str], Explanation] = {frozenset(): self.base}
         for step in self.steps:
-            for one in (*step.grown, *step.fitted):  # a full fit takes the place of a linear one
+            tried: list[Explanation] = [*step.grown, *step.fitted]
+            for one in tried:  # a full fit takes the place of a linear one
                 best[frozenset(one.hypothesis)] = one
         return list(best.values())
 
@@ -89,7 +88,9 @@ def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
     return float(np.sqrt(np.mean(held_out_residual(blocks, one) ** 2)))
 
 
-def base_of(problem: InverseProblem, archive: Archive) -> tuple[InverseProblem, Blocks, Fit] | None:
+def base_of(
+    problem: InverseProblem, archive: Archive
+) -> tuple[InverseProblem, Blocks, FittedHypothesis] | None:
     """The hypothesis without effects, with the error of the reduction at it; None where it cannot be simulated."""
     blocks = blocks_of(problem)
     fit = _fitted(problem, blocks, (), None, PRIORS[problem.trust].median_v, BASE_STEPS, archive)
@@ -110,8 +111,8 @@ def _fitted(
     delta_v: float,
     steps: int,
     archive: Archive,
-) -> Fit | None:
-    fitter = Fitter(problem, blocks, hypothesis)
+) -> FittedHypothesis | None:
+    fitter = HypothesisFitter(problem, blocks, hypothesis)
     name = fit_name(problem, "fit", hypothesis)
     x = archive.get(name, len(fitter.free))
     if x is None:
@@ -128,7 +129,7 @@ def _nearest(delta_v: float) -> float:
 def searched(
     problem: InverseProblem,
     max_effects: int,
-    enough: Callable[[Blocks, Fit], bool],
+    enough: Callable[[Blocks, FittedHypothesis], bool],
     archive: Archive,
     report: Report = lambda problem, one, gain: None,
 ) -> Path | None:
@@ -158,7 +159,7 @@ def searched(
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
 
 
-def _beyond_noise(problem: InverseProblem, blocks: Blocks, fit: Fit) -> float:
+def _beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
     """V**2 beyond the noise on unseen data."""
     return max(unseen_rmse_v(blocks, fit) ** 2 - float(np.mean(problem.white_v**2)), 0.0)
 
@@ -177,8 +178,8 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
 def _step(
     problem: InverseProblem,
     blocks: Blocks,
-    parents: Sequence[Fit],
-    best: Fit,
+    parents: Sequence[FittedHypothesis],
+    best: FittedHypothesis,
     archive: Archive,
     report: Report,
 ) -> tuple[Step, list[str]]:
@@ -214,7 +215,7 @@ def _step(
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted), refused
 
 
-def _admitted(blocks: Blocks, without: Fit, fit: Fit) -> bool:
+def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis) -> bool:
     off = unseen_rmse_v(blocks, without) ** 2 - unseen_rmse_v(blocks, fit) ** 2
     says = fit.score.total - without.score.total
     return says > ADMITTED_NATS and off > LEAST_V**2 and not fit.at_bounds
@@ -255,13 +256,3 @@ def _side_by_side(wanted: Sequence[tuple[Parent, str]], archive: Archive) -> Ite
 def _growth_size(parent: Parent) -> float:
     """Size of the model error at which the parameters of an effect are fitted: what a right hypothesis leaves."""
     return _nearest(PRIORS[parent.problem.trust].median_v)
-
-
-def linear_values(one: Explanation) -> dict[str, dict[str, float]]:
-    """owner -> name -> value, where all data put them."""
-    if isinstance(one, Fit):
-        return one.values
-    out: dict[str, dict[str, float]] = {}
-    for (owner, name), value in one.placed.items():
-        out.setdefault(owner, {})[name] = value
-    return out

@@ -11,7 +11,8 @@ from typing import Literal
 
 import numpy as np
 
-from aesi.tracer.decide.search import Explanation, Path, unseen_rmse_v
+from aesi.tracer.decide.search import Path, unseen_rmse_v
+from aesi.tracer.likelihood.growth import Explanation
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
@@ -81,14 +82,14 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     if left > allowed:
         margin = float(np.log(left / allowed))
         reason = (
-            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, whichever effects of the "
-            f"catalogue are added ({1e3 * allowed:.2f} mV would be within what a right model leaves)"
+            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, whichever effects of "
+            f"the catalogue are added ({1e3 * allowed:.2f} mV would be within what a right model leaves)"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
     if not path.chosen.hypothesis:
         reason = (
-            f"{1e3 * left:.2f} mV beyond the noise on data that the fit has not seen, {1e3 * allowed:.2f} mV are within "
-            "what a right model leaves"
+            f"{1e3 * left:.2f} mV beyond the noise on data that the fit has not seen, {1e3 * allowed:.2f} mV are "
+            "within what a right model leaves"
         )
         return Verdict("none", (), (), 0.0, left, allowed, reason, -_best_gain(path))
     groups, margin = look_alikes(path, thresholds)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from aesi.numerics.bounded import descend
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
-from aesi.tracer.case.problem import InverseProblem, Values
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
     PredictiveScore,
@@ -30,7 +31,7 @@ GAIN_NATS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class FittedHypothesis:
     """A hypothesis where the data put it.
 
     free : what moves.  point : the linear form there.  score : on unseen data.  simulations : spent.
@@ -41,7 +42,7 @@ class Fit:
     point: Linearised
     score: PredictiveScore
     simulations: int = 0
-    reference: Values = field(default_factory=dict)
+    reference: ValuesByOwner = field(default_factory=dict)
 
     @property
     def values(self) -> dict[str, dict[str, float]]:
@@ -68,7 +69,7 @@ class Fit:
         )
 
 
-class Fitter:
+class HypothesisFitter:
     """Simulations, slopes and descents of one hypothesis."""
 
     def __init__(self, problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> None:
@@ -140,14 +141,14 @@ class Fitter:
             linearise, cost, np.clip(x, self.low, self.high), self.low, self.high, steps, GAIN_NATS
         ).x
 
-    def finished(self, x: Array) -> Fit | None:
+    def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit at a point, scored."""
         e = self.residual(x)
         jacobian = None if e is None else self.jacobian(x, e)
         if e is None or jacobian is None:
             return None
         point = Linearised(x, e, jacobian)
-        return Fit(self.hypothesis, self.free, point, self.scored(point), self.simulations)
+        return FittedHypothesis(self.hypothesis, self.free, point, self.scored(point), self.simulations)
 
     def scored(self, point: Linearised) -> PredictiveScore:
         """The predictive score, over sizes of the model error."""
@@ -164,7 +165,16 @@ def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> Predic
     return best_over_sizes(out)
 
 
-def held_out_residual(blocks: Blocks, fit: Fit) -> Array:
+class LinearForm(Protocol):
+    """A hypothesis about a point, with its score."""
+
+    @property
+    def point(self) -> Linearised: ...
+    @property
+    def score(self) -> PredictiveScore: ...
+
+
+def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
     """(n,) V: the residual of each block at the parameters that the other blocks give, linearly."""
     shifts = fit.score.shifts[blocks.of_row]
     return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)

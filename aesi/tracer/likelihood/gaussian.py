@@ -1,10 +1,10 @@
 """The linear-Gaussian form of a hypothesis about a point, by blocks, and what it predicts of blocks left out.
 
-    y = f(x) + J z + e,   x + z ~ N(0, 1),   e ~ N(0, C), independent between blocks                                   (1)
+    y = f(x) + J z + e,   x + z ~ N(0, 1),   e ~ N(0, C), independent between blocks    (1)
 
 With whitened residual r and sensitivities J, a set S of blocks has the marginal density
 
-    -2 log p(y_S) = r'r + x'x - b'A^-1 b + log|A| + log|C| + n log 2 pi,   A = 1 + J'J,   b = J'r - x                   (2)
+    -2 log p(y_S) = r'r + x'x - b'A^-1 b + log|A| + log|C| + n log 2 pi,   A = 1 + J'J,   b = J'r - x     (2)
 
 and what is said of blocks F by those outside is log p(y_F | y_-F) = log p(y) - log p(y_-F).
 Bishop, Pattern Recognition and Machine Learning (2006), section 3.5.

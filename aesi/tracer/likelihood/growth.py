@@ -18,8 +18,8 @@ from aesi.numerics.bounded import Minimum, descend
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import FreeParameter, of_effect, starts, values_of
-from aesi.tracer.case.problem import InverseProblem, Values
-from aesi.tracer.likelihood.fit import EFFECT_STEP, GAIN_NATS, Fit
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
+from aesi.tracer.likelihood.fit import EFFECT_STEP, GAIN_NATS, FittedHypothesis
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
     PredictiveScore,
@@ -41,7 +41,7 @@ class Parent:
 
     problem: InverseProblem
     blocks: Blocks
-    fit: Fit
+    fit: FittedHypothesis
 
     @cached_property
     def white(self) -> dict[float, tuple[Array, Array]]:
@@ -89,7 +89,7 @@ class _Growth:
         self.added = tuple(of_effect(effect, self.problem.effects[effect].parameters))
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
-        self.held: Values = {o: v for o, v in fit.values.items() if o != effect}
+        self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
         basis = np.vstack([parent.white[delta_v][0][:, self.rest], np.eye(len(self.rest))])
         self.q = np.linalg.qr(basis)[0]
@@ -189,3 +189,17 @@ def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
     point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]]))
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
     return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations, on_bounds, u)
+
+
+Explanation = FittedHypothesis | Grown
+"""A hypothesis as it was tried: fitted with the whole model, or to first order but for its last effect."""
+
+
+def linear_values(one: Explanation) -> dict[str, dict[str, float]]:
+    """owner -> name -> value, where all data put them."""
+    if isinstance(one, FittedHypothesis):
+        return one.values
+    out: dict[str, dict[str, float]] = {}
+    for (owner, name), value in one.placed.items():
+        out.setdefault(owner, {})[name] = value
+    return out
