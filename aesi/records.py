@@ -13,9 +13,11 @@ import numpy as np
 
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import over_time, time_unit
 
 if TYPE_CHECKING:
     import pandas as pd
+    from plotly.graph_objects import Figure
 
 Hold = Literal["linear", "backward"]
 """How the current runs between samples: straight lines, or constant since the row before (as loggers do)."""
@@ -50,6 +52,14 @@ def digest(*arrays: Array | None) -> str:
     return sha.hexdigest()[:16]
 
 
+def _extent(time_s: Array) -> str:
+    """Rows and duration, for a short text."""
+    if not len(time_s):
+        return "no rows"
+    unit, divisor = time_unit(float(time_s[-1] - time_s[0]))
+    return f"{len(time_s):,} rows over {(time_s[-1] - time_s[0]) / divisor:,.4g} {unit}"
+
+
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """One continuous test of one cell.
@@ -78,6 +88,26 @@ class Measurement:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    def __repr__(self) -> str:
+        warm = "" if self.temperature_degc is None else ", with temperature"
+        return f"Measurement({self.name!r}, {_extent(self.time_s)}{warm})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The columns as a table, one row a sample; the temperature where it was measured."""
+        import pandas as pd
+
+        columns = {
+            name: getattr(self, name) for name in ("time_s", "current_a", "voltage_v", "temperature_degc")
+        }
+        return pd.DataFrame({name: values for name, values in columns.items() if values is not None})
+
+    def plot(self) -> Figure:
+        """Voltage, current and temperature over time: a plotly figure."""
+        panels = {"voltage, V": {"measured": self.voltage_v}, "current, A": {"current": self.current_a}}
+        if self.temperature_degc is not None:
+            panels["temperature, degC"] = {"temperature": self.temperature_degc}
+        return over_time(self.time_s, panels)
 
     @property
     def digest(self) -> str:
@@ -118,6 +148,27 @@ class Run:
     voltage_v: Array
     series: dict[str, Array] = field(default_factory=dict)
 
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def __repr__(self) -> str:
+        low, high = float(self.voltage_v.min()), float(self.voltage_v.max())
+        return f"Run({_extent(self.time_s)}, {low:.3f} to {high:.3f} V, states {', '.join(self.series)})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Time, current, voltage and states as a table, one row a sample."""
+        import pandas as pd
+
+        columns = {"time_s": self.time_s, "current_a": self.current_a, "voltage_v": self.voltage_v}
+        return pd.DataFrame(columns | self.series)
+
+    def plot(self) -> Figure:
+        """Voltage, current and state of charge over time: a plotly figure."""
+        panels = {"voltage, V": {"simulated": self.voltage_v}, "current, A": {"current": self.current_a}}
+        if "soc" in self.series:
+            panels["state of charge"] = {"state of charge": self.series["soc"]}
+        return over_time(self.time_s, panels)
+
     @property
     def states(self) -> pd.DataFrame:
         """The series as a table, one row a sample."""
@@ -150,6 +201,9 @@ class ErrorSeries:
 
     def __len__(self) -> int:
         return len(self.error_v)
+
+    def __repr__(self) -> str:
+        return f"ErrorSeries({self.name!r}, {_extent(self.time_s)}, inputs {', '.join(self.input_names)})"
 
     @property
     def current_a(self) -> Array:

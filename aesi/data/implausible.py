@@ -26,7 +26,7 @@ HIGHEST_CHARGE_RESISTANCE_OHM_AH = 10.0
 """Capacity times resistance is 0.05 to 0.8 ohm Ah for those 46 records: a thousand times more is time in ms."""
 CONTRADICTING_SHARE = 0.04
 CONTRADICTING_STEPS = 5
-RISE_V = 0.6
+RISE_V = 0.5
 ENOUGH_ROWS = 10
 SMALL_SHARE = 0.02
 """Of the largest current: below, the cell rests."""

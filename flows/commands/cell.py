@@ -85,6 +85,7 @@ def calibrate(
     hold: options.HoldOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements."""
+    options.say_reading(data)
     from flows.jobs.calibration import calibrate as flow
 
     flow(cell, options.measurements(data, reading, hold), out, soc0=soc0, seed=seed)
@@ -122,15 +123,17 @@ def discover(
     ] = None,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
-    from flows.jobs.discovery import discover as flow
-    from flows.jobs.discovery import discover_experiment
-
     if experiment is not None:
+        options.say_reading([experiment])
+        from flows.jobs.discovery import discover_experiment
+
         discover_experiment(str(experiment), list(overrides or []), out)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
+    options.say_reading([*data, *(test or [])])
     from aesi.pipeline.discovery.cases import case_of_files
+    from flows.jobs.discovery import discover as flow
 
     case = case_of_files(
         cell,

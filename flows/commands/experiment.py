@@ -75,6 +75,21 @@ def tables(
     typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
 
 
+def compare(
+    runs: Annotated[
+        list[str],
+        typer.Argument(help="Tracked runs (the beginning of their ids), or experiments for all of theirs."),
+    ],
+    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("compare.html"),
+    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+) -> None:
+    """Tracked runs side by side on one offline page: what differed, what came of it, where the error is."""
+    from flows.results.compare import compare as write
+
+    shown = write(runs, out, uri)
+    typer.echo(f"{out}: {len(shown)} runs", err=True)
+
+
 def candidate(
     run_id: Annotated[str, typer.Argument(help="A tracked candidate, or a run for the one that it chose.")],
     out: Annotated[Path, typer.Option(help="Folder for model/ and candidate.json.")],

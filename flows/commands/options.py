@@ -145,6 +145,11 @@ def measurements(paths: list[Path], reading: Reading, hold: Hold | None = None) 
     return tuple(read(path, reading).held(hold) for path in paths)
 
 
+def say_reading(paths: Iterable[Path]) -> None:
+    """The first line of a long command, before the libraries load."""
+    typer.echo(f"Reading {', '.join(path.name for path in paths)} ...", err=True)
+
+
 def say_notes(notes: Iterable[str]) -> None:
     """What a reader dropped, mapped or averaged, on stderr."""
     from aesi.pipeline.notes import together

@@ -85,11 +85,13 @@ def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) ->
     if (out / ARCHIVE).exists():
         console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
     tracker = _tracker(case, experiment, console)
-    follow = Follow(tracker, console, len(known_effects(case.effect_files)))
+    follow = Follow(tracker, console)
     try:
         found = run("hypotheses", lambda: run_case(case, out, follow))
         content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
     except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            console.say(f"Stopped. What was fitted is kept in {out}; the same command goes on from there.")
         if tracker is not None:
             tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise
@@ -101,16 +103,16 @@ def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) ->
 class Follow:
     """Shows and tracks each hypothesis as it is judged."""
 
-    def __init__(self, tracker: Tracker | None, console: Console, total: int) -> None:
-        self._tracker, self._console, self._total = tracker, console, total
+    def __init__(self, tracker: Tracker | None, console: Console) -> None:
+        self._tracker, self._console = tracker, console
         self._started, self._done = time.monotonic(), 0
 
     def __call__(self, tried: TriedHypothesis) -> None:
         """One hypothesis: what it says of unseen data, its error and its parameters."""
         self._done += 1
         name = "+".join(tried.effects)
-        total = max(self._total, self._done + 1)
-        self._console.progress("hypotheses", self._done, total, self._started, name)
+        # How many there will be is not known: each is judged by what the ones before it left.
+        self._console.count("hypotheses", self._done, self._started, name)
         if self._tracker is None:
             return
         parameters = {

@@ -46,6 +46,7 @@ def _stages(
     console: Console,
     started: float,
 ) -> Path:
+    from aesi.pipeline.experiment.comparison import comparison
     from aesi.pipeline.experiment.conformalise import conformalise
     from aesi.pipeline.experiment.evaluate import evaluate
     from aesi.pipeline.experiment.fit import build_problem, final_models
@@ -88,7 +89,8 @@ def _stages(
         failed=len(found.result.trials) - len(rows),
     )
     summary = run("report", lambda: write_outputs(folder, result))
-    track_result(tracker, folder, summary, found.number)
+    tracker.json("comparison.json", comparison(result))
+    track_result(tracker, folder, summary, found.number, fitted)
     return folder
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import log10
 from pathlib import Path
 from typing import Any
 
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ROLES, Failed
@@ -105,7 +106,9 @@ class CandidateTracker:
         )
 
 
-def track_result(tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int) -> None:
+def track_result(
+    tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int, fitted: Sequence[Fitted]
+) -> None:
     """The models, the tables, the report and the chosen model; `number` is the candidate's they come from."""
     chosen = summary["chosen"]
     for row in summary["models"]:
@@ -116,6 +119,9 @@ def track_result(tracker: Tracker, folder: Path, summary: Mapping[str, Any], num
     tracker.parameters({"chosen_candidate": number, "chosen_model": chosen})
     for name in ("summary.json", "report.html", "tables.md", "tables.tex"):
         tracker.files(folder / name)
+    for one in fitted:
+        if one.trials:
+            tracker.json(f"search of {one.model.name}.json", [dict(row) for row in one.trials])
     if (folder / "figures").is_dir():
         tracker.files(folder / "figures", "figures")
     tracker.model(folder / "model")

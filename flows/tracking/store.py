@@ -92,6 +92,18 @@ class Store:
                 f"no run {run_id!r} is tracked in {_without_password(self.uri)}; give a whole run id."
             ) from None
 
+    def artifact(self, run: Any, name: str) -> Path | None:
+        """A file among the artifacts of a run, or None where there is none; of a local store without asking it."""
+        from mlflow.utils.file_utils import local_file_uri_to_path
+
+        if not str(run.info.artifact_uri).startswith("file:"):
+            try:
+                return self.read(run.info.run_id, name)
+            except InputError:
+                return None
+        path = Path(local_file_uri_to_path(run.info.artifact_uri)) / name
+        return path if path.is_file() else None
+
     def read(self, run_id: str, name: str) -> Path:
         """An artifact of a run, a file or a folder, as it lies on disk or is fetched from a server.
 

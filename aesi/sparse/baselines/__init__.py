@@ -1,33 +1,40 @@
 """What a user would pick instead, on the same features, splits and regimes; each a function of problem and tuning."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from aesi.records import ErrorModel
 from aesi.sparse.baselines.boosting import gradient_boosting
 from aesi.sparse.baselines.ridge import plain_ridge
-from aesi.sparse.baselines.sindy_c import tuned_sindy_c
+from aesi.sparse.baselines.sindy_c import Judge, tuned_sindy_c
 from aesi.sparse.search.genome_space import GenomeSpace
 from aesi.sparse.search.problem import Problem
 
 
 @dataclass(frozen=True)
 class Tuning:
-    """What a baseline may spend, the same as the search: candidates, generation size, ranges (None: the widest)."""
+    """What a baseline may spend and is judged by, the same as the search.
+
+    candidates, population : how many, and in a generation.  space : ranges (None: the widest).  judge : weights and
+    constraints.  told : hears of each candidate, as a row of plain values.
+    """
 
     seed: int = 0
     candidates: int = 200
     population: int = 20
     space: GenomeSpace | None = None
+    judge: Judge = field(default_factory=Judge)
+    told: Callable[[dict[str, Any]], None] | None = None
 
 
 BASELINES: dict[str, Callable[[Problem, Tuning], ErrorModel]] = {
     "SINDy-C": lambda problem, tuning: tuned_sindy_c(
-        problem, tuning.seed, tuning.candidates, tuning.population, tuning.space
+        problem, tuning.seed, tuning.candidates, tuning.population, tuning.space, tuning.judge, tuning.told
     ),
     "ridge": lambda problem, _: plain_ridge(problem),
     "gradient boosting": lambda problem, tuning: gradient_boosting(problem, tuning.seed),
 }
 """Name -> function of the problem and the tuning."""
 
-__all__ = ["BASELINES", "Tuning", "gradient_boosting", "plain_ridge", "tuned_sindy_c"]
+__all__ = ["BASELINES", "Judge", "Tuning", "gradient_boosting", "plain_ridge", "tuned_sindy_c"]

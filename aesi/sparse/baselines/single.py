@@ -21,12 +21,17 @@ FactorFit = Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Single:
-    """A single fit: its fitness, the model, and how it did on validation."""
+    """A single fit: its losses (left-out pieces, validation, terms), fitness, model, and how it did on validation.
+
+    pearson_train : correlation of error and prediction in free run, on left-out pieces.
+    """
 
     genome: Genome
     fitness: float
     model: SparseModel
     valid: Judged
+    losses: tuple[float, float, int]
+    pearson_train: float
 
 
 def evaluate_single(
@@ -49,4 +54,4 @@ def evaluate_single(
         return Failed("the model diverges in free run")
     losses = (folds.loss, valid.loss, int(np.count_nonzero(coefficients)))
     score = fitness(losses, len(problem.library), weights or FitnessWeights())
-    return Single(genome, score, model, valid)
+    return Single(genome, score, model, valid, losses, folds.pearson)

@@ -31,9 +31,9 @@ BEAM = 2
 """Hypotheses that a further effect is tried on."""
 HOPELESS_SHARE = 0.7
 """Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
-ADMITTED_NATS = 12.0
+ADMITTED_NATS = 15.0
 """What an effect has to say more of unseen data than the hypothesis without it."""
-LEAST_V = 1e-4
+LEAST_V = 1.5e-4
 """And what it has to take off the error on unseen data: less is within what two solvers of one model differ by."""
 
 
@@ -156,7 +156,29 @@ def searched(
             break
         others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
+    chosen = _pruned(problem, blocks, chosen, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
+
+
+def _pruned(
+    problem: InverseProblem, blocks: Blocks, chosen: FittedHypothesis, archive: Archive, report: Report
+) -> FittedHypothesis:
+    """The hypothesis without effects that it does not need once the others are in."""
+    while len(chosen.hypothesis) > 1:
+        best: FittedHypothesis | None = None
+        for name in chosen.hypothesis[:-1]:  # the last one was admitted on top of the others
+            rest = tuple(other for other in chosen.hypothesis if other != name)
+            start, size = chosen.placed, chosen.score.delta_v
+            fit = _fitted(problem, blocks, rest, start, size, 2 * REFIT_STEPS, archive)
+            if fit is None:
+                continue
+            report(problem, fit, fit.score.total - chosen.score.total)
+            if not _admitted(blocks, fit, chosen) and (best is None or fit.score.total > best.score.total):
+                best = fit
+        if best is None:
+            break
+        chosen = best
+    return chosen
 
 
 def _beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
