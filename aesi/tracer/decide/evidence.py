@@ -16,8 +16,8 @@ from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.states import ModelState
 
-SIMPLER_NATS = 3.0
-"""What a hypothesis with more effects has to say more, to be believed rather than one whose own parameters moved."""
+AS_MUCH_NATS = 0.5
+"""Two hypotheses within this of each other say as much of unseen data."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,14 +91,11 @@ def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[..., bo
 
 def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tuple[Path, Verdict]:
     """Which of two searches is to be believed: one that explains the data before one that does not, then the one that
-    says more, and of two that say as much the one with fewer effects."""
+    says more; a named effect with all else as declared, where that says as much as own parameters that all moved."""
     if (first.word == "unknown") != (second.word == "unknown"):
         return (tight, second) if first.word == "unknown" else (exact, first)
-    more = len(exact.chosen.hypothesis) - len(tight.chosen.hypothesis)
     ahead = exact.chosen.score.total - tight.chosen.score.total
-    if ahead > SIMPLER_NATS * more:
-        return exact, first
-    return tight, second
+    return (exact, first) if ahead > -AS_MUCH_NATS else (tight, second)
 
 
 def _sharpened(

@@ -17,7 +17,7 @@ import numpy as np
 from aesi.numerics.bounded import Minimum, descend
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import FreeParameter, of_effect, starts, values_of
+from aesi.tracer.case.free_parameter import FURTHEST_SDS, FreeParameter, of_effect, starts, values_of
 from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 from aesi.tracer.likelihood.fit import EFFECT_STEP, GAIN_NATS, FittedHypothesis
 from aesi.tracer.likelihood.gaussian import (
@@ -52,10 +52,13 @@ class Parent:
 
     @cached_property
     def movable(self) -> IntArray:
-        """Parameters that are not on a bound, which a linear form cannot see."""
-        bounds = np.array([f.bounds for f in self.fit.free])
+        """Parameters but those on a bound of what they can mean at all, which a linear form cannot see.  The bounds of
+        the others are where their prior has long taken over."""
         x = self.fit.point.x
-        return np.flatnonzero((x > bounds[:, 0] + 1e-9) & (x < bounds[:, 1] - 1e-9))
+        bounds = np.array([f.bounds for f in self.fit.free])
+        near = np.abs(x[:, None] - bounds) < 1e-9
+        hard = np.abs(bounds) < FURTHEST_SDS - 1e-6
+        return np.flatnonzero(~(near & hard).any(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
