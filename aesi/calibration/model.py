@@ -33,7 +33,7 @@ STEP = 0.02
 
 
 @dataclass(frozen=True)
-class Layout:
+class WorkingVector:
     """Where the parts of a working vector stand."""
 
     globals: int
@@ -72,7 +72,7 @@ class Model:
         self, cell: Cell, records: tuple[Prepared, ...], free: tuple[Free, ...], shapes: Shapes
     ) -> None:
         self.cell, self.records, self.free, self.shapes = cell, records, free, shapes
-        self.layout = Layout(len(free), shapes.n_ocp, shapes.n_entropic, len(records))
+        self.layout = WorkingVector(len(free), shapes.n_ocp, shapes.n_entropic, len(records))
         self.zero_a = ZERO_SHARE * max(float(np.abs(r.data.current_a).max()) for r in records)
         self.weights = [
             min(1.0, INDEPENDENT / len(r.rows)) ** 0.5 / ERROR_V * r.trusted.astype(float) for r in records

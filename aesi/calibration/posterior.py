@@ -26,7 +26,7 @@ SPREAD = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class PosteriorSamples:
     """samples : (n, parameters) working coordinates.  intervals : 95 %, from them.  off : name -> width over that of
     the linear interval.  accepted : share of proposals.  autocorrelation : steps, nan where the chain is too short."""
 
@@ -52,7 +52,7 @@ class Posterior:
         )
 
 
-def sampled(found: Calibration, steps: int, seed: int = 0) -> Posterior:
+def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
     """Draw from the posterior of the global parameters, `steps` of each walker.
 
     Raises InputError where emcee is not installed or the steps are too few.
@@ -95,7 +95,7 @@ def sampled(found: Calibration, steps: int, seed: int = 0) -> Posterior:
     return _summary(found, kept, float(np.mean(sampler.acceptance_fraction)), autocorrelation)
 
 
-def _summary(found: Calibration, samples: Array, accepted: float, autocorrelation: float) -> Posterior:
+def _summary(found: Calibration, samples: Array, accepted: float, autocorrelation: float) -> PosteriorSamples:
     out, off = {}, {}
     for j, free in enumerate(found.model.free):
         low, middle, high = np.quantile(samples[:, j], [0.025, 0.5, 0.975])
@@ -103,4 +103,4 @@ def _summary(found: Calibration, samples: Array, accepted: float, autocorrelatio
             free.value(float(middle)), free.value(float(low)), free.value(float(high)), free.unit, free.source
         )
         off[free.name] = float((high - low) / (2.0 * 1.96 * np.sqrt(found.covariance[j, j])))
-    return Posterior(samples, out, off, accepted, autocorrelation)
+    return PosteriorSamples(samples, out, off, accepted, autocorrelation)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from aesi.calibration import Calibration, calibrate
-from aesi.calibration.posterior import Posterior, sampled
+from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
@@ -80,7 +80,7 @@ def _made_from(found: Calibration) -> str:
 def to_json(
     found: Calibration,
     read: Sequence[str] = (),
-    posterior: Posterior | None = None,
+    posterior: PosteriorSamples | None = None,
     spectra: Sequence[SpectrumError] = (),
 ) -> dict[str, Any]:
     """The report: errors by file, parameters with intervals, what stays open.
@@ -130,7 +130,7 @@ def to_json(
     }  # fmt: skip
 
 
-def _of_posterior(posterior: Posterior | None, name: str) -> dict[str, float]:
+def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:
     if posterior is None:
         return {}
     interval = posterior.intervals[name]
