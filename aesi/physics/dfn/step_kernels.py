@@ -2,6 +2,7 @@
 
 from numba import njit
 
+from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.dfn.newton_kernels import solve_reaction
 from aesi.physics.dfn.transport_kernels import (
     calm_particles,
@@ -14,9 +15,9 @@ from aesi.physics.dfn.transport_kernels import (
 )
 from aesi.physics.espm.electrode_kernels import end_weight
 from aesi.physics.espm.kernels import FASTMATH, lookup
-from aesi.physics.espm.transport_kernels import GAS, arrhenius, solid_forcing
+from aesi.physics.espm.transport_kernels import arrhenius, solid_forcing
 
-GAS_OVER_FARADAY = GAS / 96485.33212331001
+GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 SALT_TOLERANCE = 1e-4
 """Of the rest concentration: how far from its prediction the salt may end before a step is repeated."""
 SURFACE_TOLERANCE = 1e-6
