@@ -152,7 +152,7 @@ def discover(
 
 
 def export(
-    cell: options.Cell,
+    cell: options.CellOption,
     to: Annotated[Literal["bpx", "pybamm"], typer.Option(help="A BPX file, or a script that PyBaMM runs.")],
     out: Annotated[Path, typer.Option(help="File to write: .json for bpx, .py for pybamm.")],
 ) -> None:

@@ -41,7 +41,6 @@ def test_a_folded_cell_is_the_cell_with_its_effects(cell):
     found = folded(cell, (*INSIDE, *OPTIONAL, CATALOGUE["voltage_sensor_offset"].activate(offset_v=2e-3)))
     assert found.held == INSIDE
     assert [effect.id for effect in found.left] == [
-        "double_layer",
         "asymmetric_kinetics",
         "voltage_sensor_offset",
     ]
