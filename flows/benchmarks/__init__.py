@@ -11,6 +11,7 @@ from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 
 BENCHMARKS = OF_THE_PACKAGE | {
     "blind": "flows.benchmarks.blind",
+    "splits": "flows.benchmarks.splits",
     "tracking": "flows.benchmarks.tracking",
     "scale": "flows.benchmarks.scale",
 }
