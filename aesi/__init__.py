@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from aesi.data import read_measurement
     from aesi.physics import Cell, simulate
     from aesi.pipeline.cross_check import cross_check
-    from aesi.pipeline.hybrid import HybridModel
+    from aesi.pipeline.product.hybrid import HybridModel
 
 __version__ = "0.1.0"
 
@@ -29,7 +29,7 @@ _HOME = {
     "Cell": "aesi.physics",
     "simulate": "aesi.physics",
     "read_measurement": "aesi.data",
-    "HybridModel": "aesi.pipeline.hybrid",
+    "HybridModel": "aesi.pipeline.product.hybrid",
     "cross_check": "aesi.pipeline.cross_check",
 }
 

@@ -147,6 +147,10 @@ class ErrorSeries:
         )
 
 
+Role = Literal["train", "valid", "test"]
+ROLES: tuple[Role, ...] = ("train", "valid", "test")
+
+
 @dataclass(frozen=True)
 class Split:
     """Records by role. The test records choose nothing: they are met once, by the model already chosen."""

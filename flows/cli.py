@@ -12,7 +12,7 @@ from typing import NoReturn
 import typer
 
 from aesi.errors import AesiError
-from flows import environment
+from flows.base import environment
 from flows.commands import bench, cell, data, effects, experiment
 
 INTERRUPTED = 130  # what shells return for a process that Ctrl-C ended

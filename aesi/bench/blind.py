@@ -19,7 +19,7 @@ import numpy as np
 from aesi.data.blind import BlindCase, CaseSpec, cells_in, generate, plan, small_plan
 from aesi.errors import AesiError
 from aesi.physics import Cell
-from aesi.pipeline.discover import to_json
+from aesi.pipeline.discovery.discover import to_json
 from aesi.tracer import discover
 
 MV = 1e3

@@ -1,10 +1,11 @@
 """Prediction intervals of the voltage error: one step ahead, online; and free run, by horizon."""
 
-from aesi.conformal.calibrated import Calibrated, Stream
 from aesi.conformal.free_run import WHOLE_DRIVE, FreeRunBands
 from aesi.conformal.intervals import Intervals
-from aesi.conformal.method import Method
+from aesi.conformal.online.calibrated import Calibrated, Stream
+from aesi.conformal.online.method import Method
 from aesi.conformal.registry import DEFAULT_METHOD, METHODS
+from aesi.conformal.saved import calibrated_from_dict
 
 __all__ = [
     "DEFAULT_METHOD",
@@ -15,4 +16,5 @@ __all__ = [
     "Intervals",
     "Method",
     "Stream",
+    "calibrated_from_dict",
 ]

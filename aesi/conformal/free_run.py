@@ -36,11 +36,10 @@ import numpy as np
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from aesi.conformal.band import State
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import LocalScale, covariates
 from aesi.errors import FitError, InputError
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.records import ErrorSeries, FreeRun
 
 SCHEMA = "aesi.free_run_bands/3"
@@ -94,7 +93,7 @@ class HorizonBand:
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
         return self.widening * high
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         """Plain values and numpy arrays only; the whole drive's horizon is None."""
         return {
             "horizon_s": self.horizon_s if math.isfinite(self.horizon_s) else None,
@@ -107,7 +106,7 @@ class HorizonBand:
         }
 
     @classmethod
-    def from_state(cls, state: State, alpha: float) -> Self:
+    def from_state(cls, state: SavedState, alpha: float) -> Self:
         """Inverse of `to_state`."""
         return cls(
             WHOLE_DRIVE if state["horizon_s"] is None else float(state["horizon_s"]),
@@ -201,7 +200,7 @@ class FreeRunBands:
         low, high = self.along(*where) if horizon_s is None else self.at(horizon_s, *where)
         return Intervals(low, high, ~free.outside)
 
-    def to_dict(self) -> State:
+    def to_dict(self) -> SavedState:
         """Plain values and numpy arrays only."""
         return {
             "schema": SCHEMA,
@@ -210,7 +209,7 @@ class FreeRunBands:
         }
 
     @classmethod
-    def from_dict(cls, state: State) -> FreeRunBands:
+    def from_dict(cls, state: SavedState) -> FreeRunBands:
         """Inverse of `to_dict`; arrays may come back as lists. Raises InputError for another schema."""
         if state.get("schema") != SCHEMA:
             raise InputError(

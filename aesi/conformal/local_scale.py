@@ -17,9 +17,8 @@ from typing import Self
 import numpy as np
 from scipy.signal import lfilter
 
-from aesi.conformal.band import State
 from aesi.numerics.quantile_regression import fit_quantiles
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, SavedState
 
 LOW_SOC = 0.25
 MEMORY_S = 60.0
@@ -47,12 +46,12 @@ class LocalScale:
         """(n,) V, > 0."""
         return np.asarray(np.maximum(covariates @ self.weights, self.floor))
 
-    def to_state(self) -> State:
+    def to_state(self) -> SavedState:
         """Plain values and numpy arrays only."""
         return {"weights": self.weights, "floor": self.floor}
 
     @classmethod
-    def from_state(cls, state: State) -> Self:
+    def from_state(cls, state: SavedState) -> Self:
         """Inverse of `to_state`."""
         return cls(np.asarray(state["weights"], dtype=float), float(state["floor"]))
 

@@ -1,24 +1,17 @@
-"""What is known by name: methods, and the kinds of band and regressor that a saved file may hold."""
+"""The methods that are known by name."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from aesi.conformal.band import Band
-from aesi.conformal.boosted import BoostedQuantiles
-from aesi.conformal.forest import ForestQuantiles
-from aesi.conformal.linear import LinearQuantiles
-from aesi.conformal.marginal import FixedBand, RollingBand
-from aesi.conformal.method import EnbPI, Method, SplitConformal
-from aesi.conformal.normalised import NormalisedQuantiles
-from aesi.conformal.regression import FitTask, QuantileModel, RegressionBand
-from aesi.conformal.spci import SPCI
+from aesi.conformal.online.method import EnbPI, Method, SplitConformal
+from aesi.conformal.online.spci import SPCI
+from aesi.conformal.regressors.boosted import BoostedQuantiles
+from aesi.conformal.regressors.forest import ForestQuantiles
+from aesi.conformal.regressors.linear import LinearQuantiles
+from aesi.conformal.regressors.model import FitTask, QuantileModel
+from aesi.conformal.regressors.normalised import NormalisedQuantiles
 from aesi.numerics.boosting import Growth
-
-BANDS: dict[str, type[Band]] = {band.kind: band for band in (FixedBand, RollingBand, RegressionBand)}
-MODELS: dict[str, type[QuantileModel]] = {
-    model.kind: model for model in (LinearQuantiles, ForestQuantiles, BoostedQuantiles, NormalisedQuantiles)
-}
 
 RATE = 0.05
 """Of the adaptive step: fast enough to hold 85 % in every bin of current and charge on a measured drive, slow

@@ -9,3 +9,6 @@ Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 AnyArray = NDArray[Any]
+
+SavedState = dict[str, Any]
+"""Plain values and numpy arrays under string keys, as a model folder keeps them; nothing in it needs pickle."""

@@ -2,8 +2,8 @@
 
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Contribution, Effect, Record, Trace
-from aesi.physics.espm import simulate
 from aesi.physics.model import EspmModel
+from aesi.physics.simulation import simulate
 
 __all__ = [
     "ActiveEffect",

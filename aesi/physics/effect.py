@@ -23,6 +23,8 @@ from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
 
 Kind = Literal["physics", "parameter", "instrument"]
+Measurable = Literal["temperature"]
+"""Quantities that a record may hold beside current and voltage."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,11 @@ class Contribution:
 
 @dataclass(frozen=True, eq=False)
 class Effect:
-    """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source."""
+    """One effect; `doc` is the docstring of its file: summary, equation, where it holds, source.
+
+    infers : the quantity that the effect supplies where it was not measured; with the measurement it has nothing to
+    say and does not compete.
+    """
 
     id: str
     kind: Kind
@@ -71,11 +77,7 @@ class Effect:
     on_voltage: Callable[..., Contribution] | None = None
     on_reading: Callable[..., Array] | None = None
     file: str | None = None
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        from aesi.physics.effects import find_effect
-
-        return find_effect, (self.id, self.file)
+    infers: Measurable | None = None
 
     def activate(self, **values: float) -> ActiveEffect:
         """This effect with the given parameters, defaults elsewhere.
@@ -141,15 +143,8 @@ class ActiveEffect:
         return self.effect.id, self.effect.file, self.values
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-ready; `from_dict` gives it back."""
+        """JSON-ready; `aesi.physics.effects.active_effect` gives it back."""
         out: dict[str, Any] = {"effect": self.effect.id, "parameters": self.parameters}
         if self.effect.file is not None:
             out["file"] = self.effect.file
         return out
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> ActiveEffect:
-        """Inverse of `to_dict`.  Raises InputError for an unknown effect, ParameterError for its values."""
-        from aesi.physics.effects import find_effect
-
-        return find_effect(str(content["effect"]), content.get("file")).activate(**content["parameters"])

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from aesi.physics.cell import Cell
-from aesi.physics.relations import Constant
+from aesi.physics.cell.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
 DEFAULT_ELECTROLYTE_ORDER = 3

@@ -11,8 +11,9 @@ import numpy as np
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.read import Sign
 from aesi.errors import DataError, InputError
-from aesi.physics import Cell, simulate
-from aesi.pipeline.hybrid import HybridModel
+from aesi.physics import simulate
+from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, Run
 
 if TYPE_CHECKING:
@@ -42,16 +43,15 @@ def simulate_file(
     say_notes : is given what the reader dropped or mapped, one sentence each.
     """
     profile = _read(current, columns, sign, say_notes)
-    saved = HybridModel.load(cell) if cell.is_dir() else None
-    declared = saved.cell if saved else Cell.from_bpx(cell)
-    active = (*(saved.effects if saved else ()), *_activated(effects, effect_files))
+    declared = declared_model(cell)
+    active = (*declared.effects, *_activated(effects, effect_files))
     if soc0 is None and profile.voltage_v is None:
-        soc0 = saved.soc0 if saved else None
+        soc0 = declared.soc0
         if soc0 is None:
             raise DataError(f"{current.name} has no voltage to start from; give --soc0.")
     rest = None if profile.voltage_v is None else float(profile.voltage_v[0])
     run = simulate(
-        declared,
+        declared.cell,
         profile.time_s,
         profile.current_a,
         soc0,

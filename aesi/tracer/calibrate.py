@@ -13,7 +13,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.espm import model_with
+from aesi.physics.simulation import model_with
 from aesi.records import Measurement
 from aesi.tracer.candidates import Estimate
 from aesi.tracer.cell_start import one_branch, sized, with_activation

@@ -116,7 +116,12 @@ def discover(
         check_record(cell, record)
     tested = tuple(prepare_test(cell, data, measurements, soc0) for data in tests)
     there = {active.id for active in given} - set(TOLERANCES)
-    tried = {name: effect for name, effect in effects.items() if name != NUMERICS and name not in there}
+    measured = all(data.temperature_degc is not None for data in measurements)
+    tried = {
+        name: effect
+        for name, effect in effects.items()
+        if name != NUMERICS and name not in there and not (measured and effect.infers)
+    }
     problem = _refined(Problem(cell, records, tried, fixed=tuple(given)), effects.get(NUMERICS))
     _check_cells(problem, tested)
     problem = _with_noise_of_residual(problem)

@@ -19,9 +19,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from aesi.parameters import Parameter
+from aesi.physics.cell.relations import Sum, Table
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
-from aesi.physics.relations import Sum, Table
 
 ID = "ocp_correction"
 KNOTS = 19

@@ -39,6 +39,11 @@ Hypothesis = tuple[str, ...]
 """Ids of the effects that are in, in the order in which they were added."""
 
 
+def needed(effects: Sequence[ActiveEffect], data: Measurement) -> tuple[ActiveEffect, ...]:
+    """The effects that have something to say of a record: not those that infer what it holds as a measurement."""
+    return tuple(a for a in effects if a.effect.infers is None or data.temperature_degc is None)
+
+
 @dataclass(frozen=True, eq=False)
 class Problem:
     """One case.
@@ -141,15 +146,15 @@ class Problem:
         self, data: Measurement, soc0: float | None, effects: tuple[ActiveEffect, ...], hold: Hold,
         rest_voltage_v: float | None = None,
     ) -> Run:  # fmt: skip
-        """One simulation; stoichiometries that run out are clipped, so that a search is not stopped by
-        them."""
+        """One simulation, at the measured temperature where there is one; stoichiometries that run out are clipped, so
+        that a search is not stopped by them."""
         return simulate(
             self.cell,
             data.time_s,
             data.current_a,
             soc0,
-            (*effects, *stepping(data)),
-            None,
+            (*needed(effects, data), *stepping(data)),
+            data.temperature_degc,
             hold,
             rest_voltage_v=rest_voltage_v,
             on_depletion="clip",

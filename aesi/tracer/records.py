@@ -133,6 +133,7 @@ def prepare(
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     start, sd, notes = _initial_state(cell, data, soc0)
+    notes = (*notes, *_temperature_noted(data))
     noise_full = noise_floor_v(data.voltage_v, data.current_a)
     if rows is None:
         noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
@@ -142,6 +143,16 @@ def prepare(
     given = soc0 is not None and start == soc0
     return Record(
         data, thin, n_fit, until, start, sd, hold, thin_hold, noise, noise_full, rest, given, notes=notes
+    )
+
+
+def _temperature_noted(data: Measurement) -> tuple[str, ...]:
+    if data.temperature_degc is None:
+        return ()
+    low, high = float(np.min(data.temperature_degc)), float(np.max(data.temperature_degc))
+    return (
+        f"{data.name}: simulated at its measured temperature, {low:.1f} to {high:.1f} degC; effects that would infer "
+        "it (self_heating, ambient_temperature) do not compete for this record.",
     )
 
 

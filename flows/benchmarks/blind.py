@@ -12,7 +12,7 @@ from typing import Any
 
 from aesi.bench.blind import chosen, judged, summary
 from aesi.data.blind import CaseSpec
-from aesi.pipeline.sections import TrackingConfig
+from aesi.pipeline.experiment.sections import TrackingConfig
 
 SHOWN = ("cell", "label", "target_mv", "verdict", "effects", "indistinguishable", "error")
 
@@ -32,10 +32,10 @@ def run(
     cells : folder of the two declared cell files.  cases, only, small, seed, every : which cases, see `chosen`.
     workers : processes on this machine.  address : of a Dask scheduler, whose workers must see `cells`.
     """
-    from flows import environment
-    from flows.console import Console
-    from flows.mlflow_store import Store
-    from flows.tracking import Subject, Tracker
+    from flows.base import environment
+    from flows.base.console import Console
+    from flows.tracking.store import Store
+    from flows.tracking.tracker import Subject, Tracker
 
     environment.prepare()
     specs = chosen(cases, only, small, seed, every)
@@ -66,7 +66,7 @@ def _judged(specs: list[CaseSpec], cells: str, workers: int, address: str | None
         return
     from distributed import as_completed
 
-    from flows.dask_pool import connect
+    from flows.evaluation.dask_pool import connect
 
     client, cluster = connect(address, workers)
     try:

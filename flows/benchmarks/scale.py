@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.pipeline.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.records import Failed
 from aesi.sparse import Genome, Problem
 
@@ -40,9 +40,9 @@ def run(
 
     overrides : laid over the experiment, so that a candidate takes about a second.
     """
-    from aesi.pipeline.fit import build_problem
-    from aesi.pipeline.load import load
-    from flows import environment
+    from aesi.pipeline.experiment.fit import build_problem
+    from aesi.pipeline.experiment.load import load
+    from flows.base import environment
 
     environment.prepare()
     config = read_experiment(experiment, overrides)
@@ -73,7 +73,7 @@ def _genomes(problem: Problem, candidates: int) -> list[Genome]:
 
 def _measured(config: ExperimentConfig, genomes: Sequence[Genome], workers: int) -> tuple[float, list[float]]:
     """Wall seconds of all candidates, and the processor seconds of each worker."""
-    from flows.dask_pool import DaskPool
+    from flows.evaluation.dask_pool import DaskPool
 
     pool = DaskPool(config.model_dump_json(), str(config.base), None, workers, config.search.timeout_s)
     try:

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.ensemble import synthetic_record
-from aesi.pipeline.sections import TrackingConfig
+from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.records import INPUT_NAMES, Split
 from aesi.sparse import Genome, Library, Options, Problem, evaluate
 from aesi.sparse.inputs import with_inputs
-from flows import environment
+from flows.base import environment
 
 METRICS = 10
 PARAMETERS = 14
@@ -131,8 +131,8 @@ def _workspace() -> Iterator[None]:
 
 @contextmanager
 def _tracker() -> Iterator[Any]:
-    from flows.mlflow_store import Store
-    from flows.tracking import Subject, Tracker
+    from flows.tracking.store import Store
+    from flows.tracking.tracker import Subject, Tracker
 
     settings = TrackingConfig(system_metrics=False, log_model=False)
     store = Store(f"sqlite:///{Path(os.environ['AESI_HOME']) / 'mlflow.db'}")

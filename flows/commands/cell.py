@@ -79,7 +79,7 @@ def calibrate(
     sign: options.Sign = "discharge-positive",
 ) -> None:
     """Fit the physics model's own parameters to measurements."""
-    from flows.calibrate import calibrate as flow
+    from flows.jobs.calibration import calibrate as flow
 
     flow(cell, options.measurements(data, column, sign), out, soc0=soc0, seed=seed)
 
@@ -114,15 +114,15 @@ def discover(
     ] = None,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
-    from flows.discover import discover as flow
-    from flows.discover import discover_experiment
+    from flows.jobs.discovery import discover as flow
+    from flows.jobs.discovery import discover_experiment
 
     if experiment is not None:
         discover_experiment(str(experiment), list(overrides or []), out)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
-    from aesi.pipeline.cases import case_of_files
+    from aesi.pipeline.discovery.cases import case_of_files
 
     case = case_of_files(
         cell,

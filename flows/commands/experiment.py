@@ -31,7 +31,7 @@ def run(
     ] = True,
 ) -> None:
     """The whole flow: data, physics, search, ensembles, intervals, tables, figures, report."""
-    from flows.run import start
+    from flows.jobs.start import start
 
     start(
         experiment,
@@ -49,7 +49,7 @@ def worker(
     overrides: Overrides = None,
 ) -> None:
     """One more process on a shared study: evaluates candidates of an experiment that others also work on."""
-    from flows.worker import work
+    from flows.jobs.worker import work
 
     work(experiment, list(overrides or []))
 
@@ -66,10 +66,10 @@ def tables(
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
 ) -> None:
     """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
-    from flows.console import Console
-    from flows.mlflow_store import Store
-    from flows.tables import tables_of
-    from flows.tracking import deliver_leftovers
+    from flows.base.console import Console
+    from flows.results.tables import tables_of
+    from flows.tracking.leftovers import deliver_leftovers
+    from flows.tracking.store import Store
 
     deliver_leftovers(Store(uri), Console().say)
     typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
@@ -81,6 +81,6 @@ def ui(
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
 ) -> None:
     """The MLflow UI on the tracking store in use."""
-    from flows.ui import serve
+    from flows.results.ui import serve
 
     serve(port=port, host=host, uri=uri)

@@ -5,7 +5,7 @@ import io
 import numpy as np
 import pytest
 
-from aesi.conformal import METHODS, Calibrated
+from aesi.conformal import METHODS, Calibrated, calibrated_from_dict
 from aesi.errors import FitError, InputError
 
 WINDOW = 50
@@ -126,7 +126,7 @@ def test_survives_a_file_without_pickle(calibrated: Calibrated) -> None:
     np.savez(file, **arrays)
     file.seek(0)
     with np.load(file, allow_pickle=False) as stored:
-        restored = Calibrated.from_dict(_put_arrays(bare, stored))
+        restored = calibrated_from_dict(_put_arrays(bare, stored))
     record = series(400, 6)
     np.testing.assert_array_equal(restored.intervals(record).lower_v, calibrated.intervals(record).lower_v)
     np.testing.assert_array_equal(restored.intervals(record).upper_v, calibrated.intervals(record).upper_v)

@@ -11,8 +11,8 @@ import pint
 import pytest
 
 from aesi.errors import CellError, InputError, ParameterError
-from aesi.physics import ActiveEffect, Cell, simulate
-from aesi.physics.effects import CATALOGUE, describe, find_effect, load_effect
+from aesi.physics import Cell, simulate
+from aesi.physics.effects import CATALOGUE, active_effect, describe, find_effect, load_effect
 
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
 CELL = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
@@ -103,7 +103,7 @@ def test_it_vanishes_at_its_neutral_values(effect):
 def test_it_travels_between_processes_and_files(effect):
     active = effect.activate()
     assert pickle.loads(pickle.dumps(active)) == active
-    assert ActiveEffect.from_dict(json.loads(json.dumps(active.to_dict()))) == active
+    assert active_effect(json.loads(json.dumps(active.to_dict()))) == active
 
 
 @each
@@ -214,7 +214,7 @@ def test_a_users_own_effect_works_like_the_others(tmp_path):
     assert shift == pytest.approx(-0.01 * np.gradient(CURRENT, TIME))
     assert effect.equation.strip() == "V = V_cell - L dI/dt"
     assert pickle.loads(pickle.dumps(active)) == active
-    assert ActiveEffect.from_dict(json.loads(json.dumps(active.to_dict()))) == active
+    assert active_effect(json.loads(json.dumps(active.to_dict()))) == active
     assert np.isfinite(run(active, CATALOGUE["self_heating"].activate()).voltage_v).all()
 
 

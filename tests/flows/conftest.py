@@ -11,7 +11,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from flows import cli, environment
+from flows import cli
+from flows.base import environment
 
 ROOT = Path(__file__).resolve().parents[2]
 SMOKE = ROOT / "experiments" / "smoke.yaml"
@@ -39,7 +40,7 @@ def home(folder):
 @pytest.fixture(scope="session")
 def empty_store(tmp_path_factory):
     """An empty MLflow database: making its tables takes seconds, copying it takes none."""
-    from flows.mlflow_store import Store
+    from flows.tracking.store import Store
 
     folder = tmp_path_factory.mktemp("store")
     with home(folder):
@@ -50,7 +51,7 @@ def empty_store(tmp_path_factory):
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory, empty_store):
     """A workspace in which the small experiment ran once, uninterrupted. Copy it to change it."""
-    from flows.run import start
+    from flows.jobs.start import start
 
     folder = tmp_path_factory.mktemp("finished")
     copy_store(empty_store, folder)
@@ -128,7 +129,7 @@ def arguments():
 @pytest.fixture
 def run(tracked):
     """Runs the small experiment in this process; the folder of its results."""
-    from flows.run import start
+    from flows.jobs.start import start
 
     def go(*more, **options):
         return start(SMOKE, [*SMALL, *ASIDE, *more], use_prefect=False, **options)

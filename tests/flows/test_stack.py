@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from flows.mlflow_store import KIND, Store
-from flows.tracking import deliver_leftovers
+from flows.tracking.leftovers import deliver_leftovers
+from flows.tracking.store import KIND, Store
 
 pytestmark = pytest.mark.slow
 

@@ -54,5 +54,11 @@ def depends_on_temperature(cell: Cell) -> bool:
 
 
 EFFECT = Effect(
-    "ambient_temperature", "parameter", __doc__, PARAMETERS, on_model=shift_cell, on_record=shift_record
+    "ambient_temperature",
+    "parameter",
+    __doc__,
+    PARAMETERS,
+    on_model=shift_cell,
+    on_record=shift_record,
+    infers="temperature",
 )

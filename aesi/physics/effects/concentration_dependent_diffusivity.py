@@ -16,9 +16,9 @@ import numpy as np
 
 from aesi.parameters import Parameter
 from aesi.physics.cell import Electrode
+from aesi.physics.cell.relations import Constant, Product, Table, scaled
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
-from aesi.physics.relations import Constant, Product, Table, scaled
 
 POINTS = 129
 BEYOND_LIMITS = 0.1

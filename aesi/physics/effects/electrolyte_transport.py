@@ -10,9 +10,9 @@ doi:10.1149/2.1141607jes.
 """
 
 from aesi.parameters import Parameter
+from aesi.physics.cell.relations import scaled
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
-from aesi.physics.relations import scaled
 
 RANGE = "published tortuosities and electrolytes, a factor of five either way"
 PARAMETERS = {

@@ -21,9 +21,9 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.parameters import Parameter
 from aesi.physics.cell import Electrode
+from aesi.physics.cell.relations import Sum, Table
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
-from aesi.physics.relations import Sum, Table
 
 ORDER = 8
 EXPECTED_V = 0.01

@@ -51,4 +51,4 @@ def warm(model: EspmModel, *, heat_transfer_w_k: float, heat_capacity_factor: fl
     return replace(model, heat=HeatBalance(declared * heat_capacity_factor, heat_transfer_w_k))
 
 
-EFFECT = Effect("self_heating", "physics", __doc__, PARAMETERS, on_model=warm)
+EFFECT = Effect("self_heating", "physics", __doc__, PARAMETERS, on_model=warm, infers="temperature")

@@ -9,9 +9,9 @@ Source: scatter of published values, Wang et al., Prog. Energy 4 (2022) 032004, 
 """
 
 from aesi.parameters import Parameter
+from aesi.physics.cell.relations import scaled
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
-from aesi.physics.relations import scaled
 
 RANGE = "an order of magnitude either way, the scatter of published values"
 PARAMETERS = {

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.pipeline.report.embed import Embedded, Store, embed
-from aesi.pipeline.table_formats import ABSENT
+from aesi.pipeline.report.table_formats import ABSENT
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

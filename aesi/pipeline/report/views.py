@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from aesi.numerics.typing import Array, BoolArray
+from aesi.records import Role
 
 Row = Mapping[str, Any]
-Role = Literal["train", "valid", "test"]
 Part = Literal["fit", "test"]
 
 KIND_ORDER = ("physics", "parameter", "instrument", "placebo")
@@ -67,7 +67,7 @@ class BootstrapView:
 class RunView:
     """Everything the report of a run shows.
 
-    models : rows of summary.json (see `aesi.pipeline.tables`); `chosen` and `physics` name two of them.
+    models : rows of summary.json (see `aesi.pipeline.report.tables`); `chosen` and `physics` name two of them.
     candidates : rows with oob, valid, terms and, where known, fitness, number, feasible, front, chosen.
     terms : rows with term and, where known, importance (SVD), bagging, stability, inclusion.
     settings : what the search picked (lambda1, lambda2, tau, ...), as text.

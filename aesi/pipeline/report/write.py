@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.pipeline import tables
-from aesi.pipeline.figures import paper_figures, predicted_models
-from aesi.pipeline.report import words
+from aesi.pipeline.report import tables, words
+from aesi.pipeline.report.figures import paper_figures, predicted_models
 from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, RunView

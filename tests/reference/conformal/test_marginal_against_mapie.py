@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import METHODS
-from aesi.conformal.method import EnbPI
+from aesi.conformal.online.method import EnbPI
 
 WINDOW = 100
 

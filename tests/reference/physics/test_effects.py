@@ -185,7 +185,7 @@ def test_active_material_loss_is_a_smaller_volume_fraction(peer, plain_v):
 def test_windows_after_a_loss_are_the_peers_electrode_balance(peer, name, loss):
     import pybamm
 
-    from aesi.physics.espm import model_with
+    from aesi.physics.simulation import model_with
 
     aged = model_with(peer.cell, [CATALOGUE[name].activate(loss=loss)]).cell
     q_n, q_p = aged.electrode_capacity_ah(aged.negative), aged.electrode_capacity_ah(aged.positive)

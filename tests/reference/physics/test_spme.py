@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from aesi.physics import Cell, EspmModel, simulate
-from aesi.physics.plain import run_plain
-from aesi.physics.relations import Constant
+from aesi.physics.cell.relations import Constant
+from aesi.physics.espm.plain import run_plain
 
 from .conftest import Peer, read
 

@@ -10,7 +10,7 @@ import aesi
 from aesi.numerics.metrics import mser
 from aesi.records import INPUT_NAMES, ErrorSeries, Split
 from aesi.sparse import Options, Problem, evaluate, with_inputs
-from flows.search import search
+from flows.search.nsga2 import search
 
 PERIOD = 1800
 

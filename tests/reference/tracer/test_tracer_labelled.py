@@ -8,7 +8,7 @@ from aesi.bench.blind import is_right
 from aesi.data import read_measurement
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.discover import to_json
+from aesi.pipeline.discovery.discover import to_json
 from aesi.tracer import discover
 
 CHEAP = (

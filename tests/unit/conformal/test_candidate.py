@@ -5,7 +5,7 @@ import pytest
 
 from aesi.bench.spci import oracle_series
 from aesi.conformal import METHODS
-from aesi.conformal.candidate import thinned, validation_scores
+from aesi.conformal.validation import thinned, validation_scores
 
 
 def test_scores_a_candidate_in_under_two_seconds(rng: np.random.Generator) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.conformal.method import EnbPI
+from aesi.conformal.online.method import EnbPI
 
 
 def test_skewed_residuals_get_the_narrowest_band_not_equal_tails() -> None:

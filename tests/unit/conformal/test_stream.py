@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import METHODS
-from aesi.conformal.narrowest import level_pairs, narrowest
+from aesi.conformal.bands.narrowest import level_pairs, narrowest
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aesi.conformal.tracker import AIM, LOG_RATIO_LIMIT, SHARED, move, replay
+from aesi.conformal.online.tracker import AIM, LOG_RATIO_LIMIT, SHARED, move, replay
 
 ALPHA, RATE = 0.1, 0.05
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.errors import CellError
-from aesi.physics.expression import compile_expression
+from aesi.physics.cell.expression import compile_expression
 
 
 def test_values_follow_the_rules_of_arithmetic():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.errors import CellError
-from aesi.physics.relations import (
+from aesi.physics.cell.relations import (
     Constant,
     Expression,
     PowerSeries,

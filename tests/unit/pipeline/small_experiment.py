@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.pipeline.config import ExperimentConfig, parse_experiment
-from aesi.pipeline.conformalise import conformalise
-from aesi.pipeline.fit import build_problem, final_models
-from aesi.pipeline.load import Loaded, load
+from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
+from aesi.pipeline.experiment.conformalise import conformalise
+from aesi.pipeline.experiment.fit import build_problem, final_models
+from aesi.pipeline.experiment.load import Loaded, load
 from aesi.sparse import Candidate, Genome, evaluate
 
 ROOT = Path(__file__).resolve().parents[3]

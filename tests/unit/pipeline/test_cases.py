@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from aesi.pipeline.cases import case_of_experiment
-from aesi.pipeline.config import read_experiment
+from aesi.pipeline.discovery.cases import case_of_experiment
+from aesi.pipeline.experiment.config import read_experiment
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
 

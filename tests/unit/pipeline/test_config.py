@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aesi.errors import ConfigError
-from aesi.pipeline.config import ExperimentConfig, parse_experiment, read_experiment
-from aesi.pipeline.load import load
+from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment, read_experiment
+from aesi.pipeline.experiment.load import load
 
 ROOT = Path(__file__).resolve().parents[3]
 CONTENT = {"name": "x", "data": {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}}

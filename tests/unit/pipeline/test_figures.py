@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.pipeline.figures import before_and_after_maps, paper_figures
+from aesi.pipeline.report.figures import before_and_after_maps, paper_figures
 from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records, timeline
 from aesi.pipeline.report.views import BootstrapView
 

@@ -5,9 +5,9 @@ import pytest
 from small_experiment import NOISE_V, experiment, fitted, write_record
 
 from aesi.errors import DataError
-from aesi.pipeline.evaluate import evaluate
-from aesi.pipeline.load import load
-from aesi.pipeline.tables import free_run_band_table
+from aesi.pipeline.experiment.evaluate import evaluate
+from aesi.pipeline.experiment.load import load
+from aesi.pipeline.report.tables import free_run_band_table
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from small_experiment import SOC0, experiment, fitted, write_record
 import aesi
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.hybrid import HybridModel
-from aesi.pipeline.load import load
-from aesi.pipeline.model_folder import SCHEMA
+from aesi.pipeline.experiment.load import load
+from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.product.model_folder import SCHEMA
 from aesi.sparse import SparseModel
 
 

@@ -5,7 +5,7 @@ import io
 
 import pytest
 
-from aesi.pipeline import table_formats, tables
+from aesi.pipeline.report import table_formats, tables
 
 ESPM = {
     "name": "ESPM",

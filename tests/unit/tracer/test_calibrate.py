@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from aesi.physics import Cell, simulate
+from aesi.physics.cell.relations import Constant
 from aesi.physics.effect import Record
-from aesi.physics.relations import Constant
 from aesi.pipeline.calibrate import to_json, to_text
 from aesi.records import Measurement
 from aesi.tracer.calibrate import calibrate

@@ -10,7 +10,7 @@ from aesi.physics import Cell, EspmModel, Record, Trace, simulate
 from aesi.physics.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.effects.particle_size_distribution import lognormal_bins
-from aesi.physics.espm import model_with
+from aesi.physics.simulation import model_with
 from aesi.physics.throughput import throughput_ah
 
 CELLS = Path(__file__).resolve().parents[4] / "experiments" / "cells"

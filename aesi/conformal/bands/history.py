@@ -1,0 +1,69 @@
+"""What a regression sees: the raw window or causal features of it, and the current if it was calibrated with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Self
+
+import numpy as np
+
+from aesi.numerics.drive import drive_features, drive_row
+from aesi.numerics.typing import Array, BoolArray, SavedState
+from aesi.numerics.windows import N_LAGS, history_features, history_row, n_features, raw_lags, spans
+
+View = Literal["features", "lags"]
+
+
+@dataclass(frozen=True)
+class History:
+    """window : samples.  view : "features" (lags, rolling means, deviations, steps: `numerics.windows`),
+    ready after N_LAGS samples; or "lags" (the last `window` residuals as they are), ready after `window`.
+    with_current : the columns of `numerics.drive` follow those of the residuals."""
+
+    window: int
+    view: View = "features"
+    with_current: bool = False
+
+    @property
+    def needed(self) -> int:
+        """Samples before the first row."""
+        return N_LAGS if self.view == "features" else self.window
+
+    @property
+    def n_history(self) -> int:
+        """Columns that are made of residuals, V; they come first."""
+        return n_features(self.window) if self.view == "features" else self.window
+
+    def rows(self, residuals: Array, current_a: Array | None) -> tuple[Array, BoolArray]:
+        """Rows (n, p) for every sample of a record, and (n,) whether the history suffices."""
+        if self.view == "features":
+            rows, ready = history_features(residuals, self.window)
+        else:
+            rows, ready = raw_lags(residuals, self.window)
+        if not self.with_current:
+            return rows, ready
+        assert current_a is not None
+        return np.column_stack([rows, drive_features(current_a)]), ready
+
+    def row(self, past: Array, recent_current: Array) -> Array | None:
+        """The row after `past` (most recent last, at most the window), None where it is too short.
+
+        recent_current : up to N_RECENT currents, A, the coming sample's own at the end; may be empty without.
+        """
+        if len(past) < self.needed:
+            return None
+        if self.view == "lags":
+            out = past[::-1].copy()
+        else:
+            out = np.empty(n_features(self.window))
+            history_row(past, spans(self.window), out)
+        return np.concatenate([out, drive_row(recent_current)]) if self.with_current else out
+
+    def to_state(self) -> SavedState:
+        """The three fields."""
+        return {"window": self.window, "view": self.view, "with_current": self.with_current}
+
+    @classmethod
+    def from_state(cls, state: SavedState) -> Self:
+        """Inverse of `to_state`."""
+        return cls(int(state["window"]), state["view"], bool(state["with_current"]))

@@ -1,0 +1,206 @@
+"""A calibrated method: replay a record, or run beside a cell one sample at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.conformal.bands.band import Band
+from aesi.conformal.intervals import Intervals
+from aesi.conformal.online.records import checked_current, checked_record
+from aesi.conformal.online.scale import Scale
+from aesi.conformal.online.tracker import move, replay, scaled
+from aesi.errors import InputError
+from aesi.numerics.drive import N_RECENT
+from aesi.numerics.typing import Array, SavedState
+
+SCHEMA = "aesi.conformal/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """Intervals of the next residual at miss rate `alpha`, from the residuals before it.
+
+    method : the name it is registered under.  window : samples of history that are looked at.
+    band : the fitted rule.  scale : where the adaptive step starts.  rate : of that step; 0 without.
+    marginal_v : (low, high) V, used while the history is too short.
+    floor_v : V, no interval is narrower (the resolution of the calibration residuals).
+
+    A missing residual (NaN, a gap) ends the history: the marginal interval stands in, flagged by
+    `Intervals.warm`, until enough residuals have come.
+    """
+
+    method: str
+    alpha: float
+    window: int
+    band: Band
+    scale: Scale
+    rate: float
+    marginal_v: tuple[float, float]
+    floor_v: float
+
+    @property
+    def needs_current(self) -> bool:
+        """Whether it was calibrated with the current, and so must be used with it."""
+        return self.band.needs_current or self.scale.needs_current
+
+    def intervals(self, residuals: Array, current_a: Array | None = None) -> Intervals:
+        """Replay one continuous record: the interval of sample k is made from the residuals of samples before k
+        and the current up to and at k.
+
+        residuals : (n,) V, evenly sampled as in the calibration; NaN where the voltage is missing.
+        current_a : (n,) A, discharge positive; needed where `needs_current`, else ignored.
+        """
+        residuals = checked_record(residuals)
+        current = self._current(current_a, len(residuals))
+        raw = self.band.batch(residuals, current)
+        low = np.where(raw.ready, raw.low, self.marginal_v[0])
+        high = np.where(raw.ready, raw.high, self.marginal_v[1])
+        groups = np.zeros(len(residuals), dtype=np.int64) if current is None else self.scale.groups(current)
+        start = self.scale.log_ratio
+        replay(low, high, raw.ready, residuals, groups, start, self.rate, self.alpha, self.floor_v)
+        return Intervals(low, high, raw.ready)
+
+    def stream(self) -> Stream:
+        """A fresh stream, at the start of a record."""
+        return Stream(self)
+
+    def adaptive(self, rate: float) -> Calibrated:
+        """The same intervals with another rate of the adaptive step (0 turns it off)."""
+        return replace(self, rate=rate)
+
+    def to_dict(self) -> SavedState:
+        """Plain values and numpy arrays only; `aesi.conformal.calibrated_from_dict` restores the same
+        intervals to the last bit."""
+        return {
+            "schema": SCHEMA,
+            "method": self.method,
+            "alpha": self.alpha,
+            "window": self.window,
+            "band_kind": self.band.kind,
+            "band": self.band.to_state(),
+            "scale": self.scale.to_state(),
+            "rate": self.rate,
+            "marginal_v": list(self.marginal_v),
+            "floor_v": self.floor_v,
+        }
+
+    def _current(self, current_a: Array | None, n: int) -> Array | None:
+        if not self.needs_current:
+            return None
+        if current_a is None:
+            raise InputError(
+                f"these {self.method} intervals were calibrated with the current; give current_a."
+            )
+        return checked_current(current_a, n)
+
+
+class Stream:
+    """Intervals beside a running cell: `interval()` before a sample, `update(error_v)` after it.
+
+    Memory is fixed (twice the window). The intervals equal those of `Calibrated.intervals` on the same
+    residuals. The object is mutable and belongs to one continuous record; call `gap()` after an interruption.
+    """
+
+    def __init__(self, calibrated: Calibrated) -> None:
+        self._calibrated = calibrated
+        self._past = _Tail(calibrated.window)
+        self._currents = _Tail(N_RECENT - 1)
+        self._log_ratio = calibrated.scale.log_ratio.copy()
+        self._pending: _Pending | None = None
+
+    def interval(self, current_a: float | None = None) -> tuple[float, float]:
+        """(low, high) V of the coming residual, given the current at its sample, A, where `needs_current`.
+
+        Asking again before `update` gives the same interval, or that of another current.
+        """
+        pending = self._pending
+        if pending is None or pending.current_a != current_a:
+            pending = self._pending = self._make(current_a)
+        return pending.low, pending.high
+
+    @property
+    def warm(self) -> bool:
+        """False while the history is too short and the marginal interval stands in (after `interval`)."""
+        return self._pending is not None and self._pending.warm
+
+    def update(self, error_v: float) -> None:
+        """Take in the residual that the last interval was for; NaN or infinity means that it is missing.
+
+        Raises InputError where the interval of this sample was not asked for and needs the current.
+        """
+        calibrated = self._calibrated
+        low, high = self.interval() if self._pending is None else (self._pending.low, self._pending.high)
+        pending, self._pending = self._pending, None
+        assert pending is not None
+        if pending.current_a is not None:
+            self._currents.append(pending.current_a)
+        if not np.isfinite(error_v):
+            self._past.clear()
+            return
+        if pending.warm and calibrated.rate > 0:
+            missed = error_v < low or error_v > high
+            move(self._log_ratio, pending.group, missed, calibrated.rate, calibrated.alpha)
+        self._past.append(error_v)
+
+    def gap(self) -> None:
+        """The samples that follow are not adjacent to those before: forget the history, keep the scale."""
+        self._past.clear()
+        self._currents.clear()
+        self._pending = None
+
+    def _make(self, current_a: float | None) -> _Pending:
+        calibrated, group = self._calibrated, 0
+        recent = np.empty(0)
+        if calibrated.needs_current:
+            if current_a is None or not np.isfinite(current_a):
+                raise InputError(
+                    f"these {calibrated.method} intervals were calibrated with the current; "
+                    f"call interval(current_a) with its value at the coming sample, not {current_a}."
+                )
+            recent = np.append(self._currents.values, current_a)
+            group = int(np.searchsorted(calibrated.scale.edges_a, current_a))
+        else:
+            current_a = None
+        raw = calibrated.band.row(self._past.values, recent)
+        if raw is None:
+            return _Pending(current_a, *calibrated.marginal_v, group, warm=False)
+        low, high = scaled(raw[0], raw[1], self._log_ratio[group], calibrated.floor_v)
+        return _Pending(current_a, low, high, group, warm=True)
+
+
+@dataclass(frozen=True)
+class _Pending:
+    """The interval that was given out and not yet judged."""
+
+    current_a: float | None
+    low: float
+    high: float
+    group: int
+    warm: bool
+
+
+class _Tail:
+    """The last `size` values, contiguous, in fixed memory."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._buffer = np.empty(2 * size)
+        self._start = self._stop = 0
+
+    @property
+    def values(self) -> Array:
+        """(m,) m <= size, most recent last; a view."""
+        return self._buffer[self._start : self._stop]
+
+    def append(self, value: float) -> None:
+        if self._stop == len(self._buffer):
+            self._buffer[: self._size] = self._buffer[-self._size :]
+            self._stop = self._size
+        self._buffer[self._stop] = value
+        self._stop += 1
+        self._start = max(0, self._stop - self._size)
+
+    def clear(self) -> None:
+        self._start = self._stop = 0

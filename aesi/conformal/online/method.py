@@ -1,0 +1,133 @@
+"""From calibration residuals to a `Calibrated` method."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.conformal.bands.band import Band
+from aesi.conformal.bands.marginal import FixedBand, RollingBand
+from aesi.conformal.bands.narrowest import level_pairs
+from aesi.conformal.online.calibrated import Calibrated
+from aesi.conformal.online.records import checked_currents, checked_records
+from aesi.conformal.online.scale import Scale
+from aesi.errors import FitError, InputError
+from aesi.numerics.quantiles import conformal_quantile
+from aesi.numerics.typing import Array
+
+RELATIVE_FLOOR = 1e-3
+"""No interval is narrower than this share of the marginal one: below it lie the quantisation of the sensor
+and stretches of rest, where a width of zero would claim knowledge that nobody has."""
+MIN_WINDOW = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a method calibrates on: checked records (n_i,) V, their currents (n_i,) A or None, and settings."""
+
+    records: list[Array]
+    currents: list[Array] | None
+    alpha: float
+    window: int
+    marginal_v: tuple[float, float]
+    floor_v: float
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True)
+class Method(ABC):
+    """A way to calibrate. `rate` is that of the adaptive step (`tracker`), 0 without."""
+
+    name: str
+    rate: float = 0.0
+
+    def fit(
+        self,
+        residuals: Sequence[Array],
+        alpha: float = 0.1,
+        window: int = 200,
+        rng: np.random.Generator | None = None,
+        current_a: Sequence[Array] | None = None,
+    ) -> Calibrated:
+        """Calibrate on honest residuals: held out or out of bag, never those of the fit.
+
+        residuals : one (n_i,) array a continuous record, V, all at one sampling rate; NaN is missing.
+        alpha : share of misses allowed, in (0, 1).  window : samples of history.
+        rng : used by randomised regressors only; default seed 0.
+        current_a : one (n_i,) array a record, A; methods that can use it then need it at prediction too.
+
+        Raises InputError for an impossible alpha, window or current, FitError for too few or constant residuals.
+        """
+        if not 0 < alpha < 1:
+            raise InputError(f"alpha = {alpha:g} is not a share of misses; give a value between 0 and 1.")
+        if window < MIN_WINDOW:
+            raise InputError(f"window = {window} samples is too short a history; give {MIN_WINDOW} or more.")
+        records = checked_records(residuals)
+        marginal = marginal_interval(records, alpha)
+        floor = width_floor(records, marginal)
+        currents = checked_currents(current_a, records)
+        rng = rng or np.random.default_rng(0)
+        band, scale = self.band(Calibration(records, currents, alpha, window, marginal, floor, rng))
+        return Calibrated(self.name, alpha, window, band, scale, self.rate, marginal, floor)
+
+    @abstractmethod
+    def band(self, data: Calibration) -> tuple[Band, Scale]:
+        """The raw band, and the factor on its half-width that calibrates it."""
+
+    def adaptive(self, rate: float) -> Method:
+        """The same method with another rate of the adaptive step."""
+        return replace(self, rate=rate)
+
+
+def marginal_interval(records: Sequence[Array], alpha: float) -> tuple[float, float]:
+    """Equal-tailed conformal interval of the finite residuals of all records: V, V.
+
+    Raises FitError for constant residuals, or fewer than 2/alpha - 1 of them.
+    """
+    pooled = np.concatenate([*records, np.empty(0)])
+    pooled = pooled[np.isfinite(pooled)]
+    if pooled.size and np.ptp(pooled) == 0:
+        raise FitError(
+            f"all {pooled.size} residuals equal {pooled[0]:g} V, which says nothing about the spread. "
+            "Calibrate on residuals of measured voltage that the model was not fitted to."
+        )
+    return -conformal_quantile(-pooled, alpha / 2), conformal_quantile(pooled, alpha / 2)
+
+
+def width_floor(records: Sequence[Array], marginal_v: tuple[float, float]) -> float:
+    """V, > 0: the least width of any interval; a thousandth of the marginal width, or the smallest step that
+    the residuals take (its 1 % quantile), whichever is larger."""
+    steps = np.abs(np.concatenate([np.diff(r) for r in records]))
+    steps = steps[np.isfinite(steps) & (steps > 0)]
+    resolution = float(np.quantile(steps, 0.01)) if steps.size else 0.0
+    return max(RELATIVE_FLOOR * (marginal_v[1] - marginal_v[0]), resolution)
+
+
+@dataclass(frozen=True)
+class SplitConformal(Method):
+    """Two fixed quantiles of the calibration residuals; with a rate, adaptive conformal inference."""
+
+    name: str = "split"
+
+    def band(self, data: Calibration) -> tuple[Band, Scale]:
+        return FixedBand(*data.marginal_v), Scale.none()
+
+
+@dataclass(frozen=True)
+class EnbPI(Method):
+    """Quantiles of the last `window` residuals, updated at every step; the narrowest of `n_betas` pairs."""
+
+    name: str = "enbpi"
+    n_betas: int = 5
+
+    def band(self, data: Calibration) -> tuple[Band, Scale]:
+        alpha, window = data.alpha, data.window
+        needed = int(np.ceil(2 / alpha)) - 1
+        if needed > window:
+            raise InputError(
+                f"a window of {window} cannot hold the {needed} residuals that alpha = {alpha:g} needs."
+            )
+        return RollingBand(window, needed, level_pairs(alpha, self.n_betas)), Scale.none()

@@ -1,0 +1,63 @@
+"""The factor on the raw band that calibrates it, for each range of the current."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from aesi.numerics.quantiles import conformal_quantile
+from aesi.numerics.typing import Array, IntArray, SavedState
+
+GROUP_LEVELS = (0.05, 0.2, 0.4, 0.6, 0.8, 0.95)
+"""Quantiles of the calibration currents that separate the groups: rest, mild and hard use either way."""
+ENOUGH_SCORES = 200
+"""Held-out samples from which a group is scaled by its own scores rather than by all."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scale:
+    """edges_a : (n_groups - 1,) A, increasing.  log_ratio : (n_groups,) log of the factor on the half-width."""
+
+    edges_a: Array
+    log_ratio: Array
+
+    @classmethod
+    def none(cls) -> Self:
+        """Factor one, whatever the current."""
+        return cls(np.empty(0), np.zeros(1))
+
+    @classmethod
+    def fit(cls, scores: Array, alpha: float, current_a: Array | None) -> Self:
+        """scores : (n,) |e - middle| / half-width of held-out samples.  current_a : (n,) A, or None for one
+        group. The factor is the conformal quantile of the scores."""
+        everywhere = float(np.log(conformal_quantile(scores, alpha)))
+        if current_a is None:
+            return cls(np.empty(0), np.array([everywhere]))
+        edges = np.unique(np.quantile(current_a, GROUP_LEVELS))
+        scale = cls(edges, np.full(len(edges) + 1, everywhere))
+        groups = scale.groups(current_a)
+        for g in range(len(edges) + 1):
+            own = scores[groups == g]
+            if own.size >= max(ENOUGH_SCORES, 1 / alpha):
+                scale.log_ratio[g] = np.log(conformal_quantile(own, alpha))
+        return scale
+
+    @property
+    def needs_current(self) -> bool:
+        """Whether there is more than one group."""
+        return self.edges_a.size > 0
+
+    def groups(self, current_a: Array) -> IntArray:
+        """(n,) group of each current."""
+        return np.searchsorted(self.edges_a, current_a).astype(np.int64)
+
+    def to_state(self) -> SavedState:
+        """Edges and factors."""
+        return {"edges_a": self.edges_a, "log_ratio": self.log_ratio}
+
+    @classmethod
+    def from_state(cls, state: SavedState) -> Self:
+        """Inverse of `to_state`."""
+        return cls(np.asarray(state["edges_a"], dtype=float), np.asarray(state["log_ratio"], dtype=float))

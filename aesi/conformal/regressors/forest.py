@@ -1,0 +1,97 @@
+"""Quantile regression forest, the regressor of the paper and of SPCI as published.
+
+Grown by `quantile-forest` with all samples kept in each leaf (its default keeps one, and the bands then
+cover far too little), then flattened: each leaf's distribution on a common grid (`numerics.trees`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
+from aesi.numerics.trees import Splits, flatten, forest_quantiles
+from aesi.numerics.typing import Array, SavedState
+
+GRID_POINTS = 512
+TAIL = 2e-4
+"""The grid is even in probability between the tails and even in its logarithm within them."""
+
+
+def _grid(targets: Array) -> Array:
+    """Increasing values at which distributions are kept: quantiles of all targets, dense in the tails."""
+    tail = np.geomspace(TAIL, 0.02, GRID_POINTS // 8, endpoint=False)
+    levels = np.concatenate(
+        [[0.0], tail, np.linspace(0.02, 0.98, 3 * GRID_POINTS // 4), 1 - tail[::-1], [1.0]]
+    )
+    return np.unique(np.quantile(targets, levels))
+
+
+def _leaf_distributions(forest: Any, grid: Array) -> Array:
+    """(n_leaves, g) share of each leaf's own training samples at or below each grid value."""
+    # quantile-forest numbers its samples by the order of their targets, from one; zero is padding.
+    ordered = np.asarray(forest.forest_.y_train)[0]
+    position = np.searchsorted(grid, ordered)  # first grid value at or above the target
+    rows = []
+    for tree, members in zip(forest.estimators_, forest.forest_.y_train_leaves, strict=True):
+        for node in np.flatnonzero(tree.tree_.children_left < 0):
+            inside = np.asarray(members[node][0])
+            inside = inside[inside > 0] - 1
+            counts = np.bincount(position[inside], minlength=len(grid))
+            rows.append(np.cumsum(counts) / len(inside))
+    return np.array(rows)
+
+
+@dataclass(frozen=True, eq=False)
+class ForestQuantiles(QuantileModel):
+    """levels : (2 B,).  grid : (g,) V.  leaf_cdf : (n_leaves, g).  splits : the trees."""
+
+    levels: Array
+    grid: Array
+    leaf_cdf: Array
+    splits: Splits
+    kind: ClassVar[str] = "forest"
+
+    @classmethod
+    def fit(cls, task: FitTask, **forest: Any) -> Self:
+        """`forest` goes to RandomForestQuantileRegressor."""
+        from quantile_forest import RandomForestQuantileRegressor
+
+        regressor = RandomForestQuantileRegressor(
+            max_samples_leaf=None, random_state=int(task.rng.integers(2**31)), **forest
+        )
+        regressor.fit(task.rows, task.targets)
+        splits = flatten(regressor.estimators_)
+        grid = _grid(task.targets)
+        return cls(task.levels, grid, _leaf_distributions(regressor, grid), splits)
+
+    def quantiles(self, rows: Array) -> Array:
+        out = np.empty((len(rows), self.levels.size))
+        s = self.splits
+        # scikit-learn compares in single precision; the same rounding keeps every row in its leaf.
+        single = np.ascontiguousarray(rows, dtype=np.float32)
+        forest_quantiles(
+            single,
+            self.levels,
+            self.grid,
+            self.leaf_cdf,
+            s.roots,
+            s.feature,
+            s.threshold,
+            s.left,
+            s.right,
+            out,
+        )
+        return out
+
+    def to_state(self) -> SavedState:
+        return {"levels": self.levels, "grid": self.grid, "leaf_cdf": self.leaf_cdf, **vars(self.splits)}
+
+    @classmethod
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
+        real = {k: np.asarray(state[k], dtype=float) for k in ("levels", "grid", "leaf_cdf", "threshold")}
+        whole = {k: np.asarray(state[k], dtype=np.int64) for k in ("roots", "feature", "left", "right")}
+        splits = Splits(whole["roots"], whole["feature"], real["threshold"], whole["left"], whole["right"])
+        return cls(real["levels"], real["grid"], real["leaf_cdf"], splits)

@@ -1,0 +1,60 @@
+"""What a regressor of the SPCI family has to supply: quantiles of the next residual from feature rows.
+
+A new regressor is one small file with a `QuantileModel`, a line in `aesi.conformal.saved` and a method that
+fits it in `aesi.conformal.registry`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Self
+
+import numpy as np
+
+from aesi.numerics.typing import Array, BoolArray, SavedState
+
+
+@dataclass(frozen=True, eq=False)
+class FitTask:
+    """What a regressor is fitted to.
+
+    rows : (n, p); the first n_history columns are residuals or linear in them, V.  targets : (n,) V.
+    levels : (2 B,) quantile levels.  floor_v : V, no band is narrower.
+    """
+
+    rows: Array
+    targets: Array
+    levels: Array
+    n_history: int
+    floor_v: float
+    rng: np.random.Generator
+
+    def only(self, rows: BoolArray) -> FitTask:
+        """The same task on some of the rows."""
+        return replace(self, rows=self.rows[rows], targets=self.targets[rows])
+
+
+class QuantileModel(ABC):
+    """A fitted map from feature rows (n, p) to quantiles (n, 2 B): B lower levels, then B upper ones."""
+
+    kind: ClassVar[str]
+
+    @abstractmethod
+    def quantiles(self, rows: Array) -> Array:
+        """(n, 2 B) V."""
+
+    @abstractmethod
+    def to_state(self) -> SavedState:
+        """Everything `from_state` needs."""
+
+    @classmethod
+    @abstractmethod
+    def from_state(cls, state: SavedState, kinds: Kinds) -> Self:
+        """Inverse of `to_state`; `kinds` holds the regressors that may stand inside this one."""
+
+
+Fitter = Callable[[FitTask], QuantileModel]
+Kinds = Mapping[str, type[QuantileModel]]
+"""Regressors by their `kind`, the word that a saved state names them by."""

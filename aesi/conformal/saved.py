@@ -1,0 +1,44 @@
+"""Calibrated intervals from what was saved of them; what a saved file may hold is listed here."""
+
+from __future__ import annotations
+
+from aesi.conformal.bands.band import Band
+from aesi.conformal.bands.marginal import FixedBand, RollingBand
+from aesi.conformal.bands.regression import RegressionBand
+from aesi.conformal.online.calibrated import SCHEMA, Calibrated
+from aesi.conformal.online.scale import Scale
+from aesi.conformal.regressors.boosted import BoostedQuantiles
+from aesi.conformal.regressors.forest import ForestQuantiles
+from aesi.conformal.regressors.linear import LinearQuantiles
+from aesi.conformal.regressors.model import QuantileModel
+from aesi.conformal.regressors.normalised import NormalisedQuantiles
+from aesi.errors import InputError
+from aesi.numerics.typing import SavedState
+
+BANDS: dict[str, type[Band]] = {band.kind: band for band in (FixedBand, RollingBand, RegressionBand)}
+REGRESSORS: dict[str, type[QuantileModel]] = {
+    model.kind: model for model in (LinearQuantiles, ForestQuantiles, BoostedQuantiles, NormalisedQuantiles)
+}
+
+
+def calibrated_from_dict(state: SavedState) -> Calibrated:
+    """Inverse of `Calibrated.to_dict`; arrays may come back as lists.
+
+    Raises InputError for another schema or a kind of band this version does not know.
+    """
+    if state.get("schema") != SCHEMA:
+        raise InputError(f"intervals have schema {state.get('schema')!r}, this version reads {SCHEMA!r}.")
+    kind = state["band_kind"]
+    if kind not in BANDS:
+        raise InputError(f"unknown kind of band {kind!r}; this version knows {', '.join(sorted(BANDS))}.")
+    low, high = state["marginal_v"]
+    return Calibrated(
+        method=str(state["method"]),
+        alpha=float(state["alpha"]),
+        window=int(state["window"]),
+        band=BANDS[kind].from_state(state["band"], REGRESSORS),
+        scale=Scale.from_state(state["scale"]),
+        rate=float(state["rate"]),
+        marginal_v=(float(low), float(high)),
+        floor_v=float(state["floor_v"]),
+    )

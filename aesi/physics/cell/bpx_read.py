@@ -1,0 +1,151 @@
+"""The fields of a BPX file to a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from typing import Any
+
+from aesi.errors import CellError
+from aesi.physics.cell.bpx_schema import load_bpx
+from aesi.physics.cell.parts import (
+    CONTACT_RESISTANCE,
+    CellParameters,
+    Electrode,
+    Electrolyte,
+    Separator,
+    require_positive,
+)
+from aesi.physics.cell.relations import Constant, Relation, relation
+
+DEFAULT_TEMPERATURE_K = 298.15
+
+Fields = Mapping[str, Any]
+
+
+def read_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> CellParameters:
+    """See `Cell.from_bpx`."""
+    v1, where = load_bpx(source)
+    try:
+        return _cell(v1, where)
+    except KeyError as error:
+        raise CellError(f"{where}: the field {error.args[0]!r} is missing, which this model needs.") from None
+
+
+def _cell(v1: dict[str, Any], where: str) -> CellParameters:
+    parts = v1["Parameterisation"]
+    fields, header = parts["Cell"], v1["Header"]
+    state = v1.get("State") or {}
+    initial = state.get("Initial conditions") or {}
+    thermal = state.get("Thermal environment") or {}
+    reference = float(fields.get("Reference temperature [K]") or DEFAULT_TEMPERATURE_K)
+    user = parts.get("User-defined") or {}
+    cell = CellParameters(
+        negative=_electrode(parts["Negative electrode"], f"{where}: Negative electrode"),
+        separator=_separator(parts["Separator"]),
+        positive=_electrode(parts["Positive electrode"], f"{where}: Positive electrode"),
+        electrolyte=_electrolyte(parts["Electrolyte"], initial, f"{where}: Electrolyte"),
+        electrode_area_m2=float(fields["Electrode area [m2]"]),
+        electrode_pairs=int(fields["Number of electrode pairs connected in parallel to make a cell"]),
+        nominal_capacity_ah=float(fields["Nominal cell capacity [A.h]"]),
+        lower_voltage_v=float(fields["Lower voltage cut-off [V]"]),
+        upper_voltage_v=float(fields["Upper voltage cut-off [V]"]),
+        reference_temperature_k=reference,
+        initial_temperature_k=float(initial.get("Initial temperature [K]") or reference),
+        ambient_temperature_k=float(thermal.get("Ambient temperature [K]") or reference),
+        density_kg_m3=_optional(fields, "Density [kg.m-3]"),
+        specific_heat_j_kg_k=_optional(fields, "Specific heat capacity [J.K-1.kg-1]"),
+        volume_m3=_optional(fields, "Volume [m3]"),
+        surface_area_m2=_optional(fields, "External surface area [m2]"),
+        contact_resistance_ohm=float(user.get(CONTACT_RESISTANCE, 0.0)),
+        name=str(header.get("Title") or "cell"),
+        description=str(header.get("Description") or ""),
+        references=str(header.get("References") or ""),
+    )
+    _check_values(cell, where)
+    return cell
+
+
+def _optional(fields: Fields, name: str) -> float | None:
+    value = fields.get(name)
+    return None if value is None else float(value)
+
+
+def _electrode(fields: Fields, what: str) -> Electrode:
+    def optional_relation(name: str) -> Relation | None:
+        return None if fields.get(name) is None else relation(fields[name], f"{what}, {name}")
+
+    return Electrode(
+        thickness_m=float(fields["Thickness [m]"]),
+        particle_radius_m=float(fields["Particle radius [m]"]),
+        area_per_volume_1_m=float(fields["Surface area per unit volume [m-1]"]),
+        porosity=float(fields["Porosity"]),
+        transport_efficiency=float(fields["Transport efficiency"]),
+        conductivity_s_m=float(fields["Conductivity [S.m-1]"]),
+        theta_min=float(fields["Minimum stoichiometry"]),
+        theta_max=float(fields["Maximum stoichiometry"]),
+        c_max_mol_m3=float(fields["Maximum concentration [mol.m-3]"]),
+        diffusivity=relation(fields["Diffusivity [m2.s-1]"], f"{what}, Diffusivity [m2.s-1]"),
+        ocp=relation(fields["OCP [V]"], f"{what}, OCP [V]"),
+        rate_constant=float(fields["Reaction rate constant [mol.m-2.s-1]"]),
+        entropic=optional_relation("Entropic change coefficient [V.K-1]") or Constant(0.0),
+        diffusivity_ea_j_mol=float(fields.get("Diffusivity activation energy [J.mol-1]") or 0.0),
+        rate_ea_j_mol=float(fields.get("Reaction rate constant activation energy [J.mol-1]") or 0.0),
+        ocp_lithiation=optional_relation("OCP (lithiation) [V]"),
+        ocp_delithiation=optional_relation("OCP (delithiation) [V]"),
+        hysteresis_decay=_optional(fields, "OCP hysteresis decay constant"),
+    )
+
+
+def _separator(fields: Fields) -> Separator:
+    return Separator(
+        thickness_m=float(fields["Thickness [m]"]),
+        porosity=float(fields["Porosity"]),
+        transport_efficiency=float(fields["Transport efficiency"]),
+    )
+
+
+def _electrolyte(fields: Fields, initial: Fields, what: str) -> Electrolyte:
+    name = "Initial electrolyte concentration [mol.m-3]"
+    if initial.get(name) is None:
+        raise KeyError(name)
+    return Electrolyte(
+        c0_mol_m3=float(initial[name]),
+        transference=float(fields["Cation transference number"]),
+        conductivity=relation(fields["Conductivity [S.m-1]"], f"{what}, Conductivity [S.m-1]"),
+        diffusivity=relation(fields["Diffusivity [m2.s-1]"], f"{what}, Diffusivity [m2.s-1]"),
+        conductivity_ea_j_mol=float(fields.get("Conductivity activation energy [J.mol-1]") or 0.0),
+        diffusivity_ea_j_mol=float(fields.get("Diffusivity activation energy [J.mol-1]") or 0.0),
+    )
+
+
+def _check_values(cell: CellParameters, where: str) -> None:
+    for label, electrode in (("Negative electrode", cell.negative), ("Positive electrode", cell.positive)):
+        require_positive(
+            f"{where}: {label}",
+            thickness_m=electrode.thickness_m,
+            particle_radius_m=electrode.particle_radius_m,
+            area_per_volume_1_m=electrode.area_per_volume_1_m,
+            porosity=electrode.porosity,
+            transport_efficiency=electrode.transport_efficiency,
+            conductivity_s_m=electrode.conductivity_s_m,
+            c_max_mol_m3=electrode.c_max_mol_m3,
+            rate_constant=electrode.rate_constant,
+        )
+        if not 0.0 <= electrode.theta_min < electrode.theta_max <= 1.0:
+            raise CellError(
+                f"{where}: {label}: stoichiometry limits [{electrode.theta_min:g}, {electrode.theta_max:g}] "
+                "have to satisfy 0 <= minimum < maximum <= 1."
+            )
+    require_positive(
+        where,
+        electrode_area_m2=cell.electrode_area_m2,
+        electrode_pairs=cell.electrode_pairs,
+        nominal_capacity_ah=cell.nominal_capacity_ah,
+        separator_thickness_m=cell.separator.thickness_m,
+        separator_porosity=cell.separator.porosity,
+        separator_transport_efficiency=cell.separator.transport_efficiency,
+        electrolyte_concentration_mol_m3=cell.electrolyte.c0_mol_m3,
+        reference_temperature_k=cell.reference_temperature_k,
+        initial_temperature_k=cell.initial_temperature_k,
+    )

@@ -1,0 +1,163 @@
+"""What a cell is made of, as its file declares it: frozen, in SI units, hashable by value.
+
+Sign convention of the whole package: current is positive on discharge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from aesi.errors import CellError
+from aesi.numerics.typing import Array
+from aesi.physics.cell.relations import Constant, Relation
+from aesi.physics.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
+
+NO_ENTROPY = Constant(0.0)
+CONTACT_RESISTANCE = "Contact resistance [Ohm]"
+"""The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
+
+
+@dataclass(frozen=True)
+class Electrode:
+    """A porous electrode of one active material.
+
+    Lengths in m, concentrations in mol/m3, diffusivity in m2/s at stoichiometry x, open-circuit potential in
+    V against Li/Li+, entropic coefficient in V/K, effective solid conductivity in S/m, rate constant in
+    mol/(m2 s) so that the exchange current density is F K sqrt(c_e/c_e0 x (1 - x)), activation energies in
+    J/mol.
+    """
+
+    thickness_m: float
+    particle_radius_m: float
+    area_per_volume_1_m: float
+    porosity: float
+    transport_efficiency: float
+    conductivity_s_m: float
+    theta_min: float
+    theta_max: float
+    c_max_mol_m3: float
+    diffusivity: Relation
+    ocp: Relation
+    rate_constant: float
+    entropic: Relation = NO_ENTROPY
+    diffusivity_ea_j_mol: float = 0.0
+    rate_ea_j_mol: float = 0.0
+    ocp_lithiation: Relation | None = None
+    ocp_delithiation: Relation | None = None
+    hysteresis_decay: float | None = None
+
+    @property
+    def active_fraction(self) -> float:
+        """Volume fraction of active material, a R / 3."""
+        return self.area_per_volume_1_m * self.particle_radius_m / 3.0
+
+
+@dataclass(frozen=True)
+class Separator:
+    """Thickness in m; porosity and transport efficiency are fractions."""
+
+    thickness_m: float
+    porosity: float
+    transport_efficiency: float
+
+
+@dataclass(frozen=True)
+class Electrolyte:
+    """Concentration in mol/m3, conductivity in S/m and diffusivity in m2/s as functions of concentration."""
+
+    c0_mol_m3: float
+    transference: float
+    conductivity: Relation
+    diffusivity: Relation
+    conductivity_ea_j_mol: float = 0.0
+    diffusivity_ea_j_mol: float = 0.0
+
+
+@dataclass(frozen=True)
+class CellParameters:
+    """Everything a simulation needs to know about a cell; `aesi.Cell` adds how it is read and written.
+
+    Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no
+    thermal data), contact resistance in ohm in series with the whole cell.
+    """
+
+    negative: Electrode
+    separator: Separator
+    positive: Electrode
+    electrolyte: Electrolyte
+    electrode_area_m2: float
+    electrode_pairs: int
+    nominal_capacity_ah: float
+    lower_voltage_v: float
+    upper_voltage_v: float
+    reference_temperature_k: float = 298.15
+    initial_temperature_k: float = 298.15
+    ambient_temperature_k: float = 298.15
+    density_kg_m3: float | None = None
+    specific_heat_j_kg_k: float | None = None
+    volume_m3: float | None = None
+    surface_area_m2: float | None = None
+    contact_resistance_ohm: float = 0.0
+    name: str = "cell"
+    description: str = ""
+    references: str = ""
+
+    @property
+    def total_area_m2(self) -> float:
+        """Area of all electrode pairs."""
+        return self.electrode_area_m2 * self.electrode_pairs
+
+    def electrode_capacity_ah(self, electrode: Electrode) -> float:
+        """Charge that takes an electrode from stoichiometry 0 to 1."""
+        volume = self.total_area_m2 * electrode.thickness_m
+        return FARADAY_C_MOL * electrode.active_fraction * volume * electrode.c_max_mol_m3 / SECONDS_PER_HOUR
+
+    @property
+    def capacity_ah(self) -> float:
+        """Charge between the stoichiometry limits of the negative electrode."""
+        window = self.negative.theta_max - self.negative.theta_min
+        return window * self.electrode_capacity_ah(self.negative)
+
+    @property
+    def heat_capacity_j_k(self) -> float | None:
+        """Density times specific heat times volume, or None where one of them is not declared."""
+        if self.density_kg_m3 is None or self.specific_heat_j_kg_k is None or self.volume_m3 is None:
+            return None
+        return self.density_kg_m3 * self.specific_heat_j_kg_k * self.volume_m3
+
+    def stoichiometries(self, soc: float) -> tuple[float, float]:
+        """Rest stoichiometries (negative, positive) at a state of charge, by the declared limits."""
+        n, p = self.negative, self.positive
+        theta_n = n.theta_min + soc * (n.theta_max - n.theta_min)
+        theta_p = p.theta_max - soc * (p.theta_max - p.theta_min)
+        return theta_n, theta_p
+
+    def rest_voltage_v(self, soc: float | Array) -> Array:
+        """(n,) V, the open-circuit voltage at the reference temperature."""
+        z = np.atleast_1d(np.asarray(soc, dtype=float))
+        n, p = self.negative, self.positive
+        theta_n = n.theta_min + z * (n.theta_max - n.theta_min)
+        theta_p = p.theta_max - z * (p.theta_max - p.theta_min)
+        return p.ocp(theta_p) - n.ocp(theta_n)
+
+    def with_negative(self, **changes: Any) -> Self:
+        """A copy with fields of the negative electrode replaced."""
+        return replace(self, negative=replace(self.negative, **changes))
+
+    def with_positive(self, **changes: Any) -> Self:
+        """A copy with fields of the positive electrode replaced."""
+        return replace(self, positive=replace(self.positive, **changes))
+
+    def with_electrolyte(self, **changes: Any) -> Self:
+        """A copy with fields of the electrolyte replaced."""
+        return replace(self, electrolyte=replace(self.electrolyte, **changes))
+
+
+def require_positive(what: str, **values: float) -> None:
+    """Raise CellError for the first value that is not a positive number."""
+    for name, value in values.items():
+        if not value > 0 or not np.isfinite(value):
+            raise CellError(f"{what}: {name} = {value:g} has to be a positive number.")

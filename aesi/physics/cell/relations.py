@@ -1,0 +1,219 @@
+"""Constitutive relations: a constant, an expression in x, a table, and what effects make of them.
+
+Relations are frozen and hashable by value, so that whatever is computed from them can be cached.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from aesi.errors import CellError
+from aesi.numerics.typing import Array
+from aesi.physics.cell.expression import compile_expression
+
+TABLE_POINTS_IN_BPX = 1025
+"""Rows written where a relation has no closed form of its own (a table plus an expression)."""
+
+ADMISSIBLE = "a number, an expression in x or a table {'x': [...], 'y': [...]}"
+
+
+@dataclass(frozen=True)
+class Constant:
+    """The same value everywhere."""
+
+    value: float
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) the value."""
+        return np.full_like(np.asarray(x, dtype=float), self.value)
+
+
+@dataclass(frozen=True)
+class Expression:
+    """An expression in x, as text; refused at construction if it holds anything but arithmetic."""
+
+    text: str
+
+    def __post_init__(self) -> None:
+        compile_expression(self.text)
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) the expression at x."""
+        with np.errstate(all="ignore"):  # outside the fitted range; whoever needs finite values checks
+            return np.asarray(compile_expression(self.text)(np.asarray(x, dtype=float)), dtype=float)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Straight lines between points; constant beyond the first and the last."""
+
+    x: tuple[float, ...]
+    y: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.x) != len(self.y) or len(self.x) < 2:
+            raise CellError(f"a table needs x and y of one length >= 2, not {len(self.x)} and {len(self.y)}.")
+        if not np.all(np.diff(self.x) > 0) or not np.all(np.isfinite(self.y)):
+            raise CellError("a table needs strictly increasing x and finite y.")
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) interpolated."""
+        return np.interp(np.asarray(x, dtype=float), self.x, self.y)
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """`factor` times another relation."""
+
+    base: Relation
+    factor: float
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) factor * base(x)."""
+        return self.factor * self.base(x)
+
+
+@dataclass(frozen=True)
+class Sum:
+    """Two relations added."""
+
+    first: Relation
+    second: Relation
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) first(x) + second(x)."""
+        return self.first(x) + self.second(x)
+
+
+@dataclass(frozen=True)
+class Product:
+    """Two relations multiplied."""
+
+    first: Relation
+    second: Relation
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) first(x) * second(x)."""
+        return self.first(x) * self.second(x)
+
+
+@dataclass(frozen=True)
+class PowerSeries:
+    """c0 + c1 x + c2 x**2 + ..."""
+
+    coefficients: tuple[float, ...]
+
+    def __call__(self, x: Array) -> Array:
+        """(n,) the polynomial at x."""
+        x = np.asarray(x, dtype=float)
+        out = np.full_like(x, self.coefficients[-1])
+        for c in self.coefficients[-2::-1]:
+            out = out * x + c
+        return out
+
+
+Relation = Constant | Expression | Table | PowerSeries | Scaled | Sum | Product
+
+
+def scaled(relation: Relation, factor: float) -> Relation:
+    """`factor` times `relation`, in the simplest form; the relation itself for a factor of one."""
+    if factor == 1.0:
+        return relation
+    match relation:
+        case Constant(value):
+            return Constant(value * factor)
+        case Scaled(base, already):
+            return Scaled(base, already * factor)
+        case _:
+            return Scaled(relation, factor)
+
+
+def relation(value: object, what: str) -> Relation:
+    """A relation from what a BPX file holds: a number, text, or {"x": [...], "y": [...]}.
+
+    Raises CellError naming `what`.
+    """
+    if isinstance(value, bool) or value is None:
+        raise CellError(f"{what} is {value!r}; give {ADMISSIBLE}.")
+    if isinstance(value, int | float):
+        return Constant(float(value))
+    try:
+        if isinstance(value, str):
+            return Expression(str(value))
+        if isinstance(value, dict) and set(value) == {"x", "y"}:
+            return Table(tuple(map(float, value["x"])), tuple(map(float, value["y"])))
+    except CellError as error:
+        raise CellError(f"{what}: {error}") from None
+    raise CellError(f"{what} is {type(value).__name__}; give {ADMISSIBLE}.")
+
+
+def to_bpx(item: Relation, low: float = 0.0, high: float = 1.0) -> float | str | dict[str, list[float]]:
+    """The relation as a BPX file holds it; a mixture without closed form becomes a table on [low, high]."""
+    match item:
+        case Constant(value):
+            return value
+        case Expression(text):
+            return text
+        case Table(x, y):
+            return {"x": list(x), "y": list(y)}
+        case _:
+            closed = _as_text(item)
+            if closed is not None:
+                return closed
+            grid = np.linspace(low, high, TABLE_POINTS_IN_BPX)
+            return {"x": grid.tolist(), "y": item(grid).tolist()}
+
+
+def _as_text(item: Relation) -> str | None:
+    match item:
+        case Constant(value):
+            return f"{value!r}"
+        case Expression(text):
+            return f"({text})"
+        case Table():
+            return None
+        case PowerSeries(coefficients):
+            return "(" + " + ".join(f"({c!r}) * x ** {k}" for k, c in enumerate(coefficients)) + ")"
+        case Scaled(base, factor):
+            inner = _as_text(base)
+            return None if inner is None else f"({factor!r} * {inner})"
+        case Sum(first, second):
+            return _joined(first, " + ", second)
+        case Product(first, second):
+            return _joined(first, " * ", second)
+
+
+def _joined(first: Relation, sign: str, second: Relation) -> str | None:
+    left, right = _as_text(first), _as_text(second)
+    return None if left is None or right is None else f"({left}{sign}{right})"
+
+
+@lru_cache(maxsize=16)
+def _grid(low: float, high: float, points: int) -> Array:
+    return np.linspace(low, high, points)
+
+
+@lru_cache(maxsize=64)
+def _leaf_values(item: Relation, low: float, high: float, points: int) -> Array:
+    values = item(_grid(low, high, points))
+    values = np.array(values)
+    values.flags.writeable = False
+    return values
+
+
+def tabulated(item: Relation, low: float, high: float, points: int) -> Array:
+    """(points,) values on a uniform grid; the parts that a search leaves unchanged come from a cache."""
+    match item:
+        case Scaled(base, factor):
+            return factor * tabulated(base, low, high, points)
+        case Sum(first, second):
+            return tabulated(first, low, high, points) + tabulated(second, low, high, points)
+        case Product(first, second):
+            return tabulated(first, low, high, points) * tabulated(second, low, high, points)
+        case PowerSeries():
+            return item(_grid(low, high, points))
+        case _:
+            return _leaf_values(item, low, high, points)

@@ -1,0 +1,96 @@
+"""Effects by their name: from the catalogue, or from a file of the user's own."""
+
+from __future__ import annotations
+
+import copyreg
+import importlib.util
+from collections.abc import Mapping
+from dataclasses import replace
+from difflib import get_close_matches
+from functools import lru_cache
+from hashlib import sha256
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from aesi.errors import InputError
+from aesi.physics.effect import ActiveEffect, Effect
+from aesi.physics.effects.catalogue import CATALOGUE
+
+
+def find_effect(name: str, file: str | None = None) -> Effect:
+    """The effect of that id, from the catalogue or from a user's own file.
+
+    Raises InputError with the nearest match for an unknown id.
+    """
+    if file is not None:
+        return load_effect(file)
+    if name not in CATALOGUE:
+        near = get_close_matches(name, list(CATALOGUE), n=1)
+        hint = f"; did you mean {near[0]!r}?" if near else "."
+        raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
+    return CATALOGUE[name]
+
+
+def load_effect(path: str | PathLike[str]) -> Effect:
+    """An effect of the user's own: runs the Python file at `path`, which has to define `EFFECT`.
+
+    The file is code and is run as such; name only files that you trust.
+    Raises InputError where there is no such file, or no Effect in it.
+    """
+    return _load(str(Path(path).resolve()))
+
+
+@lru_cache(maxsize=32)
+def _load(path: str) -> Effect:
+    if not Path(path).is_file():
+        raise InputError(f"there is no effect file {path}.")
+    name = f"aesi_user_effect_{sha256(path.encode()).hexdigest()[:12]}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"{path} is not a Python file; an effect file ends in .py.")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise InputError(f"the effect file {path} fails: {type(error).__name__}: {error}.") from error
+    effect = getattr(module, "EFFECT", None)
+    if not isinstance(effect, Effect):
+        raise InputError(f"{path} defines no EFFECT of type aesi.physics.Effect.")
+    if effect.id in CATALOGUE:
+        raise InputError(f"{path}: the id {effect.id!r} is taken by the catalogue; choose another.")
+    return replace(effect, file=path)
+
+
+def describe(name: str | None = None) -> str:
+    """One effect as plain text: equation, validity, parameters, source; the list of all without a name."""
+    if name is None:
+        return "\n".join(f"{e.id:36s} {e.kind:11s} {e.summary}" for e in CATALOGUE.values())
+    effect = find_effect(name)
+    lines = [f"{effect.id} ({effect.kind})", effect.summary + ".", "", effect.equation, ""]
+    lines += [effect.validity, f"Source: {effect.source}", "", "Parameters:"]
+    for key, p in effect.parameters.items():
+        scale = ", logarithmic" if p.log else ""
+        vanishes = "" if p.neutral is None else f", vanishes at {p.neutral:g}"
+        about = f": {p.description}" if p.description else ""
+        lines.append(f"  {key} [{p.unit}] in [{p.bounds[0]:g}, {p.bounds[1]:g}]{scale}{vanishes}{about}")
+        lines.append(f"      typically {p.default:g}; range from {p.source}")
+    return "\n".join(lines if effect.parameters else lines[:-1])
+
+
+def active_effect(content: Mapping[str, Any]) -> ActiveEffect:
+    """Inverse of `ActiveEffect.to_dict`.  Raises InputError for an unknown effect, ParameterError for its values."""
+    return find_effect(str(content["effect"]), content.get("file")).activate(**content["parameters"])
+
+
+def _reduced(effect: Effect) -> tuple[Any, ...]:
+    """How an effect travels between processes: by its name, so that what arrives is the catalogue's own; by value
+    where it has no name to be found by."""
+    if effect.file is None and CATALOGUE.get(effect.id) is not effect:
+        by_value = object.__reduce_ex__(effect, 2)
+        assert isinstance(by_value, tuple)
+        return by_value
+    return find_effect, (effect.id, effect.file)
+
+
+copyreg.pickle(Effect, _reduced)

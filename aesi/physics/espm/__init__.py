@@ -1,0 +1,1 @@
+"""The extended single-particle model: constants, tables and kernels of one run."""

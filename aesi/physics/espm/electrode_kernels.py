@@ -1,0 +1,222 @@
+"""Compiled solution of one electrode: the currents of its units at one potential.
+
+Each electrode holds units: a particle of one size in one region. All units of an electrode see one potential Phi
+between its collector and the electrolyte at the separator's edge:
+
+    Phi = U(theta_u) + eta(y_u) + (L/sigma S + L/kappa E) y + chi ln(c_r / c_mean),   sum y + capacitive + plating = J
+
+with y_u the current of unit u per cell area, positive for delithiation, J = I/A in the negative electrode and -I/A
+in the positive. Newton's method on all y and Phi; one plain unit has a closed form.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from aesi.physics.espm.kernels import (
+    BEYOND_RANGE_V,
+    FASTMATH,
+    SMALLEST_OCCUPANCY,
+    lookup,
+    mean_asinh,
+    open_circuit,
+)
+
+SMALLEST_EXPONENT, LARGEST_EXPONENT = -60.0, 60.0
+NEWTON_STEPS = 60
+NEWTON_TOLERANCE_V = 1e-11
+SMALLEST_SLOPE = 1e-9
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def bounded_exp(x):  # type: ignore[no-untyped-def]
+    """exp with its argument kept from overflow."""
+    return math.exp(min(max(x, SMALLEST_EXPONENT), LARGEST_EXPONENT))
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def overpotential(y, exchange, occupancy, g1, g2, g3, log_salt, alpha, thermal):  # type: ignore[no-untyped-def]
+    """Overpotential (V) of a current y and its slope, for j = j0 (exp(alpha f eta) - exp(-(1 - alpha) f eta)).
+
+    exchange : at unit salt and occupancy.  g1..g3 : salt at Gauss points.  log_salt : its mean logarithm.
+    """
+    root = math.sqrt(occupancy)
+    mid = 2.0 * exchange * root * math.exp(0.5 * log_salt)
+    x = y / mid
+    slope = 2.0 * thermal / (mid * math.sqrt(1.0 + x * x))
+    if alpha == 0.5:
+        s = abs(y) / (2.0 * exchange * root)
+        return 2.0 * thermal * math.copysign(mean_asinh(s, g1, g2, g3), y), slope
+    eta = thermal * math.copysign(math.log(abs(x) + math.sqrt(1.0 + x * x)), x) * 2.0
+    if x != 0.0:  # the dominant branch, where the current is large
+        eta *= 0.5 / (alpha if x > 0.0 else 1.0 - alpha) if abs(x) > 1.0 else 1.0
+    half = 0.5 * mid
+    for _ in range(30):
+        forward = half * bounded_exp(alpha * eta / thermal)
+        back = half * bounded_exp(-(1.0 - alpha) * eta / thermal)
+        gradient = (alpha * forward + (1.0 - alpha) * back) / thermal
+        change = (forward - back - y) / gradient
+        change = min(max(change, -4.0 * thermal), 4.0 * thermal)
+        eta -= change
+        if abs(change) < 1e-13:
+            break
+    return eta, 1.0 / gradient
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def end_weight(z):  # type: ignore[no-untyped-def]
+    """Weight of the end of a step of z time constants, exact for a relaxing exponential: 1/2 at 0, 1 at infinity."""
+    if z < 1e-3:
+        return 0.5 + z / 12.0
+    return 1.0 / (1.0 - math.exp(-min(z, LARGEST_EXPONENT))) - 1.0 / z
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def solve_electrode(  # type: ignore[no-untyped-def]
+    lo, hi, regions, side, total, dt, thermal, temperature_rise, chi,
+    region_of, share, exchange, exchange_factor, alpha, capacity, plating, plated,
+    theta_pred, give, ocp, entropic, ohm, salt, log_salt, region_salt,
+    y, theta, delta, dl_current, region_total, plating_current, work,
+):  # fmt: skip
+    """Currents y[lo:hi] of the units of one electrode; returns Phi.
+
+    theta_pred : surface stoichiometry at the end of the step if each unit carried its share.  give : what one unit
+    of deviating current takes from it.  delta : (2 regions,) potentials of the double layers, old in, new out.
+    """
+    n = hi - lo
+    first = side * regions
+    potential, slope = work[0], work[1]
+    matrix = work[2 : 3 + n, : n + 2]
+    new_delta, gain, fitted, new_current = work[3 + n], work[4 + n], work[5 + n], work[6 + n]
+    new_current[:] = 0.0
+    phi = 0.0
+    for step in range(NEWTON_STEPS):
+        for r in range(regions):
+            region_total[first + r] = 0.0
+            new_delta[r] = np.nan
+        for i in range(n):
+            u = lo + i
+            t = theta_pred[u] - give[u] * (y[u] - share[u] * total)
+            theta[u] = t
+            r = region_of[u]
+            k = 3 * (first + r)
+            occupancy = max(t * (1.0 - t), SMALLEST_OCCUPANCY)
+            eta, d_eta = overpotential(
+                y[u], exchange[u] * exchange_factor, occupancy,
+                salt[k], salt[k + 1], salt[k + 2], log_salt[first + r] , alpha, thermal,
+            )  # fmt: skip
+            inside = min(max(t, 0.0), 1.0)
+            last = ocp.shape[0] - 1
+            cell = min(int(inside * last), last - 1)
+            falls = (ocp[cell + 1] - ocp[cell]) * last if t == inside else -BEYOND_RANGE_V
+            u_eq = open_circuit(ocp, t) + temperature_rise * lookup(entropic, inside)
+            potential[i] = u_eq + eta
+            slope[i] = max(d_eta - give[u] * falls, SMALLEST_SLOPE)
+            gain[i] = 1.0
+            region_total[first + r] += y[u]
+            if math.isnan(new_delta[r]):
+                new_delta[r] = potential[i]
+                extra, d_extra = 0.0, 0.0
+                if capacity > 0.0 and dt > 0.0:
+                    if step == 0:
+                        fitted[r] = end_weight(dt / (capacity * slope[i]))
+                    charging = capacity * (potential[i] - delta[first + r]) / dt
+                    charging = (charging - (1.0 - fitted[r]) * dl_current[first + r]) / fitted[r]
+                    new_current[r] = charging
+                    extra += charging
+                    d_extra += capacity / (dt * fitted[r])
+                if plating[0] > 0.0 and side == 0:
+                    up = plating[0] * plated[r] * bounded_exp((1.0 - plating[1]) * potential[i] / thermal)
+                    down = (
+                        plating[0]
+                        * region_salt[first + r]
+                        * bounded_exp(-plating[1] * potential[i] / thermal)
+                    )
+                    plating_current[r] = up - down
+                    extra += up - down
+                    d_extra += ((1.0 - plating[1]) * up + plating[1] * down) / thermal
+                region_total[first + r] += extra
+                gain[i] += d_extra * slope[i]
+        if n == 1 and capacity == 0.0 and plating[0] == 0.0:
+            delta[first] = potential[0]
+            return potential[0] + ohm[0, 0] * total + chi * log_salt[first]
+        if step == 0:
+            phi = potential[0]
+        worst = 0.0
+        off = -total
+        for r in range(regions):
+            off += region_total[first + r]
+        for i in range(n):
+            r = region_of[lo + i]
+            residual = potential[i] + chi * log_salt[first + r] - phi
+            for v in range(regions):
+                residual += ohm[r, v] * region_total[first + v]
+            matrix[i, n + 1] = -residual
+            worst = max(worst, abs(residual))
+            for j in range(n):
+                q = region_of[lo + j]
+                matrix[i, j] = ohm[r, q] * gain[j]
+            matrix[i, i] += slope[i]
+            matrix[i, n] = -1.0
+        for j in range(n):
+            matrix[n, j] = gain[j]
+        matrix[n, n] = 0.0
+        matrix[n, n + 1] = -off
+        if worst < NEWTON_TOLERANCE_V and abs(off) * slope[0] < NEWTON_TOLERANCE_V:
+            break
+        eliminate(matrix, n + 1)
+        for i in range(n):
+            y[lo + i] += matrix[i, n + 1]
+        phi += matrix[n, n + 1]
+    for r in range(regions):
+        delta[first + r] = new_delta[r]
+        dl_current[first + r] = new_current[r]
+    return phi
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def local_conductivity(table, salt, first, unit):  # type: ignore[no-untyped-def]
+    """Harmonic mean of the conductivity over three Gauss points."""
+    k1, k2 = lookup(table, salt[first] * unit), lookup(table, salt[first + 1] * unit)
+    k3 = lookup(table, salt[first + 2] * unit)
+    return 18.0 / (5.0 / k1 + 8.0 / k2 + 5.0 / k3)
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def drops(solid, salt, kappa, first, contrast, ohm):  # type: ignore[no-untyped-def]
+    """ohm[r, v] : drop of region r per current of region v, differences between regions times `contrast`."""
+    regions = ohm.shape[0]
+    for v in range(regions):
+        mean = 0.0
+        for r in range(regions):
+            ohm[r, v] = solid[r, v]
+            for m in range(r, regions):
+                ohm[r, v] += salt[r, m, v] / kappa[first + m]
+            mean += ohm[r, v] / regions
+        for r in range(regions):
+            ohm[r, v] = mean + contrast * (ohm[r, v] - mean)
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def eliminate(matrix, n):  # type: ignore[no-untyped-def]
+    """Solve in place: the right-hand side stands in column n and is replaced by the solution."""
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(matrix[i, k]) > abs(matrix[best, k]):
+                best = i
+        if best != k:
+            for j in range(k, n + 1):
+                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
+        pivot = 1.0 / matrix[k, k]
+        for i in range(k + 1, n):
+            factor = matrix[i, k] * pivot
+            if factor != 0.0:
+                for j in range(k + 1, n + 1):
+                    matrix[i, j] -= factor * matrix[k, j]
+    for k in range(n - 1, -1, -1):
+        value = matrix[k, n]
+        for j in range(k + 1, n):
+            value -= matrix[k, j] * matrix[j, n]
+        matrix[k, n] = value / matrix[k, k]

@@ -1,0 +1,126 @@
+"""Arguments of the compiled plain path: linear solid diffusion, closed-form kinetics, one temperature."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from aesi.numerics.galerkin import StackModes, sphere_modes, stack_modes
+from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell, Electrode
+from aesi.physics.cell.relations import Constant, Relation, Scaled, Sum
+from aesi.physics.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
+from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table
+from aesi.physics.model import EspmModel
+from aesi.records import Hold
+
+
+def run_plain(
+    model: EspmModel, time: Array, current: Array, soc0: float, hold: Hold
+) -> tuple[Array, int, int]:
+    """Rows of (7, n): voltage, surface stoichiometries (n, p), c_e0, c_eL, mean stoichiometries (n, p).
+
+    And the first sample at which a surface or the electrolyte left its range, -1 for none, with what it was.
+    """
+    from aesi.physics.espm.kernels import run_linear
+
+    out = np.empty((7, len(time)))
+    theta0 = np.array(model.cell.stoichiometries(soc0))
+    arguments = plain_arguments(model)
+    fault_at, fault = run_linear(time, current, hold == "backward", theta0, *arguments, out)  # type: ignore[call-arg]
+    return out, fault_at, fault
+
+
+def arrhenius(energy_j_mol: float, temperature_k: float, reference_k: float) -> float:
+    """Factor of a rate at `temperature_k` over that at `reference_k`."""
+    return float(np.exp(energy_j_mol / GAS_CONSTANT_J_MOL_K * (1.0 / reference_k - 1.0 / temperature_k)))
+
+
+def shifted_ocp(electrode: Electrode, rise_k: float) -> Relation:
+    """Open-circuit potential `rise_k` above the reference temperature."""
+    if rise_k == 0.0 or electrode.entropic == Constant(0.0):
+        return electrode.ocp
+    return Sum(electrode.ocp, Scaled(electrode.entropic, rise_k))
+
+
+def stoichiometry_per_coulomb(cell: Cell, electrode: Electrode) -> float:
+    """1/C: surface gain of one times this is d(stoichiometry) per charge, 1 / (F R c_max x reactive area)."""
+    area = cell.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
+    return 1.0 / (area * FARADAY_C_MOL * electrode.particle_radius_m * electrode.c_max_mol_m3)
+
+
+def stack_of(model: EspmModel) -> StackModes:
+    """Electrolyte modes of a model, cached by geometry."""
+    n, s, p = model.cell.negative, model.cell.separator, model.cell.positive
+    return stack_modes(
+        (n.thickness_m, s.thickness_m, p.thickness_m),
+        (n.porosity, s.porosity, p.porosity),
+        (n.transport_efficiency, s.transport_efficiency, p.transport_efficiency),
+        model.electrolyte_order,
+        model.regions,
+    )
+
+
+def _salt_gain(stack: StackModes) -> Array:
+    """Gain of a current that enters one electrode and leaves the other, its mean exactly zero."""
+    gain = stack.gain[0] - stack.gain[1]
+    gain[0] = 0.0
+    return gain
+
+
+@lru_cache(maxsize=64)
+def plain_arguments(model: EspmModel) -> tuple[Any, ...]:
+    """Everything `kernels.run_linear` takes between the record and the output."""
+    cell = model.cell
+    n, p, e = cell.negative, cell.positive, cell.electrolyte
+    temperature, reference = cell.initial_temperature_k, cell.reference_temperature_k
+    sphere, stack = sphere_modes(model.solid_order), stack_of(model)
+    rates = np.array([sphere.lam[1:] * _solid_rate(x, temperature, reference) for x in (n, p)])
+    scale = np.array([stoichiometry_per_coulomb(cell, x) for x in (n, p)])
+    diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)
+    faster = arrhenius(e.diffusivity_ea_j_mol, temperature, reference)
+    kappa = conductivity_table(e.conductivity, e.c0_mol_m3)
+    rise = temperature - reference
+    return (
+        rates, scale[:, None] * sphere.gain[None, 1:], 3.0 * scale,
+        stack.lam * diffusion.d0 * faster,
+        _salt_gain(stack) * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2),
+        stack.to_nodes, np.ascontiguousarray(stack.project.T), stack.gauss, stack.mean,
+        diffusion.psi, 1.0 / diffusion.d0, not diffusion.linear, model.substep_s, model.most_substeps,
+        ocp_table(shifted_ocp(n, rise), "negative"), ocp_table(shifted_ocp(p, rise), "positive"),
+        kappa * arrhenius(e.conductivity_ea_j_mol, temperature, reference),
+        _scalars(model, temperature, diffusion.top),
+    )  # fmt: skip
+
+
+def _solid_rate(electrode: Electrode, temperature: float, reference: float) -> float:
+    d = float(electrode.diffusivity(np.array([0.5]))[0])
+    faster = arrhenius(electrode.diffusivity_ea_j_mol, temperature, reference)
+    return d * faster / electrode.particle_radius_m**2
+
+
+def _scalars(model: EspmModel, temperature: float, top: float) -> Array:
+    cell = model.cell
+    n, s, p, e = cell.negative, cell.separator, cell.positive, cell.electrolyte
+    thermal_v = GAS_CONSTANT_J_MOL_K * temperature / FARADAY_C_MOL
+    reference = cell.reference_temperature_k
+    return np.array(
+        [
+            cell.total_area_m2,
+            e.c0_mol_m3,
+            top,
+            n.area_per_volume_1_m * n.thickness_m,
+            p.area_per_volume_1_m * p.thickness_m,
+            FARADAY_C_MOL * n.rate_constant * arrhenius(n.rate_ea_j_mol, temperature, reference),
+            FARADAY_C_MOL * p.rate_constant * arrhenius(p.rate_ea_j_mol, temperature, reference),
+            thermal_v,
+            2.0 * (1.0 - e.transference) * thermal_v,
+            n.thickness_m / (3.0 * n.transport_efficiency)
+            + s.thickness_m / s.transport_efficiency
+            + p.thickness_m / (3.0 * p.transport_efficiency),
+            (n.thickness_m / n.conductivity_s_m + p.thickness_m / p.conductivity_s_m) / 3.0,
+            cell.contact_resistance_ohm,
+        ]
+    )

@@ -1,0 +1,100 @@
+"""Constitutive relations sampled on uniform grids, ready for the compiled steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from aesi.errors import CellError
+from aesi.numerics.typing import Array
+from aesi.physics.cell.relations import Constant, Relation, tabulated
+
+OCP_POINTS = 8193
+ELECTROLYTE_POINTS = 2049
+ELECTROLYTE_SPAN = 4.0
+"""Tables of electrolyte properties run from zero to this many times the rest concentration."""
+WORKING_SPAN = (0.05, 2.0)
+"""Concentrations, relative to rest, at which the stepping of the electrolyte has to be stable."""
+EXTRAPOLATED_MARGIN = 0.76
+"""The exactly stepped diffusivity exceeds three quarters of the largest one where the explicit rest is extrapolated
+from two steps, so that it cannot grow, however long the step."""
+CORRECTED_MARGIN = 0.55
+"""Half of it is enough where the rest is predicted and corrected within the step."""
+SMALLEST_DIFFUSIVITY_RATIO = 1e-3
+
+
+def ocp_table(ocp: Relation, what: str) -> Array:
+    """(OCP_POINTS,) V on [0, 1]; a pole at either end is replaced by its finite neighbour.
+
+    Raises CellError where it is not finite inside.
+    """
+    values = tabulated(ocp, 0.0, 1.0, OCP_POINTS)
+    if np.isfinite(values).all():
+        return values
+    values = values.copy()
+    values[0] = values[1] if not np.isfinite(values[0]) else values[0]
+    values[-1] = values[-2] if not np.isfinite(values[-1]) else values[-1]
+    if not np.isfinite(values).all():
+        bad = float(np.flatnonzero(~np.isfinite(values))[0]) / (OCP_POINTS - 1)
+        raise CellError(f"the open-circuit potential of the {what} electrode is not finite at x = {bad:.4f}.")
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class DiffusionTable:
+    """Diffusivity split into a constant `d0` and the integral `psi` of the rest over the variable.
+
+    psi : (points,) on [0, top]; zeros where the diffusivity is constant.  The flux is d0 grad c + grad
+    psi(c).
+    """
+
+    d0: float
+    psi: Array
+    top: float
+    linear: bool
+
+
+@lru_cache(maxsize=128)
+def electrolyte_diffusion(diffusivity: Relation, c0: float) -> DiffusionTable:
+    """Split of the electrolyte diffusivity about the rest concentration c0 (mol/m3)."""
+    top = ELECTROLYTE_SPAN * c0
+    if isinstance(diffusivity, Constant):
+        return DiffusionTable(diffusivity.value, np.zeros(2), top, True)
+    return _split(diffusivity, c0, top, tuple(c0 * s for s in WORKING_SPAN), EXTRAPOLATED_MARGIN)
+
+
+@lru_cache(maxsize=128)
+def solid_diffusion(diffusivity: Relation) -> DiffusionTable:
+    """Split of a solid diffusivity over stoichiometry."""
+    if isinstance(diffusivity, Constant):
+        return DiffusionTable(diffusivity.value, np.zeros(2), 1.0, True)
+    return _split(diffusivity, 0.5, 1.0, (0.0, 1.0), CORRECTED_MARGIN)
+
+
+def _split(
+    diffusivity: Relation, reference: float, top: float, working: tuple[float, ...], margin: float
+) -> DiffusionTable:
+    grid = np.linspace(0.0, top, ELECTROLYTE_POINTS)
+    values = diffusivity(grid)
+    at_reference = float(diffusivity(np.array([reference]))[0])
+    if not at_reference > 0:
+        raise CellError(f"a diffusivity is {at_reference:g} m2/s at {reference:g}; it has to be positive.")
+    values = np.where(np.isfinite(values), values, at_reference)
+    values = np.maximum(values, SMALLEST_DIFFUSIVITY_RATIO * at_reference)
+    largest = float(values[(grid >= working[0]) & (grid <= working[1])].max())
+    d0 = max(at_reference, margin * largest)
+    rest = values - d0
+    psi = np.concatenate([[0.0], np.cumsum(0.5 * (rest[1:] + rest[:-1])) * (grid[1] - grid[0])])
+    return DiffusionTable(d0, psi, top, False)
+
+
+def conductivity_table(conductivity: Relation, c0: float) -> Array:
+    """(ELECTROLYTE_POINTS,) S/m on [0, ELECTROLYTE_SPAN c0].  Raises CellError unless positive at rest."""
+    values = tabulated(conductivity, 0.0, ELECTROLYTE_SPAN * c0, ELECTROLYTE_POINTS)
+    at_rest = float(conductivity(np.array([c0]))[0])
+    if not at_rest > 0:
+        raise CellError(f"the electrolyte conductivity is {at_rest:g} S/m at rest; it has to be positive.")
+    floor = SMALLEST_DIFFUSIVITY_RATIO * at_rest
+    return np.maximum(np.where(np.isfinite(values), values, floor), floor)

@@ -1,0 +1,144 @@
+"""Compiled steps of diffusion and heat for the general path."""
+
+import math
+
+from numba import njit
+
+from aesi.physics.espm.kernels import FASTMATH, SMALLEST_SALT, lookup, step_weights
+
+GAS = 8.31446261815324
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
+    """Factor of a rate at `temperature` over that at `reference` (K)."""
+    return math.exp(energy / GAS * (1.0 / reference - 1.0 / temperature))
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def renew_weights(dt, faster, units, rates, e_rates, w, w_e):  # type: ignore[no-untyped-def]
+    """Decay and input weights of all modes for a step; w : (units, 3, modes), w_e : (3, modes).
+
+    faster : factors of temperature on the diffusion of the negative, the positive electrode and the electrolyte.
+    """
+    for u in range(rates.shape[0]):
+        factor = faster[units[u, 0]]
+        for j in range(rates.shape[1]):
+            w[u, 0, j], w[u, 1, j], w[u, 2, j] = step_weights(rates[u, j] * factor, dt)
+    for j in range(e_rates.shape[0]):
+        w_e[0, j], w_e[1, j], w_e[2, j] = step_weights(e_rates[j] * faster[2], dt)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def step_electrolyte(  # type: ignore[no-untyped-def]
+    j0, j1, deviation, ahead, strength, one_minus_t, rates, gains, w, project, psi, top, to_nodes, c0,
+    q, c, rest, forcing, before,
+):  # fmt: skip
+    """Step the modes q and the concentrations c at the nodes.
+
+    j0, j1 : cell current density at both ends.  deviation : (2 regions,) of each region's current from its share.
+    ahead : this step over the last, 0 for the first.  strength : factor of the explicit part psi, 0 where linear.
+    """
+    regions = deviation.shape[0] // 2
+    forcing[:] = 0.0
+    if strength > 0.0:
+        for i in range(rest.shape[0]):
+            rest[i] = lookup(psi, c[i] / top)
+        for i in range(rest.shape[0]):
+            for j in range(forcing.shape[0]):
+                forcing[j] += project[i, j] * rest[i]
+    for j in range(q.shape[0]):
+        source = -strength * rates[j] * forcing[j]
+        slope = -strength * rates[j] * ahead * (forcing[j] - before[j])
+        for r in range(regions):
+            source += one_minus_t * (
+                gains[r, j] * (j0 / regions + deviation[r])
+                + gains[regions + r, j] * (-j0 / regions + deviation[regions + r])
+            )
+            slope += one_minus_t * (gains[r, j] - gains[regions + r, j]) * (j1 - j0) / regions
+        q[j] = w[0, j] * q[j] + (w[1, j] + w[2, j]) * source + w[2, j] * slope
+    before[:] = forcing
+    c[:] = c0
+    for j in range(q.shape[0]):
+        for i in range(c.shape[0]):
+            c[i] += to_nodes[i, j] * q[j]
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def step_particle(  # type: ignore[no-untyped-def]
+    mean, z, u0, u1, dt, rates, gains, lump, w, strength, at, project, psi, nodes, force, force_end
+):
+    """Step one particle under a current from u0 to u1; returns its new mean and what a unit of current takes.
+
+    strength : factor of the explicit part psi, 0 where diffusion is linear; predicted, then corrected once.
+    """
+    taken = lump * dt
+    force[:] = 0.0
+    if strength > 0.0:
+        solid_forcing(mean, z, at, project, psi, nodes, force)
+    for j in range(z.shape[0]):
+        a, b = w[1, j], w[2, j]
+        source = -strength * rates[j] * force[j + 1]
+        z[j] = w[0, j] * z[j] - gains[j] * (a * u0 + b * u1) + (a + b) * source
+        taken += gains[j] * (a + b)
+    mean -= lump * 0.5 * (u0 + u1) * dt
+    if strength > 0.0:
+        solid_forcing(mean, z, at, project, psi, nodes, force_end)
+        for j in range(z.shape[0]):
+            z[j] -= w[2, j] * strength * rates[j] * (force_end[j + 1] - force[j + 1])
+    return mean, taken
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-untyped-def]
+    """force[k] : mode k of the integral psi of the diffusivity's variable part, at the profile of (mean, z)."""
+    nodes[:] = mean
+    for i in range(nodes.shape[0]):
+        for j in range(z.shape[0]):
+            nodes[i] += at[i, j + 1] * z[j]
+    force[:] = 0.0
+    for i in range(nodes.shape[0]):
+        value = lookup(psi, nodes[i])
+        for j in range(force.shape[0]):
+            force[j] += project[j, i] * value
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
+    """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
+
+    contrast : factor of what differs between the regions of an electrode in the logarithm.
+    """
+    for i in range(gauss.shape[0]):
+        g = 0.0
+        for j in range(c.shape[0]):
+            g += gauss[i, j] * c[j]
+        salt[i] = max(g / c0, SMALLEST_SALT)
+    regions = log_salt.shape[0] // 2
+    for side in range(2):
+        middle = 0.0
+        for r in range(side * regions, (side + 1) * regions):
+            g1, g2, g3 = salt[3 * r], salt[3 * r + 1], salt[3 * r + 2]
+            log_salt[r] = (5.0 * math.log(g1 * g3) + 8.0 * math.log(g2)) / 18.0
+            region_salt[r] = c0 * (5.0 * (g1 + g3) + 8.0 * g2) / 18.0
+            middle += log_salt[r] / regions
+        for r in range(side * regions, (side + 1) * regions):
+            log_salt[r] = middle + contrast * (log_salt[r] - middle)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def mean_heat(start, end, i0, i1):  # type: ignore[no-untyped-def]
+    """Mean heat over a step whose current is a straight line: quadratic in it, by the larger end's resistance."""
+    if i0 == i1:
+        return end
+    resistance = start / (i0 * i0) if abs(i0) > abs(i1) else end / (i1 * i1)
+    return 0.5 * (start + end) - resistance * (i1 - i0) ** 2 / 6.0
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def heated(t_k, watts, dt, heat):  # type: ignore[no-untyped-def]
+    """Temperature after a step of constant heating; heat : capacity J/K, conductance W/K, surroundings K."""
+    if heat[1] * dt < 1e-9 * heat[0]:
+        return t_k + watts * dt / heat[0]
+    settled = heat[2] + watts / heat[1]
+    return settled + (t_k - settled) * math.exp(-heat[1] * dt / heat[0])

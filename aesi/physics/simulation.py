@@ -1,0 +1,210 @@
+"""`simulate`: current in, voltage and internal states out.
+
+The extended single-particle model: solid diffusion in one particle an electrode, electrolyte diffusion
+through the three layers, Butler-Volmer kinetics averaged over each electrode with the surface and local
+electrolyte concentrations, electrolyte potential with the conductivity at the mean concentration, ohmic drop
+of the solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693,
+doi:10.1149/2.0341915jes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+
+from aesi.errors import DataError, SimulationError
+from aesi.numerics.typing import Array
+from aesi.physics.balance import same_rest
+from aesi.physics.cell import Cell, initial_soc
+from aesi.physics.constants import ZERO_CELSIUS_K
+from aesi.physics.effect import ActiveEffect, Record, Trace
+from aesi.physics.espm.plain import run_plain
+from aesi.physics.model import EspmModel
+from aesi.records import Hold, Run
+
+OnDepletion = Literal["raise", "clip"]
+LAYERS = {1: "negative electrode", 2: "positive electrode"}
+
+
+def simulate(
+    cell: Cell,
+    time_s: Array,
+    current_a: Array,
+    soc0: float | None = None,
+    effects: Iterable[ActiveEffect] = (),
+    temperature_degc: Array | float | None = None,
+    hold: Hold = "linear",
+    *,
+    rest_voltage_v: float | None = None,
+    on_depletion: OnDepletion = "raise",
+) -> Run:
+    """Terminal voltage and states of `cell` under a current.
+
+    time_s : (n,) s, strictly increasing, any sampling.  current_a : (n,) A, positive on discharge.
+    soc0 : state of charge at rest before the first sample, by the declared windows; where an effect moved these,
+    the cell starts from the same rest voltage in the new ones. None takes it from `rest_voltage_v`.
+    effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
+    temperature_degc : (n,) or one value: the cell's measured temperature; None leaves it to the cell file's
+    initial temperature, or to the heat balance where an effect brings one.
+    hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row
+    before.
+    on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
+    "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
+    at 10 V per unit of stoichiometry, every value stays finite, and `series["depleted"]` is 1 from the first
+    such sample on.
+
+    Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
+    Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated.
+    """
+    time, current = _checked_record(time_s, current_a)
+    active = _instruments_first(effects)
+    model = model_with(cell, active)
+    record = Record(time, current, _kelvin(temperature_degc, time))
+    for effect in active:
+        if effect.effect.on_record is not None:
+            record = effect.effect.on_record(record, **effect.parameters)
+    if soc0 is None:
+        soc0 = _soc_from_rest(model, active, rest_voltage_v)
+    else:
+        soc0 = same_rest(cell, model.cell, soc0)
+    rows, extra, fault_at, fault = _core(model, record, soc0, hold)
+    series = _series(model.cell, rows, time) | extra
+    if fault_at >= 0:
+        if on_depletion == "raise":
+            raise SimulationError(_depletion(cell, time, fault_at, fault))
+        series["depleted"] = (np.arange(len(time)) >= fault_at).astype(float)
+    elif on_depletion == "clip":
+        series["depleted"] = np.zeros(len(time))
+    voltage = _voltage_effects(model, active, record, rows[0], series, hold)
+    return Run(time, current, voltage, series)
+
+
+def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:
+    """The model of `cell` after what the effects do to it."""
+    return _model_with(cell, tuple(effects))
+
+
+@lru_cache(maxsize=128)
+def _model_with(cell: Cell, effects: tuple[ActiveEffect, ...]) -> EspmModel:
+    model = EspmModel(cell)
+    for active in effects:
+        if active.effect.on_model is not None:
+            model = _changed(model, active)
+    return model
+
+
+@lru_cache(maxsize=256)
+def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
+    """One effect's change; the records of a case share all but the last of them."""
+    assert active.effect.on_model is not None
+    return active.effect.on_model(model, **active.parameters)
+
+
+def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
+    """What was recorded has to be set right before the cell can answer to it."""
+    return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
+
+
+def _core(
+    model: EspmModel, record: Record, soc0: float, hold: Hold
+) -> tuple[Array, dict[str, Array], int, int]:
+    time, current = record.time_s, record.current_a
+    temperature = record.temperature_k
+    if temperature is not None and np.ptp(temperature) == 0.0:
+        model = model.with_cell(initial_temperature_k=float(temperature[0]))
+        if model.heat is None:
+            temperature = None
+    if model.is_plain and temperature is None:
+        rows, fault_at, fault = run_plain(model, time, current, soc0, hold)
+        kelvin = np.full(len(time), model.cell.initial_temperature_k)
+        return rows, {"temperature_k": kelvin}, fault_at, fault
+    from aesi.physics.espm.extended import run_extended
+
+    return run_extended(model, time, current, temperature, soc0, hold)
+
+
+def _voltage_effects(
+    model: EspmModel,
+    effects: Sequence[ActiveEffect],
+    record: Record,
+    voltage: Array,
+    series: dict[str, Array],
+    hold: Hold,
+) -> Array:
+    for active in effects:
+        if active.effect.on_voltage is not None:
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
+            added = active.effect.on_voltage(trace, **active.parameters)
+            voltage = voltage + added.voltage_v
+            series.update(added.series)
+    for active in effects:
+        if active.effect.on_reading is not None:
+            trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
+            voltage = active.effect.on_reading(trace, **active.parameters)
+    return voltage
+
+
+def _checked_record(time_s: Array, current_a: Array) -> tuple[Array, Array]:
+    time = np.ascontiguousarray(time_s, dtype=float)
+    current = np.ascontiguousarray(current_a, dtype=float)
+    if time.ndim != 1 or time.shape != current.shape or len(time) == 0:
+        raise DataError(
+            f"time_s and current_a have shapes {time.shape} and {current.shape}; give two equal rows."
+        )
+    if not (np.isfinite(time).all() and np.isfinite(current).all()):
+        raise DataError("time_s or current_a holds a value that is not finite; drop or fill it first.")
+    if len(time) > 1 and not (np.diff(time) > 0).all():
+        row = int(np.flatnonzero(np.diff(time) <= 0)[0]) + 1
+        raise DataError(
+            f"time_s does not increase at row {row} ({time[row]:g} s); sort or drop duplicate stamps."
+        )
+    return time, current
+
+
+def _kelvin(temperature_degc: Array | float | None, time: Array) -> Array | None:
+    if temperature_degc is None:
+        return None
+    kelvin = np.asarray(temperature_degc, dtype=float) + ZERO_CELSIUS_K
+    if kelvin.shape not in ((), time.shape) or not np.isfinite(kelvin).all() or not (kelvin > 0).all():
+        raise DataError(
+            f"temperature_degc has to be one value or {len(time)} finite ones, above -273.15 degC."
+        )
+    return np.ascontiguousarray(np.broadcast_to(kelvin, time.shape))
+
+
+def _soc_from_rest(model: EspmModel, effects: Sequence[ActiveEffect], rest_voltage_v: float | None) -> float:
+    """State of charge from the rest voltage, freed of what instrument faults add to it."""
+    if rest_voltage_v is None:
+        raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
+    true = np.array([rest_voltage_v])
+    one = np.zeros(1)
+    for active in effects:
+        if active.effect.on_reading is not None:
+            trace = Trace(model, one, one, np.array([rest_voltage_v]), {})
+            true = true - (active.effect.on_reading(trace, **active.parameters) - rest_voltage_v)
+    return initial_soc(model.cell, float(true[0]))
+
+
+def _depletion(cell: Cell, time: Array, at: int, fault: int) -> str:
+    if fault in LAYERS:
+        what = f"the surface of the {LAYERS[fault]} left the stoichiometry range [0, 1]"
+    else:
+        what = "the electrolyte ran out of salt"
+    return (
+        f"{cell.name}: {what} at {time[at]:.6g} s (row {at}); the record asks for more charge than the cell "
+        'has: check soc0, capacity and the sign of the current, or use on_depletion="clip".'
+    )
+
+
+def _series(cell: Cell, rows: Array, time: Array) -> dict[str, Array]:
+    n, p = cell.negative, cell.positive
+    return {
+        "c_sp": rows[2] * p.c_max_mol_m3,
+        "c_sn": rows[1] * n.c_max_mol_m3,
+        "c_e0": rows[3],
+        "c_eL": rows[4],
+        "soc": (rows[5] - n.theta_min) / (n.theta_max - n.theta_min),
+    }

@@ -1,0 +1,87 @@
+"""Cases for the tracer: from files named on the command line, or from an experiment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from aesi.data import read_measurement
+from aesi.data.read import Sign
+from aesi.errors import ConfigError
+from aesi.pipeline.discovery.discover import Case
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.load import cell_path, locator, virtual_experiment
+from aesi.pipeline.experiment.sections import DiscoverConfig
+from aesi.records import Measurement
+
+MOST_ROWS = 80_000
+"""A hypothesis is simulated hundreds of times: more rows than these take hours, and tell hardly more."""
+
+
+def case_of_files(
+    cell: Path,
+    data: Sequence[Path],
+    tests: Sequence[Path] = (),
+    columns: Mapping[str, str | None] | None = None,
+    sign: Sign = "discharge-positive",
+    soc0: float | None = None,
+    holdout: float = 0.3,
+    max_effects: int = 3,
+    seed: int = 0,
+    effect_files: Sequence[Path] = (),
+) -> Case:
+    """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told."""
+    paths = (*data, *tests)
+    rows = MOST_ROWS // max(1, len(paths))
+    read = [read_measurement(path, columns, sign, max_rows=rows) for path in paths]
+    return Case(
+        cell,
+        tuple(read[: len(data)]),
+        tuple(read[len(data) :]),
+        soc0,
+        holdout,
+        max_effects,
+        seed,
+        tuple(effect_files),
+    )
+
+
+def case_of_experiment(config: ExperimentConfig) -> Case:
+    """The case that an experiment with a `discover` section describes."""
+    wanted = config.discover or DiscoverConfig()
+    if config.data.kind == "virtual":
+        fit, test, soc0 = _virtual(config)
+    else:
+        fit = _read(config, wanted.fit, wanted.fit_until_s)
+        test = _read(config, wanted.test, dict.fromkeys(wanted.test, wanted.until_s))
+        soc0 = None
+    if not fit:
+        raise ConfigError("discover.fit names no record; give at least one to look at.")
+    return Case(
+        cell_path(config),
+        fit,
+        test,
+        soc0 if config.cell.soc0 is None else config.cell.soc0,
+        wanted.holdout,
+        wanted.max_effects,
+        config.seed,
+    )
+
+
+def _read(
+    config: ExperimentConfig, names: Sequence[str], until_s: Mapping[str, float | None]
+) -> tuple[Measurement, ...]:
+    where = locator(config)
+    data = config.data
+    return tuple(
+        read_measurement(where(name), data.columns or None, data.sign, stop_s=until_s.get(name))
+        for name in names
+    )
+
+
+def _virtual(
+    config: ExperimentConfig,
+) -> tuple[tuple[Measurement, ...], tuple[Measurement, ...], float | None]:
+    """The training record is looked at, the test records judge; they start from their rest voltages."""
+    experiment = virtual_experiment(config, cell_path(config))
+    return experiment.train, experiment.test, None

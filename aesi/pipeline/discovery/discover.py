@@ -1,0 +1,224 @@
+"""`aesi discover` as plain functions: a case in; discovery.json, report.html and a model folder out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aesi.errors import InputError
+from aesi.physics.effects import CATALOGUE, Effect, load_effect
+from aesi.pipeline.notes import together
+from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
+from aesi.records import Measurement
+from aesi.tracer import Discovery, discover
+from aesi.tracer.discovery import Progress
+from aesi.tracer.outcome import Errors, Part, State
+from aesi.tracer.yardstick import POINTS_TO, Pointer
+
+SCHEMA = "aesi.discovery/1"
+STATES: tuple[State, ...] = ("before", "recalibrated", "after")
+ARCHIVE = "hypotheses.jsonl"
+MV = 1e3
+ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
+"""Words of effect ids that a title writes in another way."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """One case as it was asked for.
+
+    cell : a BPX file, or the folder of a saved model, whose cell and effects are what is declared.
+    """
+
+    cell: Path
+    measurements: tuple[Measurement, ...]
+    tests: tuple[Measurement, ...] = ()
+    soc0: float | None = None
+    holdout: float = 0.3
+    max_effects: int = 3
+    seed: int = 0
+    effect_files: tuple[Path, ...] = ()
+
+
+def catalogue(files: Sequence[Path]) -> dict[str, Effect]:
+    """The catalogue and the user's own effects.  Raises InputError for a file that holds none."""
+    own = [load_effect(file) for file in files]
+    names = [effect.id for effect in own]
+    if len(set(names)) < len(names):
+        raise InputError(f"two effect files define the same id: {', '.join(names)}; rename one.")
+    return dict(CATALOGUE) | {effect.id: effect for effect in own}
+
+
+def run_case(case: Case, out: Path, progress: Progress | None = None) -> Discovery:
+    """Trace one case; fits are kept in `out`, so that the same case goes on where it was interrupted."""
+    given = declared_model(case.cell)
+    out.mkdir(parents=True, exist_ok=True)
+    return discover(
+        given.cell,
+        case.measurements,
+        case.tests,
+        soc0=case.soc0,
+        holdout=case.holdout,
+        max_effects=case.max_effects,
+        seed=case.seed,
+        effects=catalogue(case.effect_files),
+        given=given.effects,
+        archive=out / ARCHIVE,
+        progress=progress,
+    )
+
+
+def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str = "") -> dict[str, Any]:
+    """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
+    from aesi.pipeline.report import write_discovery_report
+
+    content = to_json(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
+    out.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(content, indent=1, allow_nan=False)
+    (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
+    HybridModel(found.cell, found.model_effects, soc0=found.soc0, hold=found.hold).save(out / "model")
+    title = ", ".join(m.name for m in case.measurements)
+    write_discovery_report(out / "report.html", view(found, content, title, mlflow_run_id))
+    return content
+
+
+def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
+    """The content of discovery.json.  read : what a reader dropped, mapped or averaged in the files."""
+    verdict = found.verdict
+    return {
+        "schema": SCHEMA,
+        "verdict": verdict.word,
+        "effects": list(verdict.effects),
+        "indistinguishable": [list(group) for group in verdict.groups],
+        "confidence": round(verdict.confidence, 4),
+        "reason": verdict.reason,
+        **{state: {part: _errors(found, state, part) for part in ("fit", "test")} for state in STATES},
+        "noise_floor_mv": MV * found.noise_floor_v,
+        "explainable_mv": MV * found.after.yardstick.explained_v,
+        "structured_mv": MV * verdict.structured_v,
+        "tolerance_mv": MV * verdict.tolerance_v,
+        "candidates": [
+            {
+                "effect": c.effect,
+                "kind": c.kind,
+                "score": c.score,
+                "test_rmse_mv": MV * c.test_rmse_v,
+                "parameters": {
+                    name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+                    for name, p in c.parameters.items()
+                },
+                "hypothesis": list(c.hypothesis),
+                "remark": c.remark,
+            }
+            for c in found.candidates
+        ],
+        "files": _file_rows(found),
+        "dependence": _dependence(found),
+        "points_to": _pointers(found),
+        "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
+        "notes": list(together((*read, *found.notes))),
+        "seconds": round(found.seconds, 2),
+        "simulations": found.simulations,
+    }
+
+
+def _errors(found: Discovery, state: State, part: Part) -> dict[str, float]:
+    residuals = [f.residual_v(state) for f in found.files if f.part == part]
+    if not residuals:
+        return {}
+    errors = Errors.of(np.concatenate(residuals))
+    return {"rmse_mv": MV * errors.rmse_v, "mae_mv": MV * errors.mae_v, "max_mv": MV * errors.max_v}
+
+
+def _file_rows(found: Discovery) -> list[dict[str, Any]]:
+    rows = []
+    for f in found.files:
+        gain, low, high = (MV * v for v in f.gain_v)
+        rmse = {f"{s}_mv": MV * f.errors(s).rmse_v for s in STATES}
+        gains = {"gain_mv": gain, "gain_low_mv": low, "gain_high_mv": high}
+        rows.append({"name": f.name, "part": f.part, **rmse, **gains})
+    return rows
+
+
+def _dependence(found: Discovery) -> list[dict[str, Any]]:
+    before, after = found.before.shares, found.after.shares
+    return [{"variable": name, "before": before[name], "after": after.get(name, 0.0)} for name in before]
+
+
+def _pointers(found: Discovery) -> list[dict[str, Any]]:
+    before, after = found.before.yardstick.pointers, found.after.yardstick.pointers
+    none = Pointer(0.0)
+    return [
+        {
+            "says": text,
+            "before": before.get(text, none).share,
+            "after": after.get(text, none).share,
+            "terms": list(before.get(text, none).terms),
+            "terms_after": list(after.get(text, none).terms),
+        }
+        for text in POINTS_TO
+    ]
+
+
+def view(found: Discovery, content: Mapping[str, Any], title: str, mlflow_run_id: str = "") -> DiscoveryView:
+    """What the report shows."""
+    titles = {name: _title(name) for name in (*CATALOGUE, *(c.effect for c in found.candidates))}
+    return DiscoveryView(
+        title=title,
+        cell=found.cell.name,
+        discovery=content,
+        traces=tuple(
+            DiscoveryTrace(
+                f.name, f.part, f.time_s, f.current_a, f.soc, f.measured_v, *(f.voltages[s] for s in STATES)
+            )
+            for f in found.files
+        ),
+        effects=tuple(_effect_view(found, name) for name in found.verdict.effects),
+        files=tuple(content["files"]),
+        dependence=tuple(content["dependence"]),
+        points_to=tuple(content["points_to"]),
+        experiments=tuple(content["experiments"]),
+        titles=titles,
+        notes=tuple(content["notes"]),
+        versions={name: version(name) for name in ("aesi", "numpy", "scipy")},
+        mlflow_run_id=mlflow_run_id,
+        seconds=found.seconds,
+    )
+
+
+def _title(effect: str) -> str:
+    return " ".join(ABBREVIATIONS.get(word, word) for word in effect.split("_"))
+
+
+def _effect_view(found: Discovery, name: str) -> EffectView:
+    effect = found.effects[name]
+    candidate = next(c for c in found.candidates if c.effect == name)
+    rows = tuple(
+        {
+            "name": key,
+            "unit": p.unit,
+            "value": p.value,
+            "low": p.low,
+            "high": p.high,
+            "bounds": effect.parameters[key].bounds,
+            "description": effect.parameters[key].description,
+        }
+        for key, p in candidate.parameters.items()
+    )
+    return EffectView(
+        id=name,
+        title=_title(name),
+        kind=effect.kind,
+        equation=effect.equation,
+        validity=effect.validity,
+        source=effect.source,
+        parameters=rows,
+    )

@@ -1,0 +1,1 @@
+"""What an experiment does: config, load, fit, conformalise, evaluate, outputs."""

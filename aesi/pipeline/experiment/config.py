@@ -1,0 +1,196 @@
+"""What an experiment is: one validated record read from a YAML file.
+
+Files an experiment reads are named relative to its YAML file. What it writes goes below the workspace; an
+experiment's name becomes a folder there and can therefore hold letters, digits, `_` and `-` alone. Its sections are
+in sections.py.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
+
+from aesi.errors import ConfigError
+from aesi.pipeline.experiment.sections import (
+    CellConfig,
+    ConformalConfig,
+    DataConfig,
+    DiscoverConfig,
+    FallbackConfig,
+    LibraryConfig,
+    RunnerConfig,
+    SearchConfig,
+    Section,
+    TrackingConfig,
+)
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
+
+ModelName = Literal["ESPM", "AESI I", "AESI II", "SINDy-C", "ridge", "gradient boosting"]
+
+
+class ExperimentConfig(Section):
+    """One experiment. `base` is the folder its relative paths start from; it is not part of its identity."""
+
+    name: str
+    note: str = ""
+    seed: Annotated[int, Field(ge=0)] = 0
+    data: DataConfig
+    cell: CellConfig = CellConfig()
+    fallback: FallbackConfig | None = None
+    library: LibraryConfig = LibraryConfig()
+    search: SearchConfig = SearchConfig()
+    conformal: ConformalConfig = ConformalConfig()
+    models: tuple[ModelName, ...] = get_args(ModelName)
+    tracking: TrackingConfig = TrackingConfig()
+    runner: RunnerConfig = RunnerConfig()
+    discover: DiscoverConfig | None = None
+    base: Path = Field(default_factory=Path.cwd, exclude=True)
+
+    @model_validator(mode="after")
+    def _has_something_to_do(self) -> ExperimentConfig:
+        if not self.data.has_roles and self.discover is None:
+            raise ValueError(f"data: {NO_ROLES}")
+        return self
+
+    @field_validator("name")
+    @classmethod
+    def _is_a_folder_name(cls, value: str) -> str:
+        if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,99}", value):
+            raise ValueError(
+                f"{value!r} has to be letters, digits, `_` and `-`: it becomes a folder below runs/"
+            )
+        return value
+
+    def path(self, name: str) -> Path:
+        """A file the experiment reads: absolute, or relative to the experiment's own folder."""
+        path = Path(name).expanduser()
+        return path if path.is_absolute() else (self.base / path).resolve()
+
+    @property
+    def digest(self) -> str:
+        """Content hash of what decides the result; who computes and where it is tracked does not."""
+        return self._hash()
+
+    @property
+    def setting(self) -> str:
+        """The digest without the seed: runs of one setting can be put together as mean and spread."""
+        return self._hash("seed")
+
+    def _hash(self, *without: str) -> str:
+        content = self.model_dump(mode="json", exclude={"note", "tracking", "runner", "base", *without})
+        for key in ("workers", "timeout_s", "memory_mb"):
+            content["search"].pop(key)
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()[:16]
+
+
+def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> ExperimentConfig:
+    """The experiment in a YAML file, with `key.subkey=value` overrides laid over it.
+
+    Raises ConfigError in one sentence: file, key, what was found, what is admissible.
+    """
+    import yaml
+
+    path = Path(path)
+    try:
+        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: there is no such experiment file.{_neighbours(path)}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read as text ({error}).") from None
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{path}: is not YAML ({' '.join(str(error).split())}).") from None
+    if not isinstance(content, dict):
+        raise ConfigError(f"{path}: holds no keys; an experiment starts with `name:`, `data:`, `cell:`.")
+    for override in overrides:
+        _override(content, override)
+    return parse_experiment(content, base=path.resolve().parent, where=str(path))
+
+
+def parse_experiment(
+    content: Mapping[str, Any], base: Path | None = None, where: str = "experiment"
+) -> ExperimentConfig:
+    """The experiment in a mapping. Raises ConfigError like `read_experiment`; `where` names the source."""
+    try:
+        return ExperimentConfig.model_validate({**content, "base": base or Path.cwd()})
+    except ValidationError as error:
+        raise ConfigError(f"{where}: {_sentence(error.errors()[0])}") from None
+
+
+def _neighbours(path: Path) -> str:
+    if not path.parent.is_dir():
+        return ""
+    names = sorted(p.name for p in path.parent.glob("*.yaml"))
+    near = get_close_matches(path.name, names, n=1)
+    if near:
+        return f" Did you mean {path.parent / near[0]}?"
+    return f" There are: {', '.join(names)}." if names else ""
+
+
+def _override(content: dict[str, Any], override: str) -> None:
+    """Lay `a.b=value` over the mapping, the value read as YAML."""
+    import yaml
+
+    key, equals, text = override.partition("=")
+    parts = [part.strip() for part in key.split(".")]
+    if not equals or not all(parts):
+        raise ConfigError(f"--set {override}: has to read key=value, for instance search.candidates=50.")
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        raise ConfigError(f"--set {override}: {text!r} is not a YAML value.") from None
+    for depth, part in enumerate(parts[:-1]):
+        child = content.setdefault(part, {})
+        if not isinstance(child, dict):
+            raise ConfigError(f"--set {override}: {'.'.join(parts[: depth + 1])} is a value and has no keys.")
+        content = child
+    content[parts[-1]] = value
+
+
+def _sentence(detail: ErrorDetails) -> str:
+    """One pydantic error as a sentence that says where, what was found and what to do."""
+    location = [str(part) for part in detail["loc"]]
+    key = ".".join(location) or "the experiment"
+    if detail["type"] == "extra_forbidden":
+        known = _keys_at(location[:-1])
+        near = get_close_matches(location[-1], known, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else f" Known here: {', '.join(known)}."
+        return f"unknown key {key!r}.{hint}"
+    if detail["type"] == "missing":
+        return f"{key!r} is missing; please give it."
+    if detail["type"] == "value_error":
+        return f"{key}: {str(detail['ctx']['error']).rstrip('.')}."
+    found = detail["input"]
+    return f"{key} = {found!r} is not admissible: {_lower_first(detail['msg'].rstrip('.'))}."
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]
+
+
+def _keys_at(location: Sequence[str]) -> list[str]:
+    """The keys of the section at `location`."""
+    section: type[BaseModel] = ExperimentConfig
+    for part in location:
+        field = section.model_fields.get(part)
+        inner = (
+            [t for t in (field.annotation, *get_args(field.annotation)) if _is_section(t)] if field else []
+        )
+        if not inner:
+            return []
+        section = inner[0]
+    return [name for name in section.model_fields if name != "base"]
+
+
+def _is_section(annotation: object) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)

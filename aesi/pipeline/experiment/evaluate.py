@@ -1,0 +1,255 @@
+"""Judge models that are already chosen: each regime by itself, each figure beside its baseline.
+
+This is the only place that reads `Split.test`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any, cast
+
+import numpy as np
+
+from aesi.conformal import FreeRunBands, Intervals
+from aesi.conformal.free_run import HorizonBand
+from aesi.conformal.scores import score
+from aesi.numerics.metrics import mser, rmse
+from aesi.numerics.typing import Array
+from aesi.pipeline.experiment.bands import error_ahead, reach
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.report.views import Prediction, Trace
+from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
+
+MILLIVOLT_PER_VOLT = 1e3
+HORIZONS_S = (1.0, 10.0, 60.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """rows : one a model, as in summary.json.  traces : every record with every model's prediction."""
+
+    rows: tuple[dict[str, Any], ...]
+    traces: tuple[Trace, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """One model on one record, (n,) V each; bounds relative to the prediction, None where not calibrated."""
+
+    series: ErrorSeries
+    free: FreeRun
+    one_step: Array
+    intervals: Intervals | None
+    bands: Intervals | None
+    compared: dict[str, Intervals]
+
+
+def evaluate(fitted: Sequence[Fitted], split: Split) -> Evaluation:
+    """Figures of every model on train, validation and test records, and the traces that the report draws."""
+    traces: dict[tuple[Role, str], dict[str, Prediction]] = {}
+    rows, outside = [], {}
+    for one in fitted:
+        started = time.monotonic()
+        judged = {role: [_judge(one, series) for series in getattr(split, role)] for role in ROLES}
+        seconds = one.seconds + time.monotonic() - started
+        rows.append(_row(one, judged, seconds))
+        for role, records in judged.items():
+            for record in records:
+                key = (role, record.series.name)
+                traces.setdefault(key, {})[one.model.name] = _prediction(record)
+                if one.terms:
+                    outside[key] = record.free.outside
+    return Evaluation(
+        rows=tuple(rows),
+        traces=tuple(
+            _trace(role, series, traces[role, series.name], outside.get((role, series.name)))
+            for role in ROLES
+            for series in cast("tuple[ErrorSeries, ...]", getattr(split, role))
+        ),
+    )
+
+
+def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
+    free = one.model.free_run(series)
+    prediction = one.model.one_step(series)
+    residual = series.error_v - prediction
+    residual[0] = np.nan  # the first sample has no step before it
+    return _Judged(
+        series=series,
+        free=free,
+        one_step=prediction,
+        intervals=None if one.intervals is None else one.intervals.intervals(residual, series.current_a),
+        bands=None if one.bands is None else one.bands.intervals(series, free, reach(one.model, series)),
+        compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()},
+    )
+
+
+def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) -> dict[str, Any]:
+    row: dict[str, Any] = {"name": one.model.name, "terms": one.terms, "seconds": round(seconds, 3)}
+    free: dict[str, Any] = {}
+    step: dict[str, Any] = {}
+    for role, records in judged.items():
+        if not records:
+            continue
+        error = _joined(r.series.error_v for r in records)
+        free[f"{role}_mser_pct"] = mser(error, _joined(r.free.error_v for r in records))
+        free[f"{role}_rmse_mv"] = MILLIVOLT_PER_VOLT * rmse(error, _joined(r.free.error_v for r in records))
+        after = _joined(r.series.error_v[1:] for r in records)
+        step[f"{role}_rmse_mv"] = MILLIVOLT_PER_VOLT * rmse(after, _joined(r.one_step[1:] for r in records))
+    test = judged["test"]
+    free["diverged"] = sum(r.free.diverged_at is not None for r in test)
+    free["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
+    step["persistence_rmse_mv"] = _persistence_mv(test, 1)
+    ahead = _ahead(one, test)
+    row |= {"free_run": free, "one_step": step, "k_step": _k_step(ahead, test)}
+    row["k_step_persistence"] = {_seconds(h): _persistence_mv(test, _steps(test, h)) for h in HORIZONS_S}
+    if one.intervals is not None:
+        residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
+        row["intervals"] = _interval_figures(
+            test, [r.intervals for r in test], residuals, one.intervals.alpha
+        )
+        row["intervals_by_method"] = {
+            name: _interval_figures(test, [r.compared[name] for r in test], residuals, each.alpha)
+            for name, each in one.compared.items()
+        }
+    if one.bands is not None:
+        residuals = [r.series.error_v - r.free.error_v for r in test]
+        whole = _interval_figures(test, [r.bands for r in test], residuals, one.bands.alpha)
+        row["free_run_intervals"] = (
+            whole | _inside([r.bands for r in test], residuals) | _left_out(one.bands.horizons[-1])
+        )
+        row["bands_by_horizon"] = {
+            _seconds(band.horizon_s): _horizon_figures(one, one.bands, band, test, ahead[band.horizon_s])
+            for band in one.bands.horizons
+            if band.horizon_s in ahead
+        }
+    return row
+
+
+def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
+    """Horizon in s -> (n,) V a test record: what a prediction from a measurement that long before left of the
+    error; NaN where there is none so early."""
+    finite = () if one.bands is None else (b.horizon_s for b in one.bands.horizons if isfinite(b.horizon_s))
+    horizons = sorted({*HORIZONS_S, *finite})
+    return {h: [error_ahead(one.model, r.series, h) for r in test] for h in horizons}
+
+
+def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> dict[str, float]:
+    figures = {}
+    for horizon in HORIZONS_S:
+        left = _joined(each[_steps(test, horizon) :] for each in ahead[horizon])
+        figures[_seconds(horizon)] = MILLIVOLT_PER_VOLT * rmse(left, np.zeros(len(left)))
+    return figures
+
+
+def _horizon_figures(
+    one: Fitted, bands: FreeRunBands, band: HorizonBand, test: Sequence[_Judged], left: Sequence[Array]
+) -> dict[str, float]:
+    intervals = [
+        bands.intervals(r.series, r.free, reach(one.model, r.series, band.horizon_s), band.horizon_s)
+        for r in test
+    ]
+    figures = _interval_figures(test, intervals, left, bands.alpha)
+    return figures | _inside(intervals, left) | _left_out(band)
+
+
+def _inside(intervals: Sequence[Intervals | None], residuals: Sequence[Array]) -> dict[str, float]:
+    """Coverage of the rows inside the trained range, where alone the band is calibrated; NaN without such rows."""
+    covered = [
+        each.covers(residual)[each.warm & np.isfinite(residual)]
+        for each, residual in zip(intervals, residuals, strict=True)
+        if each is not None
+    ]
+    inside = _joined(covered)
+    return {"inside_coverage_pct": 100.0 * float(np.mean(inside)) if inside.size else float("nan")}
+
+
+def _left_out(band: HorizonBand) -> dict[str, float]:
+    """How the calibration pieces fared, each with the scale of the others: what to expect of one drive."""
+    return {
+        "pieces": len(band.by_piece),
+        "worst_piece_coverage_pct": 100.0 * min(band.by_piece),
+    }
+
+
+def _persistence_mv(test: Sequence[_Judged], steps: int) -> float:
+    """RMSE of holding the last measured error for `steps` steps."""
+    truth = _joined(r.series.error_v[steps:] for r in test)
+    held = _joined(r.series.error_v[:-steps] for r in test)
+    return MILLIVOLT_PER_VOLT * rmse(truth, held)
+
+
+def _interval_figures(
+    test: Sequence[_Judged], intervals: Sequence[Intervals | None], residuals: Sequence[Array], alpha: float
+) -> dict[str, float]:
+    """Scores over all test records together, so that a bin spread over records is one bin."""
+    known = [each for each in intervals if each is not None]
+    together = Intervals(
+        lower_v=_joined(each.lower_v for each in known),
+        upper_v=_joined(each.upper_v for each in known),
+        warm=_joined(each.warm for each in known),
+    )
+    scores = score(
+        together,
+        _joined(residuals),
+        alpha,
+        current_a=_joined(r.series.current_a for r in test),
+        soc=_joined(r.series.soc for r in test),
+        dt_s=test[0].series.dt_s,
+    )
+    return {
+        "nominal_pct": 100.0 * (1.0 - alpha),
+        "coverage_pct": 100.0 * scores.coverage,
+        "average_width_v": scores.mean_width_v,
+        "winkler_v": scores.interval_score_v,
+        "worst_bin_coverage_pct": 100.0 * scores.worst_bin_coverage,
+        "low_minutes_pct": 100.0 * scores.low_minutes,
+    }
+
+
+def _prediction(record: _Judged) -> Prediction:
+    model_v = record.series.model_v
+    free_v, step_v = model_v + record.free.error_v, model_v + record.one_step
+    bands, intervals = record.bands, record.intervals
+    return Prediction(
+        free_run_v=free_v,
+        free_run_lower_v=None if bands is None else free_v + bands.lower_v,
+        free_run_upper_v=None if bands is None else free_v + bands.upper_v,
+        one_step_v=step_v,
+        one_step_lower_v=None if intervals is None else step_v + intervals.lower_v,
+        one_step_upper_v=None if intervals is None else step_v + intervals.upper_v,
+        diverged_at=record.free.diverged_at,
+    )
+
+
+def _trace(role: Role, series: ErrorSeries, predictions: dict[str, Prediction], outside: Any) -> Trace:
+    return Trace(
+        name=series.name,
+        role=role,
+        time_s=series.time_s,
+        current_a=series.current_a,
+        soc=series.soc,
+        measured_v=series.model_v + series.error_v,
+        physics_v=series.model_v,
+        predictions=predictions,
+        outside=outside,
+    )
+
+
+def _without_first(residual: Array) -> Array:
+    return np.concatenate([[np.nan], residual[1:]])
+
+
+def _steps(records: Sequence[_Judged], horizon_s: float) -> int:
+    return max(1, round(horizon_s / records[0].series.dt_s))
+
+
+def _seconds(horizon_s: float) -> str:
+    return f"{horizon_s:g}"
+
+
+def _joined(arrays: Iterable[Any]) -> Any:
+    return np.concatenate(list(arrays))

@@ -1,0 +1,88 @@
+"""From a loaded experiment to the models that will be judged.
+
+Nothing here looks at `Split.test`.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from aesi.conformal import Calibrated, FreeRunBands
+from aesi.pipeline.experiment.candidate import genome_space
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.load import Loaded
+from aesi.records import ErrorModel
+from aesi.sparse import Candidate, Options, Problem
+from aesi.sparse.baselines import BASELINES, Tuning
+from aesi.sparse.yardsticks import Bare, Persistence
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A model ready to be judged.
+
+    terms : active terms (0 where counting them makes no sense).  seconds : what its own fit took.
+    intervals, bands : one step ahead, and in free run; None where they could not be calibrated (`notes`).
+    compared : the same intervals by other methods, by name (of the ensembles alone).
+    """
+
+    model: ErrorModel
+    terms: int
+    seconds: float
+    intervals: Calibrated | None = None
+    bands: FreeRunBands | None = None
+    compared: Mapping[str, Calibrated] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
+    """The search problem over the training records: library, resamples, factors."""
+    library, search = config.library, config.search
+    options = Options(
+        inputs=library.inputs,
+        p_c=library.p_c[1],
+        d=library.d[1],
+        factors=library.factors,
+        special=library.special,
+        mixed=library.mixed,
+        resamples=search.resamples,
+        block=search.block,
+        best=search.top_share,
+        horizon=search.horizon,
+        fold=search.fold,
+        regime=search.regime,
+        seed=config.seed,
+    )
+    return Problem.build(loaded.split, options)
+
+
+def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) -> tuple[Fitted, ...]:
+    """The chosen candidate's two ensembles, and the baselines that the experiment names, in its order."""
+    fitted = []
+    for name in config.models:
+        started = time.monotonic()
+        model, terms = _model(name, problem, chosen, config)
+        fitted.append(Fitted(model, terms, time.monotonic() - started))
+    return tuple(fitted)
+
+
+def _model(
+    name: str, problem: Problem, chosen: Candidate, config: ExperimentConfig
+) -> tuple[ErrorModel, int]:
+    if name == "AESI I":
+        return chosen.bagging, len(chosen.bagging.terms)
+    if name == "AESI II":
+        return chosen.stability, len(chosen.stability.terms)
+    if name == "ESPM":
+        return Bare(), 0
+    if name == "persistence":
+        return Persistence(), 0
+    baseline = BASELINES[name](problem, _tuning(problem, config))
+    return baseline, len(getattr(baseline, "terms", ()))
+
+
+def _tuning(problem: Problem, config: ExperimentConfig) -> Tuning:
+    search = config.search
+    return Tuning(config.seed, search.candidates, search.population, genome_space(problem, config))

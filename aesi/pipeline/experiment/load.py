@@ -1,0 +1,198 @@
+"""From an experiment's data section to error series by role: measure, simulate, subtract, cut.
+
+The physics model runs over each whole record from its own start, so that a piece cut out of the middle keeps
+the states that its history gave it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aesi.data import read_measurement
+from aesi.data.resample import to_even
+from aesi.errors import ConfigError, DataError
+from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
+from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
+from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.error_series import error_series
+from aesi.pipeline.product.initial_state import rest_soc
+from aesi.records import ROLES, ErrorSeries, Measurement, Role, Split
+from aesi.sparse import with_inputs
+
+if TYPE_CHECKING:
+    from aesi.data.virtual import Experiment
+
+
+@dataclass(frozen=True, eq=False)
+class Loaded:
+    """What an experiment works on.
+
+    digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
+    about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
+    """
+
+    cell: Cell
+    cell_name: str
+    effects: tuple[ActiveEffect, ...]
+    split: Split
+    soc0: dict[str, float]
+    digests: dict[str, str]
+    notes: tuple[str, ...]
+
+
+def load(config: ExperimentConfig) -> Loaded:
+    """Measurements, simulated and subtracted, by role.
+
+    Raises ConfigError or DataError naming the file and what to do; with a `fallback` section, data that cannot be
+    had are replaced by it and a note says so.
+    """
+    if not config.data.has_roles:
+        raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")
+    try:
+        return _load(config)
+    except DataError as error:
+        if config.fallback is None or config.data.kind != "catalogue":
+            raise
+        fallback = config.model_copy(
+            update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None}
+        )
+        note = f"Fallback: {error} The same job runs on the bundled virtual cell instead."
+        loaded = _load(fallback)
+        return replace(loaded, notes=(note, *loaded.notes))
+
+
+def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
+    """Pieces of a record that repeats a schedule; each training repeat gives its last share to validation."""
+    train, valid = [], []
+    for number in repeats.train:
+        piece = _repeat(series, repeats.period_s, number)
+        cut = round(len(piece) * (1 - repeats.valid_share))
+        train.append(piece.take(slice(0, cut)))
+        if cut < len(piece):
+            valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
+    test = [_repeat(series, repeats.period_s, number) for number in repeats.test]
+    return Split(tuple(train), tuple(valid), tuple(test))
+
+
+def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
+    start = series.time_s[0] + (number - 1) * period_s
+    low, high = np.searchsorted(series.time_s, [start, start + period_s])
+    if high - low < 2:
+        raise DataError(
+            f"{series.name} lasts {series.time_s[-1] - series.time_s[0]:.0f} s and has no repeat {number} of "
+            f"{period_s:g} s; take it out of `repeats`."
+        )
+    return series.take(slice(int(low), int(high)), f"repeat {number}")
+
+
+def _load(config: ExperimentConfig) -> Loaded:
+    path = cell_path(config)
+    given = declared_model(path)
+    cell, effects = given.cell, (*given.effects, *_effects(config))
+    sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
+    series: dict[str, ErrorSeries] = {}
+    soc0: dict[str, float] = {}
+    notes: list[str] = []
+    for name, (measurement, known_soc0) in sources.records.items():
+        declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
+        soc0[name] = rest_soc(cell, measurement) if declared is None else declared
+        even = to_even(measurement, config.data.dt_s)
+        notes.extend(even.notes)
+        run = simulate(
+            cell, even.time_s, even.current_a, soc0[name], effects, even.temperature_degc, config.data.hold
+        )
+        whole = error_series(even, run, config.data.dt_s)
+        # Before the record is cut: a filtered current has to know what came before a piece.
+        series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
+    return Loaded(
+        cell=cell,
+        cell_name=cell.name or path.stem,
+        effects=effects,
+        split=_split(config.data, series, sources.roles),
+        soc0=soc0,
+        digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
+        notes=tuple(notes),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sources:
+    """Every record once, with its state of charge at the start where that is known; and names by role."""
+
+    records: dict[str, tuple[Measurement, float | None]]
+    roles: dict[Role, tuple[str, ...]]
+
+
+def _sources(config: ExperimentConfig) -> _Sources:
+    data = config.data
+    where = locator(config)
+    roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
+    names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
+    records: dict[str, tuple[Measurement, float | None]] = {
+        name: (read_measurement(where(name), data.columns or None, data.sign), None)
+        for name in dict.fromkeys(names)
+    }
+    return _Sources(records, roles)
+
+
+def virtual_experiment(config: ExperimentConfig, cell: Path) -> Experiment:
+    """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
+    from aesi.data.virtual import DEFAULT_MIX, Laboratory, paper_experiment
+
+    wanted = config.data.virtual
+    effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
+    laboratory = Laboratory(cell, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
+    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c)
+
+
+def _virtual(config: ExperimentConfig, cell: Path) -> _Sources:
+    experiment = virtual_experiment(config, cell)
+    measurements: dict[Role, tuple[Measurement, ...]] = {role: getattr(experiment, role) for role in ROLES}
+    return _Sources(
+        records={m.name: (m, experiment.soc0[m.name]) for role in ROLES for m in measurements[role]},
+        roles={role: tuple(m.name for m in measurements[role]) for role in ROLES},
+    )
+
+
+def _split(data: DataConfig, series: dict[str, ErrorSeries], roles: dict[Role, tuple[str, ...]]) -> Split:
+    if data.repeats:
+        return cut_repeats(next(iter(series.values())), data.repeats)
+    train, valid, test = (tuple(series[name] for name in roles[role]) for role in ROLES)
+    return Split(train, valid, test)
+
+
+def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
+    from aesi.physics.effects import CATALOGUE
+
+    unknown = [name for name in config.cell.effects if name not in CATALOGUE]
+    if unknown:
+        raise ConfigError(f"cell.effects: there is no effect {unknown[0]!r}; `aesi effects` lists them.")
+    return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
+
+
+def cell_path(config: ExperimentConfig) -> Path:
+    """The BPX file of the experiment's cell. Raises ConfigError or DataError where there is none."""
+    if config.cell.bpx != "catalogue":
+        return config.path(config.cell.bpx)
+    from aesi.data.catalogue import locate
+
+    if config.data.set is None:
+        raise ConfigError("cell.bpx: catalogue needs data.set; give the path of a BPX file.")
+    return locate(config.data.set, "cell.bpx.json")
+
+
+def locator(config: ExperimentConfig) -> Callable[[str], Path]:
+    """Finds the file of a record by its name in the experiment."""
+    if config.data.kind == "files":
+        return config.path
+    from aesi.data.catalogue import locate
+
+    assert config.data.set is not None  # the schema of kind: catalogue
+    return partial(locate, config.data.set)

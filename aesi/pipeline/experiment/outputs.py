@@ -1,0 +1,181 @@
+"""What `aesi run` leaves in its folder: report.html, figures/, tables.md, tables.tex, model/ and summary.json."""
+
+from __future__ import annotations
+
+import json
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.evaluate import Evaluation
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.notes import together
+from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.report import tables, write_figures, write_run_report
+from aesi.pipeline.report.figures import paper_figures
+from aesi.pipeline.report.views import BootstrapView, RunView, Trace
+from aesi.sparse import Candidate, Problem, SparseModel
+from aesi.sparse.ranking import svd_ranking
+
+SCHEMA = "aesi.summary/1"
+VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
+ENSEMBLES = ("AESI I", "AESI II")
+PHYSICS = "ESPM"
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """All that an experiment ended with.
+
+    candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
+    chosen : the candidate the models come from.  run_id : of the tracked run.  seconds : wall time so far.
+    failed : how many candidates more were evaluated and came to nothing.
+    """
+
+    config: ExperimentConfig
+    loaded: Loaded
+    problem: Problem
+    chosen: Candidate
+    candidates: Sequence[Mapping[str, Any]]
+    fitted: Sequence[Fitted]
+    evaluation: Evaluation
+    run_id: str
+    seconds: float
+    failed: int = 0
+
+    @property
+    def best(self) -> str:
+        """The ensemble with the lower free-run error on the validation records; the test chooses nothing."""
+        rows = [row for row in self.evaluation.rows if row["name"] in ENSEMBLES]
+        if not rows:
+            return str(self.evaluation.rows[-1]["name"])
+        return str(max(rows, key=lambda row: row["free_run"].get("valid_mser_pct", float("-inf")))["name"])
+
+
+def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
+    """Write everything below `folder`; returns the content of summary.json."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = [finite({**row, "name": published(row["name"])}) for row in result.evaluation.rows]
+    summary = {
+        "schema": SCHEMA,
+        "experiment": result.config.name,
+        "mlflow_run_id": result.run_id,
+        "candidates": len(result.candidates) + result.failed,
+        "chosen": published(result.best),
+        "seed": result.config.seed,
+        "cell": result.loaded.cell_name,
+        "notes": list(notes(result)),
+        "models": rows,
+    }
+    hybrid(result).save(folder / "model")
+    for format in ("md", "tex"):
+        (folder / f"tables.{format}").write_text(tables.render(rows, format), encoding="utf-8")
+    view = run_view(result, rows)
+    write_run_report(folder / "report.html", view)
+    write_figures(folder / "figures" / "paper.html", f"{view.experiment}: figures", paper_figures(view))
+    text = json.dumps(summary, indent=1, allow_nan=False)
+    (folder / "summary.json").write_text(text, encoding="utf-8")
+    return summary
+
+
+def notes(result: Result) -> tuple[str, ...]:
+    """What a reader should know: of the data, of terms left out, of intervals that could not be calibrated."""
+    without_intervals = (note for one in result.fitted for note in one.notes)
+    return together((*result.loaded.notes, *result.problem.notes, *without_intervals))
+
+
+def published(name: str) -> str:
+    """A model of the error as the hybrid that it makes with the physics; the physics alone keeps its name."""
+    return name if name == PHYSICS else f"{PHYSICS} + {name}"
+
+
+def _published_trace(trace: Trace) -> Trace:
+    return replace(trace, predictions={published(name): each for name, each in trace.predictions.items()})
+
+
+def hybrid(result: Result) -> HybridModel:
+    """The product: physics, effects, the chosen ensemble and its bands."""
+    one = next(fitted for fitted in result.fitted if fitted.model.name == result.best)
+    return HybridModel(
+        cell=result.loaded.cell,
+        effects=result.loaded.effects,
+        correction=one.model if isinstance(one.model, SparseModel) else None,
+        intervals=one.intervals,
+        bands=one.bands,
+        dt_s=result.config.data.dt_s,
+        hold=result.config.data.hold,
+        soc0=next(iter(result.loaded.soc0.values()), None),
+    )
+
+
+def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
+    """What the report shows."""
+    counts = result.problem.counts
+    genome = result.chosen.genome
+    options = result.problem.options
+    return RunView(
+        experiment=result.config.name,
+        note=result.config.note,
+        cell=result.loaded.cell_name,
+        chosen=published(result.best),
+        models=tuple(rows),
+        traces=tuple(_published_trace(trace) for trace in result.evaluation.traces),
+        candidates=tuple(result.candidates),
+        terms=tuple(_terms(result)),
+        bootstrap=BootstrapView(
+            n=counts.shape[1], block=options.block or 0, unique_fraction=(counts > 0).mean(axis=1)
+        ),
+        settings={
+            "lambda1": f"{genome.lambda1:.3g}",
+            "lambda2": f"{genome.lambda2:.3g}",
+            "tau": f"{genome.tau:.2f}",
+            "p_c": str(genome.p_c),
+            "d": str(genome.d),
+            "feedback of the error": "yes" if genome.feedback else "no",
+        },
+        notes=notes(result),
+        versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
+        mlflow_run_id=result.run_id,
+        seconds=result.seconds,
+    )
+
+
+def finite(value: Any) -> Any:
+    """The value for JSON: numbers that are not finite become null, tuples lists."""
+    if isinstance(value, Mapping):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and value - value != 0:
+        return None
+    return value
+
+
+def _terms(result: Result) -> list[dict[str, Any]]:
+    """Terms of both ensembles; the importance is that in the ensemble the product is made of."""
+    chosen = result.chosen
+    bagging, stability = chosen.bagging.coefficient_table(), chosen.stability.coefficient_table()
+    best = chosen.stability if result.best == chosen.stability.name else chosen.bagging
+    importance = dict(svd_ranking(best, result.problem.split.train))
+    inclusion: dict[str, float] = {}
+    for model in (chosen.stability, chosen.bagging):
+        if model.inclusion is not None:
+            inclusion |= dict(zip(model.terms, model.inclusion.tolist(), strict=True))
+    names = dict.fromkeys([*bagging, *stability])
+    return [
+        {
+            "term": name,
+            "importance": importance.get(name),
+            "bagging": bagging.get(name),
+            "stability": stability.get(name),
+            "inclusion": inclusion.get(name),
+        }
+        for name in names
+    ]

@@ -1,0 +1,182 @@
+"""The product: ESPM, the effects added to it, the sparse correction of what is left, and prediction bands.
+
+A record is brought to the step of the correction, predicted there in free run or one step ahead, and brought
+back to its own rows. How a model is kept on disk: `aesi.pipeline.product.model_folder`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
+from aesi.data.resample import is_even, to_even
+from aesi.errors import DataError, InputError
+from aesi.numerics.typing import Array
+from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics.effects import active_effect
+from aesi.pipeline.product.error_series import error_series
+from aesi.pipeline.product.initial_state import rest_soc
+from aesi.pipeline.product.model_folder import part_file, read_model, write_model
+from aesi.pipeline.product.prediction import Prediction
+from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
+from aesi.sparse import SparseModel
+
+
+@dataclass(frozen=True, eq=False)
+class HybridModel:
+    """ESPM + effects + correction + intervals; the last two may be absent.
+
+    dt_s : s, the step of the correction; records sampled otherwise are brought to it and back.
+    """
+
+    cell: Cell
+    effects: tuple[ActiveEffect, ...] = ()
+    correction: SparseModel | None = None
+    intervals: Calibrated | None = None
+    bands: FreeRunBands | None = None
+    dt_s: float = 1.0
+    hold: Hold = "linear"
+    soc0: float | None = None
+
+    def predict(
+        self,
+        time_s: Array,
+        current_a: Array,
+        soc0: float | None = None,
+        voltage_v: Array | None = None,
+        temperature_degc: Array | None = None,
+        error0_v: float = 0.0,
+    ) -> Prediction:
+        """Voltage under a current, with its band.
+
+        time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
+        sample predicted from those before it; None: free run, from the voltage error `error0_v` at the start.
+        soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
+        the model's own.
+
+        Raises DataError where the record cannot be simulated or soc0 is unknown.
+        """
+        measured = np.full(len(time_s), np.nan) if voltage_v is None else np.asarray(voltage_v, dtype=float)
+        record = Measurement(
+            np.asarray(time_s, float), np.asarray(current_a, float), measured, temperature_degc, "the record"
+        )
+        if voltage_v is not None and not np.isfinite(measured).all():
+            row = int(np.flatnonzero(~np.isfinite(measured))[0])
+            raise DataError(
+                f"voltage_v has no value in row {row} ({record.time_s[row]:g} s); predict the parts before and after "
+                "the gap as records of their own, or leave voltage_v out for a free run."
+            )
+        soc0 = self._soc0(record, soc0, voltage_v is not None)
+        even = self._even(record)
+        series = self._series(even, soc0)
+        if voltage_v is None:
+            prediction = self._free_run(series, error0_v)
+        else:
+            prediction = self._one_step(series)
+        return prediction if even is record else self._back(prediction, record, soc0)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write the model to a folder, made where it is missing; returns the folder."""
+        folder = Path(folder)
+        parts: dict[str, Any] = {
+            "cell.bpx": self.cell.to_bpx(),
+            "effects": [effect.to_dict() for effect in self.effects],
+        }
+        for name in ("correction", "intervals", "bands"):
+            part = getattr(self, name)
+            if part is not None:
+                parts[name] = part.to_dict()
+        write_model(folder, {"dt_s": self.dt_s, "hold": self.hold, "soc0": self.soc0}, parts)
+        return folder
+
+    @staticmethod
+    def load(folder: str | Path) -> HybridModel:
+        """Read a model folder. Raises InputError naming the file that is missing or not as written by `save`."""
+        folder = Path(folder)
+        head, parts = read_model(folder)
+        correction, intervals, bands = (parts.get(name) for name in ("correction", "intervals", "bands"))
+        try:
+            return HybridModel(
+                cell=Cell.from_bpx(part_file(folder, "cell.bpx")),
+                effects=tuple(active_effect(content) for content in parts.get("effects", ())),
+                correction=SparseModel.from_dict(correction) if correction else None,
+                intervals=calibrated_from_dict(intervals) if intervals else None,
+                bands=FreeRunBands.from_dict(bands) if bands else None,
+                dt_s=float(head["dt_s"]),
+                hold=head["hold"],
+                soc0=head["soc0"],
+            )
+        except (KeyError, TypeError) as error:
+            raise InputError(f"{folder} is not a whole model: {error}; save it again.") from None
+
+    def _soc0(self, record: Measurement, soc0: float | None, measured: bool) -> float:
+        if soc0 is not None:
+            return soc0
+        if measured:
+            return rest_soc(self.cell, record)
+        if self.soc0 is None:
+            raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
+        return self.soc0
+
+    def _even(self, record: Measurement) -> Measurement:
+        """The record at the correction's step, or itself where that is nothing to do."""
+        if self.correction is None or is_even(record.time_s, self.dt_s):
+            return record
+        return to_even(record, self.dt_s)
+
+    def _series(self, record: Measurement, soc0: float) -> ErrorSeries:
+        run = simulate(
+            self.cell, record.time_s, record.current_a, soc0, self.effects, record.temperature_degc, self.hold
+        )
+        return error_series(record, run, self.dt_s)
+
+    def _free_run(self, series: ErrorSeries, error0_v: float) -> Prediction:
+        n = len(series)
+        run = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool))
+        if self.correction is not None:
+            run = self.correction.free_run(series, error0_v)
+        low = high = np.full(n, np.nan)
+        if self.bands is not None:
+            reach = 0.0 if self.correction is None else self.correction.reach(series, error0_v=error0_v)
+            low, high = self.bands.along(self.dt_s, series.current_a, series.soc, run.excess, reach)
+        alpha = None if self.bands is None else self.bands.alpha
+        return Prediction.of(series, run.error_v, low, high, run.outside, alpha)
+
+    def _one_step(self, series: ErrorSeries) -> Prediction:
+        n = len(series)
+        if self.correction is None:
+            none = np.full(n, np.nan)
+            return Prediction.of(series, np.zeros(n), none, none, np.zeros(n, dtype=bool), None)
+        error = self.correction.one_step(series)
+        error[0] = 0.0  # nothing was measured before the first sample
+        low = high = np.full(n, np.nan)
+        if self.intervals is not None:
+            residual = series.error_v - error
+            residual[0] = np.nan
+            band = self.intervals.intervals(residual, series.current_a)
+            low, high = band.lower_v, band.upper_v
+        alpha = None if self.intervals is None else self.intervals.alpha
+        return Prediction.of(series, error, low, high, self.correction.outside(series), alpha)
+
+    def _back(self, prediction: Prediction, record: Measurement, soc0: float) -> Prediction:
+        """Onto the record's own rows: the physics simulated there, the correction and its band interpolated."""
+        physics = self._series(record, soc0)
+        time = record.time_s
+
+        def onto(values: Array) -> Array:
+            return np.interp(time, prediction.time_s, values)
+
+        return replace(
+            prediction,
+            time_s=time,
+            voltage_v=physics.model_v + onto(prediction.voltage_v - prediction.physics_v),
+            lower_v=physics.model_v + onto(prediction.lower_v - prediction.physics_v),
+            upper_v=physics.model_v + onto(prediction.upper_v - prediction.physics_v),
+            physics_v=physics.model_v,
+            soc=physics.soc,
+            outside=onto(prediction.outside.astype(float)) > 0,
+        )

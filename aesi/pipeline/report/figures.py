@@ -1,0 +1,107 @@
+"""The figures of the paper, from the view of one run: name -> plotly figure, in the paper's order.
+
+Figures without data in the view (no bootstrap, no intervals, no validation record) are left out.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.pipeline.report import style
+from aesi.pipeline.report.plots import ensemble, maps, records
+from aesi.pipeline.report.views import RunView, Trace
+from aesi.records import ROLES
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+ZOOM_S = 120.0
+"""Length of the zoom on the prediction intervals."""
+
+
+def paper_figures(view: RunView) -> dict[str, Figure]:
+    """All figures of the paper that the view has data for.
+
+    Keys: bootstrap_coverage, profile_{current,voltage}, error_map_espm_{train,valid,test},
+    error_map_{before,after}, voltage_{train,valid,test}, violin, ranking, intervals_<n>, intervals_<n>_zoom.
+    """
+    figures: dict[str, Figure | None] = {}
+    if view.bootstrap is not None:
+        figures["bootstrap_coverage"] = ensemble.bootstrap_figure(view.bootstrap)
+    if view.traces:
+        for quantity in ("current", "voltage"):
+            figures[f"profile_{quantity}"] = records.profile_figure(view.traces, quantity)
+    figures |= physics_maps(view)
+    figures |= before_and_after_maps(view)
+    for role in ROLES:
+        if view.of(role):
+            figures[f"voltage_{role}"] = records.voltage_figure(view.of(role), view.chosen, view.physics)
+    figures["violin"] = violin(view)
+    figures["ranking"] = ensemble.importance_figure(view.terms)
+    for i, model in enumerate(predicted_models(view), start=1):
+        figures[f"intervals_{i}"] = records.interval_figure(view.of("test"), model)
+        figures[f"intervals_{i}_zoom"] = records.interval_figure(view.of("test"), model, ZOOM_S)
+    return {name: fig for name, fig in figures.items() if fig is not None}
+
+
+def physics_maps(view: RunView) -> dict[str, Figure | None]:
+    """Mean signed error of the physics model over (current, SOC), one map a role, one colour range."""
+    parts = {role: _joined(view.of(role)) for role in ROLES if view.of(role)}
+    limit = max(
+        (maps.shared_limit(current, soc, [error], False) for current, soc, error in parts.values()),
+        default=None,
+    )
+    names = {"train": "training set", "valid": "validation set", "test": "test set"}
+    return {
+        f"error_map_espm_{role}": maps.map_figure(
+            current, soc, error, f"Error of the {view.physics}, {names[role]}", False, limit
+        )
+        for role, (current, soc, error) in parts.items()
+    }
+
+
+def before_and_after_maps(view: RunView) -> dict[str, Figure | None]:
+    """Mean absolute error on the test records, physics alone and with the chosen model in free run."""
+    tested = [t for t in view.of("test") if view.chosen in t.predictions]
+    if not tested:
+        return {}
+    current, soc, before = _joined(tested)
+    after = np.concatenate([t.measured_v - t.predictions[view.chosen].free_run_v for t in tested])
+    limit = maps.shared_limit(current, soc, [before, after], True)
+    return {
+        "error_map_before": maps.map_figure(current, soc, before, f"{view.physics}, test set", True, limit),
+        "error_map_after": maps.map_figure(
+            current, soc, after, f"{view.chosen} in free run, test set", True, limit
+        ),
+    }
+
+
+def violin(view: RunView) -> Figure | None:
+    """Squared residuals in free run on the test records: the physics model and every hybrid."""
+    tested = view.of("test")
+    if not tested:
+        return None
+    residuals = {view.physics: _joined(tested)[2]}
+    for name in predicted_models(view):
+        parts = [t.measured_v - t.predictions[name].free_run_v for t in tested if name in t.predictions]
+        residuals[name] = np.concatenate(parts)
+    return maps.violin_figure(residuals, style.model_colours(list(residuals), view.physics))
+
+
+def predicted_models(view: RunView) -> list[str]:
+    """Names of the hybrid models that predicted the test records, the chosen one first."""
+    names = dict.fromkeys(name for trace in view.of("test") for name in trace.predictions)
+    names.pop(view.physics, None)
+    return sorted(names, key=lambda name: name != view.chosen)
+
+
+def _joined(traces: tuple[Trace, ...] | list[Trace]) -> tuple[Array, Array, Array]:
+    """Current, SOC and error of the physics model over several records."""
+    return (
+        np.concatenate([t.current_a for t in traces]),
+        np.concatenate([t.soc for t in traces]),
+        np.concatenate([t.measured_v - t.physics_v for t in traces]),
+    )

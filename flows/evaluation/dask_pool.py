@@ -1,0 +1,156 @@
+"""Candidates on Dask: a cluster of processes on this machine, or the scheduler at an address.
+
+A worker that is lost in mid-candidate gives it back to the scheduler, which hands it to another. Each worker
+builds the problem once, from the experiment, and keeps it.
+"""
+
+from __future__ import annotations
+
+import time
+from functools import lru_cache
+from queue import Empty, Queue
+from typing import Any
+
+from aesi.errors import AesiError, InputError
+from aesi.records import Failed
+from flows.base import codec
+from flows.evaluation.pool import guarded
+from flows.evaluation.scorer_recipe import build_scorer
+
+CONNECT_S = 15
+OWN_CLUSTER = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.tick.interval": "500ms",
+    "distributed.worker.memory.monitor-interval": "1s",
+    "distributed.nanny.pre-spawn-environ.MALLOC_TRIM_THRESHOLD_": str(1 << 30),
+    "distributed.nanny.pre-spawn-environ.MALLOC_MMAP_THRESHOLD_": str(1 << 30),
+    "distributed.nanny.pre-spawn-environ.MALLOC_ARENA_MAX": "1",
+}
+"""A cluster of one's own shows no dashboard, and its monitors would take 3 % of each core. Memory is kept between
+candidates: Dask's default gives it back after each array, and taking it again costs a third of a candidate."""
+
+
+def connect(address: str | None, workers: int) -> tuple[Any, Any]:
+    """A client of the scheduler at an address, or of a new cluster of processes on this machine, and that cluster.
+
+    Raises InputError without Dask, AesiError where the scheduler does not answer.
+    """
+    try:
+        import dask
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise InputError(
+            f"the runner dask needs Dask, which is not installed ({error}): pip install 'dask[distributed]', "
+            "or use the runner local."
+        ) from None
+    cluster = None
+    if address is None:
+        with dask.config.set(OWN_CLUSTER):
+            cluster = LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                host="127.0.0.1",
+                silence_logs=40,
+            )
+    try:
+        return Client(cluster or address, timeout=CONNECT_S, set_as_default=False), cluster
+    except (OSError, TimeoutError, ValueError) as error:
+        raise AesiError(
+            f"the Dask scheduler {address} does not answer ({error}); start it with `dask scheduler`, or "
+            "leave out --address for a cluster on this machine."
+        ) from None
+
+
+class DaskPool:
+    """See `flows.evaluation.pool.Pool`.
+
+    content, base : the experiment as JSON, and the folder its paths start from (which the workers must see).
+    """
+
+    def __init__(self, content: str, base: str, address: str | None, workers: int, timeout_s: float) -> None:
+        self._content, self._base, self._timeout_s = content, base, timeout_s
+        self._client, self._cluster = connect(address, workers)
+        self._futures: dict[Any, tuple[Any, float]] = {}
+        self._finished: Queue[Any] = Queue()
+
+    @property
+    def idle(self) -> int:
+        """One candidate a thread, and one waiting for each, so that no worker pauses between two."""
+        return max(0, 2 * max(1, sum(self._client.ncores().values())) - self.busy)
+
+    @property
+    def busy(self) -> int:
+        return len(self._futures)
+
+    def start(self, tag: Any, genome: Any) -> None:
+        """Hand a genome to the scheduler."""
+        data = codec.dumps(genome)
+        future = self._client.submit(evaluate_bytes, self._content, self._base, data, pure=False)
+        self._futures[future.key] = (tag, time.monotonic())
+        future.add_done_callback(self._finished.put)
+
+    def collect(self, timeout_s: float) -> list[tuple[Any, Any]]:
+        """(tag, outcome) of what has finished, after at most `timeout_s`."""
+        found = []
+        try:
+            future = self._finished.get(timeout=timeout_s)
+            while True:
+                entry = self._futures.pop(future.key, None)
+                if entry is not None:
+                    found.append((entry[0], _outcome(future)))
+                future = self._finished.get_nowait()
+        except Empty:
+            pass
+        return found + self._overdue()
+
+    def close(self) -> None:
+        """Leave the scheduler; end the cluster where it is ours."""
+        self._client.close(timeout=5)
+        if self._cluster is not None:
+            self._cluster.close(timeout=10)
+
+    def processor_s(self) -> dict[str, float]:
+        """Processor seconds that each worker has used since it started."""
+        return dict(self._client.run(time.process_time))
+
+    def _overdue(self) -> list[tuple[Any, Any]]:
+        """Candidates past their time: their worker is restarted, since a thread cannot be stopped."""
+        now = time.monotonic()
+        late = [key for key, (_, since) in self._futures.items() if now - since > self._timeout_s]
+        if not late:
+            return []
+        processing = self._client.processing()
+        running = {key: worker for worker, keys in processing.items() for key in list(keys)[:1]}
+        found = []
+        for key in late:
+            if key not in running:  # it only waits behind another
+                self._futures[key] = (self._futures[key][0], now)
+                continue
+            tag, _ = self._futures.pop(key)
+            found.append((tag, Failed(f"took longer than {self._timeout_s:g} s")))
+            self._client.restart_workers([running[key]], raise_for_error=False)
+        return found
+
+
+def evaluate_bytes(content: str, base: str, genome: bytes) -> bytes:
+    """What runs on a worker: genome in, outcome out, both without pickle."""
+    return codec.dumps(guarded(_scorer(content, base), codec.loads(genome)))
+
+
+@lru_cache(maxsize=1)
+def _scorer(content: str, base: str) -> Any:
+    return build_scorer(content, base)
+
+
+def _outcome(future: Any) -> Any:
+    if future.status == "finished":
+        return codec.loads(future.result())
+    if future.status == "cancelled":
+        return Failed("was cancelled by the scheduler")
+    error = future.exception()
+    if isinstance(error, AesiError):  # the experiment cannot be loaded there: no candidate ever will
+        raise error
+    return Failed(f"its worker was lost ({type(error).__name__}: {error})")

@@ -1,0 +1,103 @@
+"""Evaluate a generation: look up what is known, claim what is not, take from others what they finish."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flows.base import codec, fingerprint
+from flows.evaluation.outcome_store import Outcomes
+from flows.evaluation.pool import Pool
+
+POLL_S = 0.2
+"""How often candidates that another process has claimed are looked for."""
+
+
+@dataclass
+class Tally:
+    """Where the outcomes came from."""
+
+    evaluated: int = 0
+    found: int = 0
+    seconds: float = 0.0
+
+
+class Evaluation:
+    """The candidates of one study. Called with a generation, yields (position, outcome) as they come.
+
+    study : content key of the problem, so that the same genome on other data is another candidate.
+    reuse : False evaluates what an earlier run has stored; what this one stores is still shared.
+    """
+
+    def __init__(
+        self,
+        pool: Pool,
+        outcomes: Outcomes,
+        study: str,
+        say: Callable[[str], None],
+        tally: Tally,
+        reuse: bool = True,
+    ) -> None:
+        self._pool = pool
+        self._outcomes = outcomes
+        self._study = study
+        self._say = say
+        self._reuse = reuse
+        self._fresh: set[str] = set()
+        self.tally = tally
+
+    def key(self, genome: Any) -> str:
+        """Content key of a candidate of this study."""
+        return fingerprint.key(self._study, codec.dumps(genome))
+
+    def __call__(self, genomes: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+        started = time.monotonic()
+        waiting: dict[str, list[int]] = {}
+        for position, genome in enumerate(genomes):
+            waiting.setdefault(self.key(genome), []).append(position)  # twins are evaluated once
+        working: set[str] = set()
+        while waiting:
+            for key in [k for k in waiting if k not in working]:
+                outcome = self._stored(key)
+                if outcome is None and self._pool.idle and self._outcomes.claim(key):
+                    outcome = self._stored(key)  # finished between the look and the claim
+                    if outcome is None:
+                        self._pool.start(key, genomes[waiting[key][0]])
+                        working.add(key)
+                        continue
+                    self._outcomes.release(key)
+                if outcome is not None:
+                    self.tally.found += 1
+                    yield from ((position, outcome) for position in waiting.pop(key))
+            for key, outcome in self._pool.collect(POLL_S):
+                self._store(key, outcome)
+                working.discard(key)
+                self.tally.evaluated += 1
+                yield from ((position, outcome) for position in waiting.pop(key))
+            if waiting and not working:
+                time.sleep(POLL_S)
+        self.tally.seconds += time.monotonic() - started
+
+    def _stored(self, key: str) -> Any:
+        if not self._reuse and key not in self._fresh:
+            return None
+        data = self._outcomes.get(key)
+        if data is None:
+            return None
+        try:
+            return codec.loads(data)
+        except codec.Damaged as error:
+            self._say(f"cache: the stored candidate {key[:8]} is damaged ({error}); it is evaluated again.")
+            self._outcomes.discard(key)
+            return None
+
+    def _store(self, key: str, outcome: Any) -> None:
+        try:
+            self._outcomes.put(key, codec.dumps(outcome))
+            self._fresh.add(key)
+        except OSError as error:
+            # The run itself needs no cache; only a resumed one would evaluate this candidate again.
+            self._say(f"cache: candidate {key[:8]} could not be stored ({error.strerror or error}).")
+        self._outcomes.release(key)

@@ -1,0 +1,173 @@
+"""Processes that evaluate candidates and may be lost: a hang, a crash or a memory hog costs one candidate.
+
+On Linux they are forks, so the problem (the library, its Gram matrices) is shared, not copied, and replacing
+a lost process costs milliseconds. Elsewhere each builds the problem for itself.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from typing import Any
+
+from aesi.records import Failed
+from flows.evaluation.pool import Evaluate, guarded
+
+WATCH_S = 1.0
+MEGABYTE = 1 << 20
+
+
+@dataclass
+class _Process:
+    process: Any
+    pipe: Connection
+    tag: Any = None
+    deadline_s: float | None = None  # of the candidate in work, on the monotonic clock
+
+
+class LocalPool:
+    """`workers` processes of this machine.
+
+    build : makes the evaluating function, inside the process.
+    timeout_s : wall time after which a candidate has failed and its process is replaced.
+    memory_mb : address space a process may take beyond what it starts with (Linux).
+    """
+
+    def __init__(
+        self, build: Callable[[], Evaluate], workers: int, timeout_s: float, memory_mb: float
+    ) -> None:
+        method = "fork" if sys.platform == "linux" else "spawn"
+        self._context = multiprocessing.get_context(method)
+        self._build = build
+        self._timeout_s = timeout_s
+        self._memory_mb = memory_mb
+        self._processes = [self._spawn() for _ in range(workers)]
+
+    @property
+    def idle(self) -> int:
+        return sum(process.deadline_s is None for process in self._processes)
+
+    @property
+    def busy(self) -> int:
+        return len(self._processes) - self.idle
+
+    def start(self, tag: Any, genome: Any) -> None:
+        """Evaluate the genome in an idle process; its outcome will carry the tag."""
+        for i, one in enumerate(self._processes):
+            if one.deadline_s is not None:
+                continue
+            try:
+                one.pipe.send(genome)
+            except OSError:  # it died while idle
+                one = self._processes[i] = self._replace(one)
+                one.pipe.send(genome)
+            one.tag, one.deadline_s = tag, time.monotonic() + self._timeout_s
+            return
+        raise RuntimeError("no process is idle; collect before starting more")
+
+    def collect(self, timeout_s: float) -> list[tuple[Any, Any]]:
+        """(tag, outcome) of what has finished or been lost, after at most `timeout_s`."""
+        busy = [one for one in self._processes if one.deadline_s is not None]
+        if not busy:
+            return []
+        nearest = min(one.deadline_s for one in busy if one.deadline_s is not None)
+        ready = wait([one.pipe for one in busy], timeout=max(0.0, min(timeout_s, nearest - time.monotonic())))
+        found = []
+        for i, one in enumerate(self._processes):
+            if one.deadline_s is None:
+                continue
+            if one.pipe in ready:
+                found.append((one.tag, self._receive(i, one)))
+            elif time.monotonic() >= one.deadline_s:
+                found.append((one.tag, Failed(f"took longer than {self._timeout_s:g} s")))
+                self._processes[i] = self._replace(one)
+        return found
+
+    def close(self) -> None:
+        """End all processes at once; what they worked on is lost."""
+        for one in self._processes:
+            _end(one)
+        self._processes = []
+
+    def _receive(self, i: int, one: _Process) -> Any:
+        try:
+            outcome = one.pipe.recv()
+        except (EOFError, OSError):
+            one.process.join(5)
+            self._processes[i] = self._replace(one)
+            return Failed(f"its process was lost ({_how(one.process.exitcode)})")
+        one.tag = one.deadline_s = None
+        return outcome
+
+    def _replace(self, one: _Process) -> _Process:
+        _end(one)
+        return self._spawn()
+
+    def _spawn(self) -> _Process:
+        ours, theirs = self._context.Pipe()
+        process = self._context.Process(
+            target=_serve, args=(theirs, self._build, self._memory_mb, os.getpid()), daemon=True
+        )
+        with warnings.catch_warnings():
+            # The forks run numpy code alone and leave by os._exit, so locks of other threads do not matter.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            process.start()
+        theirs.close()
+        return _Process(process, ours)
+
+
+def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, parent: int) -> None:
+    """Life of a process: build, then one genome in and one outcome out, until the other end is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
+    _limit_memory(memory_mb)
+    evaluate = build()
+    while True:
+        try:
+            genome = pipe.recv()
+            pipe.send(guarded(evaluate, genome))
+        except (EOFError, OSError):
+            os._exit(0)
+
+
+def _leave_with(parent: int) -> None:
+    """A killed parent cannot tell its children; they notice that they were adopted."""
+    while os.getppid() == parent:
+        time.sleep(WATCH_S)
+    os._exit(1)
+
+
+def _limit_memory(memory_mb: float) -> None:
+    if sys.platform != "linux":
+        return
+    import resource
+
+    with open("/proc/self/statm") as statm:
+        now = int(statm.read().split()[0]) * resource.getpagesize()
+    limit = now + int(memory_mb * MEGABYTE)
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if hard == resource.RLIM_INFINITY or limit < hard:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+
+
+def _end(one: _Process) -> None:
+    one.pipe.close()
+    if one.process.is_alive():
+        one.process.kill()
+    one.process.join(5)
+
+
+def _how(exitcode: int | None) -> str:
+    if exitcode is not None and exitcode < 0:
+        name = signal.Signals(-exitcode).name
+        return f"{name}, perhaps out of memory" if name == "SIGKILL" else name
+    return f"exit code {exitcode}"

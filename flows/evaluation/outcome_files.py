@@ -1,0 +1,57 @@
+"""Outcomes of candidates as files below a folder, claimed by file locks that the kernel drops with their process."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from flows.base.files import write_atomically
+
+
+class FileOutcomes:
+    """One file a result below `folder`; claims are file locks, which the kernel drops with their process."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._locks: dict[str, FileLock] = {}
+
+    def get(self, key: str) -> bytes | None:
+        try:
+            return self._path(key).read_bytes()
+        except FileNotFoundError:
+            return None
+
+    def put(self, key: str, data: bytes) -> None:
+        write_atomically(self._path(key), data)
+
+    def discard(self, key: str) -> None:
+        self._path(key).unlink(missing_ok=True)
+
+    def claim(self, key: str) -> bool:
+        if key in self._locks:
+            return True
+        path = self._folder / "claims" / key
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lock = FileLock(path, thread_local=False)
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            return False
+        self._locks[key] = lock
+        return True
+
+    def release(self, key: str) -> None:
+        lock = self._locks.pop(key, None)
+        if lock is not None:
+            with suppress(PermissionError):  # Windows keeps a file that is open
+                Path(lock.lock_file).unlink(missing_ok=True)
+            lock.release()
+
+    def close(self) -> None:
+        for key in list(self._locks):
+            self.release(key)
+
+    def _path(self, key: str) -> Path:
+        return self._folder / key[:2] / f"{key}.bin"

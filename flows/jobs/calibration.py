@@ -1,0 +1,36 @@
+"""`aesi calibrate`: fit the model's own parameters, write the cell and the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from aesi.pipeline.calibrate import calibrate_files
+from aesi.pipeline.notes import together
+from aesi.records import Measurement
+from flows.base import environment
+from flows.base.console import Console
+
+
+def calibrate(
+    cell: Path, measurements: Sequence[Measurement], out: Path, soc0: float | None = None, seed: int = 0
+) -> dict[str, Any]:
+    """Calibrate and say what came of it; returns the report."""
+    environment.prepare()
+    console = Console()
+    console.say(f"Fitting the model's own parameters to {', '.join(m.name for m in measurements)} ...")
+    read = together(note for m in measurements for note in m.notes)
+    for note in read:
+        console.say(note)
+    content = calibrate_files(cell, measurements, out, soc0, seed)
+    for row in content["files"]:
+        console.say(
+            f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after"
+        )
+    for text in (*content["undetermined"], *(note for note in content["notes"] if note not in read)):
+        console.say(f"  {text}")
+    if content["at_bounds"]:
+        console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")
+    console.say(f"Written: {out} and {out.with_suffix('.report.md')}")
+    return content

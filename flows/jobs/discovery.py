@@ -1,0 +1,207 @@
+"""`aesi discover` as a flow: trace the residual, track every hypothesis, write the finding.
+
+cell and data -> hypotheses -> verdict -> discovery.json, report, model
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, catalogue, run_case, write_discovery
+from aesi.pipeline.product.declared import declared_model
+from aesi.records import digest
+from flows.base import environment
+from flows.base.console import Console, duration
+
+if TYPE_CHECKING:
+    from aesi.tracer import Discovery
+    from aesi.tracer.search import Admission, Scored
+    from flows.tracking.tracker import Tracker
+
+EXPERIMENT = "discover"
+
+
+def discover(
+    case: Case, out: Path, use_prefect: bool | None = None, experiment: str = EXPERIMENT
+) -> dict[str, Any]:
+    """Trace one case and write the finding to `out`; returns the content of discovery.json.
+
+    use_prefect : run the stages as a Prefect flow; None does so where a server is configured (PREFECT_API_URL),
+    because a temporary one takes longer to start than most cases take to trace.
+    Raises AesiError, one sentence, for what cannot be used; nothing is started then.
+    """
+    environment.prepare()
+    declared_model(case.cell)
+    catalogue(case.effect_files)
+    if use_prefect or (use_prefect is None and os.environ.get("PREFECT_API_URL")):
+        return _as_flow(case, out, experiment)
+    from flows.jobs.stages import plainly
+
+    console = Console()
+    return trace(case, out, plainly(console.say), console, experiment)
+
+
+def discover_experiment(path: str, overrides: Sequence[str] = (), out: Path | None = None) -> dict[str, Any]:
+    """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
+    case, folder, name = case_and_folder(path, overrides, out)
+    return discover(case, folder, experiment=name)
+
+
+def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, str]:
+    """The case of an experiment file, the folder of its results, and the name it is tracked under."""
+    from aesi.pipeline.discovery.cases import case_of_experiment
+    from aesi.pipeline.experiment.config import read_experiment
+
+    config = read_experiment(path, overrides)
+    folder = out or environment.workspace() / "runs" / config.name / "discovery"
+    return case_of_experiment(config), folder, config.name
+
+
+def _as_flow(case: Case, out: Path, experiment: str) -> dict[str, Any]:
+    environment.make_prefect_home()
+    from prefect import flow
+
+    from flows.jobs.stages import as_tasks, server_in_reach
+
+    console = Console()
+
+    @flow(name="discover", flow_run_name=out.name, validate_parameters=False, persist_result=False)
+    def discovery() -> dict[str, Any]:
+        """Trace a residual to the physics that the declared model lacks."""
+        return trace(case, out, as_tasks(console.say), console, experiment)
+
+    with server_in_reach():
+        return discovery()
+
+
+def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) -> dict[str, Any]:
+    """The flow itself; `run` runs a stage."""
+    started = time.monotonic()
+    if (out / ARCHIVE).exists():
+        console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
+    tracker = _tracker(case, experiment, console)
+    follow = Follow(tracker, console, len(catalogue(case.effect_files)))
+    try:
+        found = run("hypotheses", lambda: run_case(case, out, follow))
+        content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
+    except BaseException as error:
+        if tracker is not None:
+            tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
+        raise
+    _track_result(tracker, case, found, content, out)
+    _say(console, content, found.notes, out, started)
+    return content
+
+
+class Follow:
+    """Shows and tracks each hypothesis as it is judged."""
+
+    def __init__(self, tracker: Tracker | None, console: Console, total: int) -> None:
+        self._tracker, self._console, self._total = tracker, console, total
+        self._started, self._done = time.monotonic(), 0
+
+    def __call__(self, name: str, scored: Scored, admission: Admission | None) -> None:
+        """One hypothesis: its evidence, its error and its parameters."""
+        self._done += 1
+        total = max(self._total, self._done + 1)
+        self._console.progress("hypotheses", self._done, total, self._started, name)
+        if self._tracker is None:
+            return
+        values = scored.fit.values
+        parameters = {f"{owner}.{key}": v for owner, given in values.items() for key, v in given.items()}
+        metrics = {
+            "evidence_nats": scored.evidence,
+            "fit/rmse_mv": MV * scored.fit.rmse_v,
+            "held_out/rmse_mv": MV * scored.held_out_rmse_v,
+            "structured_mv": MV * scored.structured_v,
+            "simulations": float(scored.fit.simulations),
+        }
+        if admission is not None:
+            metrics |= {
+                "added/evidence_nats": admission.evidence_nats,
+                "added/gain_mv": MV * admission.gain_v,
+                "added/placebo_mv": MV * admission.placebo_v,
+            }
+        remark = admission.reason if admission is not None else ""
+        self._tracker.nested(
+            f"{name}#{self._done}",
+            name or "nothing",
+            "hypothesis",
+            {"hypothesis": name, "remark": remark, **parameters},
+            metrics,
+        )
+
+
+def _tracker(case: Case, experiment: str, console: Console) -> Tracker | None:
+    from flows.tracking.store import Store, StoreAway
+    from flows.tracking.tracker import Subject, Tracker
+
+    key = digest(*(m.time_s for m in case.measurements), *(m.voltage_v for m in case.measurements))
+    try:
+        return Tracker(Store(), Subject(experiment, case.seed, key), console.say)
+    except StoreAway as error:
+        console.say(f"not tracked: {error}")
+        return None
+
+
+def _run_id(tracker: Tracker | None) -> str:
+    return tracker.run_id if tracker is not None else ""
+
+
+def _track_result(
+    tracker: Tracker | None, case: Case, found: Discovery, content: dict[str, Any], out: Path
+) -> None:
+    if tracker is None:
+        return
+    tracker.parameters(
+        {
+            "cell": found.cell.name,
+            "data": ", ".join(m.name for m in case.measurements),
+            "data_digest": ", ".join(m.digest for m in case.measurements),
+            "test": ", ".join(m.name for m in case.tests),
+            "soc0": case.soc0,
+            "holdout": case.holdout,
+            "max_effects": case.max_effects,
+            "seed": case.seed,
+        },
+        {"verdict": content["verdict"], "effects": ", ".join(content["effects"])},
+    )
+    states = ("before", "recalibrated", "after")
+    errors = {
+        f"{state}/{part}_rmse_mv": content[state][part]["rmse_mv"]
+        for state in states
+        for part in ("fit", "test")
+        if content[state].get(part)
+    }
+    figures = {k: content[k] for k in ("confidence", "noise_floor_mv", "explainable_mv", "structured_mv")}
+    tracker.metrics(errors | figures | {"seconds": content["seconds"]})
+    for name in ("discovery.json", "report.html"):
+        tracker.files(out / name)
+    tracker.end("FINISHED")
+
+
+def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
+    from aesi.pipeline.notes import together
+    from aesi.pipeline.report.words import confidence, reason_finding
+
+    rest = {"none": "nothing to add", "unknown": "something that no effect of the catalogue explains"}
+    said = [*content["effects"], *([rest[content["verdict"]]] if content["verdict"] in rest else [])]
+    console.say(f"{content['verdict']} ({confidence(content)}): {', '.join(said)}")
+    console.say(f"  {reason_finding(content)}")
+    for note in together(notes):
+        console.say(f"  {note}")
+    for group in content["indistinguishable"]:
+        console.say(f"  these data cannot tell apart: {', '.join(group)}")
+    rmse: Callable[[str, str], float] = lambda state, part: content[state][part]["rmse_mv"]  # noqa: E731
+    for part in ("fit", "test"):
+        if content["after"].get(part):
+            values = [rmse(state, part) for state in ("before", "recalibrated", "after")]
+            before, own, after = values
+            console.say(
+                f"  {part}: {before:.2f} mV as declared, {own:.2f} mV recalibrated, {after:.2f} mV after"
+            )
+    console.say(f"Finished in {duration(time.monotonic() - started)}. Report: {out / 'report.html'}")

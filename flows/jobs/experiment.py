@@ -1,0 +1,100 @@
+"""The stages of an experiment, as the paper's table of contents.
+
+    data and physics -> search -> final models -> intervals -> evaluation -> report
+
+Killed at any moment and started again with --resume, it finds finished candidates by their content, evaluates
+the rest, tracks each once, and ends with the result of an uninterrupted run.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aesi.pipeline.experiment.config import ExperimentConfig
+from flows.base import environment
+from flows.base.console import Console, duration
+from flows.jobs.run_request import RunRequest
+from flows.jobs.run_session import working_on
+
+if TYPE_CHECKING:
+    from flows.jobs.stages import Run
+    from flows.tracking.tracker import Tracker
+
+
+def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
+    """The flow itself; `run` runs a stage."""
+    from flows.tracking.store import Store
+
+    started = time.monotonic()
+    config = request.config()
+    console.say(f"{config.name}: {config.note}" if config.note else config.name)
+    store = Store(config.tracking.uri)
+    with working_on(request, store, console) as tracker:
+        folder = _stages(config, request, tracker, run, console, started)
+    console.say(f"Finished in {duration(time.monotonic() - started)}.")
+    console.say(f"Report: {_shown(folder / 'report.html')}")
+    console.say(f"Runs:   aesi ui        Tables: aesi tables {config.name}")
+    return folder
+
+
+def _stages(
+    config: ExperimentConfig,
+    request: RunRequest,
+    tracker: Tracker,
+    run: Run,
+    console: Console,
+    started: float,
+) -> Path:
+    from aesi.pipeline.experiment.conformalise import conformalise
+    from aesi.pipeline.experiment.evaluate import evaluate
+    from aesi.pipeline.experiment.fit import build_problem, final_models
+    from aesi.pipeline.experiment.load import load
+    from aesi.pipeline.experiment.outputs import Result, write_outputs
+    from aesi.pipeline.notes import together
+    from flows.base.stage_cache import Cache
+    from flows.search.study import run_study
+    from flows.tracking.experiment_log import CandidateTracker, track_result, track_start
+
+    loaded = run("data and physics", lambda: load(config), retries=2)
+    for note in together(loaded.notes):
+        console.say(f"  {note}")
+    track_start(tracker, config, loaded)
+    problem = run("library and resamples", lambda: build_problem(loaded, config))
+    follow = CandidateTracker(tracker, config, loaded, problem)
+    found = run("search", lambda: run_study(problem, config, console, request.use_cache, follow))
+    cache = Cache(console.say, request.use_cache)
+    key = (config.digest, found.key)
+    models = run(
+        "final models",
+        lambda: cache.get("final models", key, lambda: final_models(problem, found.chosen, config)),
+    )
+    fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config))
+    evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split))
+    folder = environment.workspace() / "runs" / config.name / tracker.run_id
+    seconds = time.monotonic() - started
+    rows = found.rows()
+    result = Result(
+        config,
+        loaded,
+        problem,
+        found.chosen,
+        rows,
+        fitted,
+        evaluation,
+        tracker.run_id,
+        seconds,
+        failed=len(found.result.trials) - len(rows),
+    )
+    summary = run("report", lambda: write_outputs(folder, result))
+    track_result(tracker, folder, summary, found.number)
+    return folder
+
+
+def _shown(path: Path) -> str:
+    try:
+        return os.path.relpath(path)
+    except ValueError:
+        return str(path)

@@ -1,0 +1,39 @@
+"""What was asked for on the command line of `aesi run`."""
+
+from __future__ import annotations
+
+import shlex
+from dataclasses import dataclass
+from typing import Literal
+
+from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+
+
+@dataclass(frozen=True)
+class RunRequest:
+    """An experiment file, what is laid over it, and how to run it."""
+
+    path: str
+    overrides: tuple[str, ...] = ()
+    runner: Literal["local", "dask"] | None = None
+    address: str | None = None
+    resume: bool = False
+    use_cache: bool = True
+
+    def config(self) -> ExperimentConfig:
+        """The experiment with all overrides."""
+        config = read_experiment(self.path, self.overrides)
+        if self.runner is None and self.address is None:
+            return config
+        kind = self.runner or ("dask" if self.address else config.runner.kind)
+        runner = config.runner.model_copy(update={"kind": kind, "address": self.address})
+        return config.model_copy(update={"runner": runner})
+
+    @property
+    def resuming(self) -> str:
+        """The command line that goes on with what this one began."""
+        words = ["aesi", "run", self.path]
+        words += [word for text in self.overrides for word in ("--set", text)]
+        words += ["--runner", self.runner] if self.runner else []
+        words += ["--address", self.address] if self.address else []
+        return shlex.join([*words, "--resume"])

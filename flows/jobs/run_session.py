@@ -1,0 +1,133 @@
+"""A tracked run from its start to its end, whichever end that is."""
+
+from __future__ import annotations
+
+import errno
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from aesi.errors import AesiError
+from aesi.pipeline.experiment.config import ExperimentConfig
+from flows.base import environment
+from flows.base.console import Console
+from flows.jobs.run_request import RunRequest
+from flows.tracking.run_records import RunLock, RunRecord, records
+
+if TYPE_CHECKING:
+    from flows.tracking.store import Store
+    from flows.tracking.tracker import Tracker
+
+UNFINISHED = ("running", "killed", "failed")
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+
+class DiskFull(AesiError):
+    """There is no room for what a run has to keep."""
+
+
+@contextmanager
+def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[Tracker]:
+    """The tracked run to work on, new or resumed, closed as what it becomes.
+
+    Raises DiskFull, with what to do, where there is no room for what the run has to keep.
+    """
+    config = request.config()
+    with _advice_where_full(request):
+        tracker, record = _begin(request, config, store, console)
+        with RunLock(tracker.run_id):
+            try:
+                yield tracker
+            except KeyboardInterrupt:
+                console.say(f"Stopped. Everything so far is kept; go on with: {request.resuming}")
+                _close(record, tracker, "killed", wait_s=5)
+                raise
+            except BaseException:
+                _close(record, tracker, "failed", wait_s=10)
+                raise
+            left = tracker.end("FINISHED")
+            replace(record, status="finished").write()
+        if left:
+            console.say(
+                f"tracking: {left} items could not be delivered to {store.uri}; the next run delivers them."
+            )
+
+
+def _begin(
+    request: RunRequest, config: ExperimentConfig, store: Store, console: Console
+) -> tuple[Tracker, RunRecord]:
+    """The tracker of the run to work on and its record, after what earlier runs have left is put in order."""
+    from flows.tracking.leftovers import deliver_leftovers
+    from flows.tracking.tracker import Tracker
+
+    _close_killed(config.name, store, console)
+    deliver_leftovers(store, console.say)
+    old = _unfinished(config, store, console) if request.resume else None
+    tracker = Tracker(store, config, console.say, old.run_id if old else None)
+    record = (
+        replace(old, status="running")
+        if old
+        else RunRecord(tracker.run_id, config.name, config.digest, store.uri, time.time())
+    )
+    record.write()
+    console.say(f"run {tracker.run_id} {'resumed' if old else 'started'}")
+    return tracker, record
+
+
+@contextmanager
+def _advice_where_full(request: RunRequest) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in FULL:
+            raise
+        raise DiskFull(
+            f"no room is left for {environment.workspace()} ({error.strerror}); everything so far is kept: free "
+            f"some space, then go on with: {request.resuming}"
+        ) from error
+
+
+def _close(record: RunRecord, tracker: Tracker, status: str, wait_s: float) -> None:
+    """Say on disk and in the store how the run ended, as far as they take it; the reason is on its way already."""
+    with suppress(OSError):
+        replace(record, status=status).write()
+    with suppress(OSError):
+        tracker.end(status.upper(), wait_s)
+
+
+def _unfinished(config: ExperimentConfig, store: Store, console: Console) -> RunRecord | None:
+    """The newest unfinished run of the same experiment and settings that nobody works on."""
+    for record in records(config.name):
+        if record.status not in UNFINISHED or record.uri != store.uri:
+            continue
+        if record.config_digest != config.digest:
+            continue
+        lock = RunLock(record.run_id)
+        if lock.acquire():
+            lock.release()
+            return record
+    console.say("There is no unfinished run with these settings; a new one is started.")
+    return None
+
+
+def _close_killed(experiment: str, store: Store, console: Console) -> None:
+    """A run that was killed stays RUNNING in MLflow for ever; whoever comes next closes it."""
+    for record in records(experiment):
+        if record.status != "running" or record.uri != store.uri:
+            continue
+        with RunLock(record.run_id) as lock:
+            if lock.held:
+                replace(record, status="killed").write()
+                _terminate(store, record.run_id)
+                console.say(f"run {record.run_id} had been killed; it is closed as such.")
+
+
+def _terminate(store: Store, run_id: str) -> None:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        store.client.set_terminated(run_id, "KILLED")
+    except (MlflowException, OSError):
+        return  # the run is gone from the store: nothing to close

@@ -1,0 +1,1 @@
+"""What is read back from the tracking store: tables, the user interface."""

@@ -1,0 +1,152 @@
+"""`aesi tables`: the paper's tables rebuilt from the tracking store, and from nothing else.
+
+Each finished run carries its rows as the artifact summary.json. Runs that differ by seed alone are put
+together as mean and spread, with their ids beneath.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from aesi.errors import InputError
+from aesi.pipeline.report import tables
+from flows.tracking.store import KIND, Store
+
+Row = dict[str, Any]
+
+
+def tables_of(
+    experiment: str,
+    format: Literal["md", "tex", "csv"] = "md",
+    run_ids: Sequence[str] = (),
+    figures: Path | None = None,
+    uri: str | None = None,
+) -> str:
+    """The tables of the latest finished runs of an experiment, one a seed; of `run_ids` where given.
+
+    figures : a folder that gets the tracked reports and figures.
+    Raises InputError where nothing of that name was tracked.
+    """
+    store = Store(uri)
+    name = _name(experiment)
+    runs = _chosen(store, name, run_ids)
+    summaries = [_summary(store, run.info.run_id) for run in runs]
+    rows = merged([summary["models"] for summary in summaries])
+    if figures is not None:
+        for run in runs:
+            _copy_figures(store, run.info.run_id, figures / run.info.run_id)
+    text = tables.render(rows, format)
+    return f"{text}\n{_footer(name, runs, format)}"
+
+
+def merged(runs: Sequence[Sequence[Row]]) -> list[Row]:
+    """Rows of several runs as one set: the mean of every number, and the range over seeds."""
+    if len(runs) == 1:
+        return list(runs[0])
+    names = list(dict.fromkeys(row["name"] for rows in runs for row in rows))
+    return [_mean([row for rows in runs for row in rows if row["name"] == name]) for name in names]
+
+
+def _mean(rows: Sequence[Row]) -> Row:
+    row = _mean_value(rows)
+    msers = [_at(each, "free_run", "test_mser_pct") for each in rows]
+    found = [value for value in msers if value is not None]
+    if found:
+        row["spread"] = {
+            "seeds": len(found),
+            "test_mser_pct": [min(found), max(found)],
+            "test_mser_sd": _deviation(found),
+        }
+    return row
+
+
+def _mean_value(values: Sequence[Any]) -> Any:
+    present = [value for value in values if value is not None]
+    if not present:
+        return None
+    first = present[0]
+    if isinstance(first, Mapping):
+        keys = dict.fromkeys(key for value in present for key in value)
+        return {key: _mean_value([value.get(key) for value in present]) for key in keys}
+    if isinstance(first, (int, float)) and not isinstance(first, bool):
+        return sum(present) / len(present)
+    return first
+
+
+def _deviation(values: Sequence[float]) -> float:
+    mean = sum(values) / len(values)
+    return math.sqrt(sum((value - mean) ** 2 for value in values) / max(1, len(values) - 1))
+
+
+def _at(row: Mapping[str, Any], *keys: str) -> Any:
+    value: Any = row
+    for key in keys:
+        value = value.get(key) if isinstance(value, Mapping) else None
+    return value
+
+
+def _name(experiment: str) -> str:
+    path = Path(experiment)
+    if path.suffix in (".yaml", ".yml"):
+        from aesi.pipeline.experiment.config import read_experiment
+
+        return read_experiment(path).name if path.exists() else path.stem
+    return experiment
+
+
+def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:
+    """The runs asked for, else the newest finished run of each seed that shares the newest run's setting."""
+    experiment_id = store.find_experiment(name)
+    if experiment_id is None:
+        known = sorted(e.name for e in store.client.search_experiments() if e.name != "Default")
+        there = f" Tracked so far: {', '.join(known)}." if known else " Nothing is tracked there yet."
+        raise InputError(f"no experiment {name!r} is tracked in {store.uri}.{there}")
+    condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
+    finished = list(store.runs(experiment_id, condition))
+    if run_ids:
+        return [_by_id(finished, run_id, name) for run_id in run_ids]
+    if not finished:
+        raise InputError(f"experiment {name!r} has no finished run yet; `aesi run` makes one.")
+    setting = finished[0].data.tags.get("aesi.setting")
+    by_seed: dict[str, Any] = {}
+    for run in finished:
+        if run.data.tags.get("aesi.setting") == setting:
+            by_seed.setdefault(run.data.params.get("seed", "0"), run)
+    return [by_seed[seed] for seed in sorted(by_seed, key=lambda text: int(text))]
+
+
+def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:
+    found = [run for run in finished if run.info.run_id.startswith(run_id)]
+    if len(found) != 1:
+        raise InputError(f"{run_id!r} names {len(found)} finished runs of {name!r}; give a whole run id.")
+    return found[0]
+
+
+def _summary(store: Store, run_id: str) -> dict[str, Any]:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        path = store.client.download_artifacts(run_id, "summary.json")
+        content = Path(path).read_text(encoding="utf-8")
+        return dict(json.loads(content))
+    except (OSError, ValueError, MlflowException) as error:
+        raise InputError(f"run {run_id} carries no readable summary.json ({error}).") from None
+
+
+def _copy_figures(store: Store, run_id: str, folder: Path) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for item in store.client.list_artifacts(run_id):
+        if item.path in ("report.html", "figures"):
+            store.client.download_artifacts(run_id, item.path, str(folder))
+
+
+def _footer(name: str, runs: Sequence[Any], format: str) -> str:
+    ids = ", ".join(f"{run.info.run_id} (seed {run.data.params.get('seed', '?')})" for run in runs)
+    text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {ids}."
+    if len(runs) > 1:
+        text = f"Mean over {len(runs)} seeds. {text}"
+    return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]

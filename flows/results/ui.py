@@ -1,0 +1,42 @@
+"""`aesi ui`: MLflow's own UI on the tracking store in use, on loopback unless told otherwise."""
+
+from __future__ import annotations
+
+import os
+import socket
+import sys
+
+from aesi.errors import InputError
+from flows.tracking.store import Store, default_uri
+
+TRAINING = "#/experiments?workflowType=machine_learning"
+"""MLflow opens on what it has for language models, where runs are hard to find."""
+# The jobs that MLflow would run beside the server are for language models, and take eight processes.
+QUIETLY = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_LOGGING_LEVEL": "ERROR"}
+
+
+def serve(port: int, host: str, uri: str | None) -> None:
+    """Serve until interrupted. A store that is a server already has its UI there: its address is printed."""
+    uri = uri or default_uri()
+    if uri.startswith(("http://", "https://")):
+        print(f"The runs are at {uri}")
+        return
+    if not _free(host, port):
+        raise InputError(f"port {port} on {host} is taken; give another with --port.")
+    Store(uri)  # makes or migrates the tables, so that an empty workspace shows an empty UI
+    command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri]
+    command += ["--host", host, "--port", str(port), "--workers", "1"]
+    print(f"MLflow shows the runs at http://{host}:{port}/{TRAINING} (Ctrl-C ends it)", flush=True)
+    os.execve(
+        sys.executable, command, os.environ | QUIETLY
+    )  # so that whatever ends this process ends the server
+
+
+def _free(host: str, port: int) -> bool:
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except OSError:
+            return False
+    return True

@@ -1,0 +1,183 @@
+"""Evolutionary search over libraries and hyperparameters: NSGA-II, three losses, two correlation constraints.
+
+    minimise  loss_oob, loss_valid, loss_sparse    subject to  pearson_train > eps1, pearson_valid > eps2
+
+The front is kept whole; the paper's scalar fitness, 1 - (g1 L_oob + g2 L_valid + g3 L_sparse), picks from it
+and `SearchResult.sensitivity` shows how the pick moves with g. A candidate that fails is a pruned trial with
+its reason. How the term mask travels, and why, is told in term_sampler.py.
+
+A generation is asked for as a whole and told in order, so a search gives the same trials whoever evaluates
+them and however many at a time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import optuna
+from optuna.storages import BaseStorage, JournalStorage, RDBStorage
+from optuna.storages.journal import JournalFileBackend
+from optuna.study import Study
+from optuna.trial import FrozenTrial, TrialState
+
+from aesi.errors import ConfigError
+from aesi.records import Failed
+from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
+from aesi.sparse.genome_space import GenomeSpace
+from flows.search.result import FINISHED, RECORD, RECORDED, SearchResult
+from flows.search.term_sampler import INDEX, TermSampler
+
+Outcome = Candidate | Failed
+EvaluateMany = Callable[[Sequence[Genome]], Iterable[tuple[int, Outcome]]]
+"""A generation in, (position, outcome) out, in any order."""
+OnCandidate = Callable[[int, Genome, Outcome], None]
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Least Pearson correlation of error and prediction, in free run."""
+
+    pearson_train: float = 0.5
+    pearson_valid: float = 0.5
+
+
+def search(
+    problem: Problem,
+    n_trials: int,
+    seed: int = 0,
+    storage: str | Path | BaseStorage | None = None,
+    name: str = "aesi",
+    on_candidate: OnCandidate | None = None,
+    evaluate_one: Callable[[Problem, Genome], Outcome] = evaluate,
+    evaluate_many: EvaluateMany | None = None,
+    space: GenomeSpace | None = None,
+    population: int = 20,
+    constraints: Constraints | None = None,
+    weights: FitnessWeights | None = None,
+    warm_start: Sequence[Genome] | None = None,
+    shared: bool = False,
+) -> SearchResult:
+    """Search until the study holds `n_trials` finished trials; continue what `storage` already holds.
+
+    storage : None keeps the study in memory; a path is a journal file; a URL (with ://) a database. Workers
+    that share a storage and `name` share the study.
+    on_candidate : called with index, genome and outcome as each is evaluated.
+    evaluate_one : what evaluates a candidate; evaluate_many, if given, evaluates a generation instead.
+    population : candidates in a generation.
+    warm_start : genomes to begin with; None takes `GenomeSpace.plain_starts`, () none.
+    shared : other processes work on the study now; then indices under evaluation are marked in the storage
+    (a candidate that two take in the same instant is evaluated twice).
+    The same seed gives the same candidates, interrupted or not, as long as one process searches.
+    Exceptions of the evaluation are bugs: what the generation has finished is stored, and they propagate.
+    """
+    space = space or GenomeSpace.of(problem.library)
+    if space.size != len(problem.library):
+        raise ConfigError(f"the genome space has {space.size} terms, the library {len(problem.library)}.")
+    constraints = constraints or Constraints()
+    sampler = TermSampler(space, seed, population, space.plain_starts() if warm_start is None else warm_start)
+    study = _open(storage, name, sampler)
+
+    def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:
+        return ((k, evaluate_one(problem, genome)) for k, genome in enumerate(genomes))
+
+    while (missing := n_trials - len(study.get_trials(deepcopy=False, states=FINISHED))) > 0:
+        _generation(
+            study,
+            sampler,
+            min(missing, population),
+            evaluate_many or one_by_one,
+            constraints,
+            on_candidate,
+            shared,
+        )
+    return SearchResult.of(study, space.size, weights or FitnessWeights())
+
+
+def _generation(
+    study: Study,
+    sampler: TermSampler,
+    most: int,
+    evaluate_many: EvaluateMany,
+    constraints: Constraints,
+    on_candidate: OnCandidate | None,
+    shared: bool,
+) -> None:
+    asked: list[tuple[int, Genome]] = []
+    claims: dict[int, int] = {}
+    for index in _next_indices(study, sampler.size, most):
+        genome = sampler.propose(study, index)
+        asked.append((index, genome))
+        if shared:
+            claims[index] = _claim(study, sampler, genome, index)
+    outcomes: dict[int, Outcome] = {}
+    try:
+        for position, outcome in evaluate_many([genome for _, genome in asked]):
+            outcomes[position] = outcome
+            if on_candidate is not None:
+                on_candidate(*asked[position], outcome)
+    finally:
+        # What is known is told even if the rest was interrupted, so that a resumed search keeps it.
+        for position, (index, genome) in enumerate(asked):
+            if position in outcomes:
+                study.add_trial(_finished(sampler, genome, index, outcomes[position], constraints))
+        for number in claims.values():
+            study.tell(number, state=TrialState.FAIL)
+
+
+def _claim(study: Study, sampler: TermSampler, genome: Genome, index: int) -> int:
+    """Number of a running trial that tells other workers which index is taken; it fails when that is over."""
+    study.add_trial(sampler.write(genome, index, TrialState.RUNNING))
+    mine = [
+        t
+        for t in study.get_trials(deepcopy=False, states=[TrialState.RUNNING])
+        if t.user_attrs[INDEX] == index
+    ]
+    return mine[-1].number
+
+
+def _next_indices(study: Study, population: int, most: int) -> list[int]:
+    """The lowest free indices, within one generation so that the next one has all of its parents."""
+    trials = study.get_trials(deepcopy=False, states=(*FINISHED, TrialState.RUNNING))
+    taken = {trial.user_attrs[INDEX] for trial in trials}
+    free = [index for index in range(len(trials) + most) if index not in taken][:most]
+    return [index for index in free if index // population == free[0] // population]
+
+
+def _finished(
+    sampler: TermSampler, genome: Genome, index: int, outcome: Outcome, constraints: Constraints
+) -> FrozenTrial:
+    if isinstance(outcome, Failed):
+        return sampler.write(genome, index, TrialState.PRUNED, user_attrs={"reason": outcome.reason})
+    return sampler.write(
+        genome,
+        index,
+        TrialState.COMPLETE,
+        values=list(outcome.losses),
+        user_attrs={RECORD: {key: float(getattr(outcome, key)) for key in RECORDED}},
+        constraints={
+            "pearson_train": constraints.pearson_train - outcome.pearson_train,
+            "pearson_valid": constraints.pearson_valid - outcome.pearson_valid,
+        },
+    )
+
+
+def _open(storage: str | Path | BaseStorage | None, name: str, sampler: TermSampler) -> Study:
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    return optuna.create_study(
+        storage=_storage(storage),
+        study_name=name,
+        sampler=sampler,
+        directions=["minimize"] * 3,
+        load_if_exists=True,
+    )
+
+
+def _storage(storage: str | Path | BaseStorage | None) -> BaseStorage | None:
+    if storage is None or isinstance(storage, BaseStorage):
+        return storage
+    if "://" in str(storage):
+        return RDBStorage(str(storage))
+    Path(storage).parent.mkdir(parents=True, exist_ok=True)
+    return JournalStorage(JournalFileBackend(str(storage)))

@@ -1,0 +1,134 @@
+"""What a search came to: its trials, the front, and the pick under given weights."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from optuna.study import Study
+from optuna.trial import FrozenTrial, TrialState
+
+from aesi.errors import FitError
+from aesi.sparse import FitnessWeights, Genome, fitness
+from flows.search.term_sampler import INDEX, genome_of, violation
+
+FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
+RECORD = "record"
+RECORDED = (
+    "fitness",
+    "pearson_train",
+    "pearson_valid",
+    "free_run_valid_mser_pct",
+    "one_step_valid_rmse_v",
+)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One finished trial. `losses` is None where it failed, and `reason` says why.
+
+    number : its index in the search.
+    numbers : fitness, correlations and validation figures by name, as in `Candidate`.
+    """
+
+    number: int
+    genome: Genome
+    losses: tuple[float, float, float] | None
+    feasible: bool
+    numbers: dict[str, float]
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class Pick:
+    """Which trial the fitness takes under given weights."""
+
+    weights: FitnessWeights
+    trial: Trial
+    fitness: float
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """All finished trials of a study, and what to choose from them."""
+
+    study: Study
+    trials: tuple[Trial, ...]
+    library_size: int
+    weights: FitnessWeights
+
+    @classmethod
+    def of(cls, study: Study, library_size: int, weights: FitnessWeights) -> SearchResult:
+        """What the study holds now, in the order of the index."""
+        stored = study.get_trials(deepcopy=False, states=FINISHED)
+        trials = sorted((_read(trial) for trial in stored), key=lambda trial: trial.number)
+        return cls(study, tuple(trials), library_size, weights)
+
+    @property
+    def feasible(self) -> tuple[Trial, ...]:
+        """Those that were evaluated and meet the constraints."""
+        return tuple(trial for trial in self.trials if trial.feasible)
+
+    def front(self) -> tuple[Trial, ...]:
+        """Feasible trials that no other feasible one beats in all losses."""
+        return tuple(
+            trial for trial in self.feasible if not any(_dominates(other, trial) for other in self.feasible)
+        )
+
+    def best(self, weights: FitnessWeights | None = None) -> Pick:
+        """The trial of highest fitness; the earlier one on a tie.
+
+        Raises FitError, with the reasons counted, where no trial is feasible.
+        """
+        weights = weights or self.weights
+        front = self.front()
+        if not front:
+            raise FitError(self._nothing_feasible())
+        scored = [(fitness(t.losses, self.library_size, weights), -t.number, t) for t in front if t.losses]
+        score, _, trial = max(scored, key=lambda entry: entry[:2])
+        return Pick(weights, trial, score)
+
+    def sensitivity(self, several: Sequence[FitnessWeights] = ()) -> tuple[Pick, ...]:
+        """The picks under other weights (default: each loss in turn counting little, or most)."""
+        return tuple(self.best(weights) for weights in several or _around(self.weights))
+
+    def _nothing_feasible(self) -> str:
+        reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)
+        listed = "; ".join(f"{count} x {reason}" for reason, count in reasons.most_common(4))
+        return (
+            f"none of {len(self.trials)} candidates is feasible ({listed or 'none was evaluated'}); "
+            "lower the correlation constraints, widen the ranges, or evaluate more candidates."
+        )
+
+
+def _read(trial: FrozenTrial) -> Trial:
+    done = trial.state == TrialState.COMPLETE
+    numbers: dict[str, Any] = trial.user_attrs.get(RECORD, {})
+    losses = (trial.values[0], trial.values[1], trial.values[2]) if done else None
+    return Trial(
+        trial.user_attrs[INDEX],
+        genome_of(trial),
+        losses,
+        done and violation(trial) == 0,
+        numbers,
+        trial.user_attrs.get("reason"),
+    )
+
+
+def _dominates(a: Trial, b: Trial) -> bool:
+    pairs = list(zip(a.losses or (), b.losses or (), strict=True))
+    return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)
+
+
+def _around(centre: FitnessWeights) -> tuple[FitnessWeights, ...]:
+    few, most = 0.1, 0.8
+    return (
+        centre,
+        FitnessWeights(most, few, few),
+        FitnessWeights(few, most, few),
+        FitnessWeights(few, few, most),
+        FitnessWeights(0.5, 0.5, 0.0),
+        FitnessWeights(1 / 3, 1 / 3, 1 / 3),
+    )

@@ -1,0 +1,139 @@
+"""The search stage: one study, evaluated here or by Dask, shared with whoever works on the same."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from aesi.errors import FitError
+from aesi.pipeline.experiment.candidate import Scored, genome_space, weights
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.records import Failed
+from aesi.sparse import Candidate, Genome, Problem
+from flows.base import environment, fingerprint
+from flows.base.console import Console
+from flows.evaluation.generation import Evaluation, Tally
+from flows.evaluation.open_pool import open_pool
+from flows.evaluation.outcome_store import Outcomes, open_outcomes
+from flows.search.nsga2 import Constraints, search
+from flows.search.result import SearchResult
+
+OnScored = Callable[[int, Genome, Scored | Failed], None]
+"""Told of each candidate: its number, its genome, what became of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The search when it is over.
+
+    key : content key of the chosen candidate.  scored : number -> outcome, of all candidates.
+    """
+
+    result: SearchResult
+    number: int
+    chosen: Candidate
+    key: str
+    scored: dict[int, Scored | Failed]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The candidates that were evaluated, as the report draws them."""
+        front = {trial.number for trial in self.result.front()}
+        return [
+            {
+                "number": trial.number,
+                "oob": trial.losses[0],
+                "valid": trial.losses[1],
+                "terms": int(trial.losses[2]),
+                "fitness": trial.numbers.get("fitness"),
+                "feasible": trial.feasible,
+                "front": trial.number in front,
+                "chosen": trial.number == self.number,
+            }
+            for trial in self.result.trials
+            if trial.losses is not None
+        ]
+
+
+def run_study(
+    problem: Problem,
+    config: ExperimentConfig,
+    console: Console,
+    reuse: bool = True,
+    on_scored: OnScored | None = None,
+    tally: Tally | None = None,
+) -> Found:
+    """Search until all candidates of the experiment are known, and pick one.
+
+    Raises FitError, with the reasons counted, where no candidate is feasible.
+    """
+    outcomes = shared_outcomes(config)
+    pool = open_pool(problem, config)
+    tally = tally or Tally()
+    evaluation = Evaluation(pool, outcomes, study_key(problem, config), console.say, tally, reuse)
+    scored: dict[int, Scored | Failed] = {}
+    waiting: dict[Genome, list[Scored | Failed]] = {}
+    started = time.monotonic()
+
+    def evaluate_many(genomes: Sequence[Genome]) -> Iterator[tuple[int, Candidate | Failed]]:
+        for position, outcome in evaluation(genomes):
+            waiting.setdefault(genomes[position], []).append(outcome)
+            yield position, outcome if isinstance(outcome, Failed) else outcome.candidate
+
+    def on_candidate(number: int, genome: Genome, outcome: Candidate | Failed) -> None:
+        scored[number] = waiting[genome].pop()
+        if on_scored is not None:
+            on_scored(number, genome, scored[number])
+        console.progress("candidates", len(scored), config.search.candidates, started, _best(scored))
+
+    try:
+        result = search(
+            problem,
+            config.search.candidates,
+            seed=config.seed,
+            on_candidate=on_candidate,
+            evaluate_many=evaluate_many,
+            space=genome_space(problem, config),
+            population=config.search.population,
+            constraints=Constraints(config.search.pearson_train, config.search.pearson_valid),
+            weights=weights(config),
+            warm_start=None if config.search.warm_start else (),
+        )
+    finally:
+        pool.close()
+        outcomes.close()
+    if tally.found:
+        console.say(f"  {tally.evaluated} candidates evaluated, {tally.found} known from before")
+    number = result.best().trial.number
+    chosen = scored[number]
+    if isinstance(chosen, Failed):
+        raise FitError(f"the chosen candidate {number} failed: {chosen.reason}")
+    key = evaluation.key(chosen.candidate.genome)
+    return Found(result, number, chosen.candidate, key, scored)
+
+
+def shared_outcomes(config: ExperimentConfig) -> Outcomes:
+    """Where the candidates of an experiment are shared: its database, or the workspace."""
+    return open_outcomes(environment.state() / "cache" / "candidates", config.runner.storage)
+
+
+def study_key(problem: Problem, config: ExperimentConfig) -> str:
+    """Content key of all that decides what becomes of a genome: records, settings, code."""
+    search, conformal = config.search, config.conformal
+    records = (*problem.split.train, *problem.split.valid)
+    settings = [
+        problem.options.__dict__,
+        weights(config).__dict__,
+        [conformal.method, conformal.alpha, conformal.window, config.seed],
+        [search.timeout_s, search.memory_mb],
+    ]
+    return fingerprint.key(
+        fingerprint.code(), *(record.digest for record in records), json.dumps(settings, default=str)
+    )
+
+
+def _best(scored: dict[int, Scored | Failed]) -> str:
+    values = [one.candidate.fitness for one in scored.values() if isinstance(one, Scored)]
+    return f"best fitness {max(values):.3f}" if values else "none feasible yet"

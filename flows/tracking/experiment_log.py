@@ -1,0 +1,149 @@
+"""What is logged of data, candidates and models, under names that suit the compare view and the tables."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from math import log10
+from pathlib import Path
+from typing import Any
+
+from aesi.pipeline.experiment.candidate import Scored
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.load import Loaded
+from aesi.records import ROLES, Failed
+from aesi.sparse import Genome, Problem, SparseModel
+from flows.tracking.provenance import versions
+from flows.tracking.tracker import Tracker, flat
+
+MILLIVOLT_PER_VOLT = 1e3
+HEADLINES = ("free_run", "one_step", "intervals")
+"""What MLflow's charts show first: it draws a section a prefix, in the order of the alphabet."""
+WITH_UNIT = {
+    "k_step": "test_rmse_mv_by_horizon_s",
+    "k_step_persistence": "persistence_rmse_mv_by_horizon_s",
+    "bands_by_horizon": "bands_by_horizon_s",
+}
+"""Names for sections whose entries are horizons."""
+
+
+def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded) -> None:
+    """Settings, versions and data of a run."""
+    content = config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
+    tags = {"mlflow.note.content": config.note, "aesi.setting": config.setting}
+    tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
+    tracker.json("experiment.json", config.model_dump(mode="json"))
+    tracker.datasets(
+        [
+            {
+                "name": series.name,
+                "digest": series.digest,
+                "source": json.dumps({"cell": loaded.cell_name, "measured": loaded.digests}),
+                "role": role,
+                "profile": json.dumps({"rows": len(series), "dt_s": series.dt_s}),
+            }
+            for role in ROLES
+            for series in getattr(loaded.split, role)
+        ]
+    )
+
+
+class CandidateTracker:
+    """Logs a nested run a candidate."""
+
+    def __init__(self, tracker: Tracker, config: ExperimentConfig, loaded: Loaded, problem: Problem) -> None:
+        self._tracker = tracker
+        self._problem = problem
+        self._shared = {
+            "seed": config.seed,
+            "data_hashes": loaded.digests,
+            "versions": versions(),
+            "resamples": config.search.resamples,
+        }
+
+    def __call__(self, number: int, genome: Genome, outcome: Scored | Failed) -> None:
+        """Log candidate `number`; a failed one carries its reason as a tag."""
+        params = {
+            "number": number,
+            "lambda1": genome.lambda1,
+            "lambda1_log10": round(log10(genome.lambda1), 4),  # MLflow's own plots have no logarithmic axis
+            "lambda2": genome.lambda2,
+            "lambda2_log10": round(log10(genome.lambda2), 4),
+            "tau": genome.tau,
+            "p_c": genome.p_c,
+            "d": genome.d,
+            "feedback": genome.feedback,
+            "library_terms": int(genome.active(self._problem.library).sum()),
+            "library_hash": genome.digest(self._problem.library),
+            **self._shared,
+        }
+        self._tracker.nested(
+            label=f"candidate:{number}",
+            name=f"candidate {number:03d}",
+            kind="candidate",
+            params=params,
+            metrics={} if isinstance(outcome, Failed) else _metrics(outcome),
+            files={} if isinstance(outcome, Failed) else {"coefficients.json": coefficients(outcome)},
+            failed=outcome.reason if isinstance(outcome, Failed) else None,
+            seconds=0.0 if isinstance(outcome, Failed) else outcome.seconds,
+        )
+
+
+def track_result(tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int) -> None:
+    """The models, the tables, the report and the chosen model; `number` is the candidate's they come from."""
+    chosen = summary["chosen"]
+    for row in summary["models"]:
+        numbers = _numbers(row)
+        tracker.nested(f"model:{row['name']}", row["name"], "model", {"model": row["name"]}, numbers)
+        if row["name"] == chosen:
+            tracker.metrics(numbers)
+    tracker.parameters({"chosen_candidate": number, "chosen_model": chosen})
+    for name in ("summary.json", "report.html", "tables.md", "tables.tex"):
+        tracker.files(folder / name)
+    if (folder / "figures").is_dir():
+        tracker.files(folder / "figures", "figures")
+    tracker.model(folder / "model")
+
+
+def coefficients(scored: Scored) -> dict[str, dict[str, float]]:
+    """term -> coefficient for both ensembles, and term -> inclusion probability."""
+    bagging, stability = scored.candidate.bagging, scored.candidate.stability
+    return {
+        "bagging": bagging.coefficient_table(),
+        "stability": stability.coefficient_table(),
+        "inclusion": _inclusion(stability) | _inclusion(bagging),
+    }
+
+
+def _metrics(scored: Scored) -> dict[str, Any]:
+    candidate = scored.candidate
+    return {
+        "loss/oob": candidate.loss_oob,
+        "loss/valid": candidate.loss_valid,
+        "loss/sparse": candidate.loss_sparse,
+        "fitness": candidate.fitness,
+        "pearson/train": candidate.pearson_train,
+        "pearson/valid": candidate.pearson_valid,
+        "free_run/valid_mser_pct": candidate.free_run_valid_mser_pct,
+        "one_step/valid_rmse_mv": MILLIVOLT_PER_VOLT * candidate.one_step_valid_rmse_v,
+        "intervals/valid_coverage_pct": scored.coverage_pct,
+        "intervals/valid_width_v": scored.width_v,
+    }
+
+
+def _inclusion(model: SparseModel) -> dict[str, float]:
+    if model.inclusion is None:
+        return {}
+    return dict(zip(model.terms, model.inclusion.tolist(), strict=True))
+
+
+def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
+    """The numbers of a table row as metrics: free_run/test_mser_pct and so on, what is no headline below tables/."""
+    result: dict[str, float] = {}
+    for name, value in row.items():
+        if isinstance(value, Mapping):
+            below = prefix or ("" if name in HEADLINES else "tables/")
+            result |= _numbers(value, f"{below}{WITH_UNIT.get(name, name)}/")
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            result[f"{prefix}{name}"] = float(value)
+    return result

@@ -1,0 +1,37 @@
+"""What ended runs could not deliver to the tracking store, delivered by whoever comes next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from flows.base import environment
+from flows.tracking.delivery import deliver
+from flows.tracking.outbox import FLUSH_S, Outbox
+from flows.tracking.run_records import RunLock
+from flows.tracking.store import Store
+
+
+def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = FLUSH_S) -> None:
+    """Deliver what ended runs could not, where no living run does."""
+    for folder in sorted((environment.state() / "outbox").glob("*")):
+        if not any(folder.glob("[0-9]*.json")) or not _belongs(store, folder.name):
+            continue
+        with RunLock(folder.name) as lock:
+            if not lock.held:
+                continue
+            outbox = Outbox(folder, partial(deliver, store), store.away, say)
+            left = outbox.flush(wait_s)
+            outbox.close()
+            if not left:
+                say(f"tracking: what run {folder.name[:8]} had left over is delivered.")
+
+
+def _belongs(store: Store, run_id: str) -> bool:
+    from mlflow.exceptions import MlflowException
+
+    try:
+        store.client.get_run(run_id)
+    except MlflowException:
+        return False
+    return True

@@ -1,0 +1,97 @@
+"""Log a saved hybrid model to MLflow: pyfunc from code, with signature and input example, registered."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import aesi
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+    from mlflow.models import ModelSignature
+
+CODE = Path(__file__).with_name("served_model.py")
+DEFAULT_SOC0 = 0.5
+NEEDS = ("bpx", "numba", "numpy", "pandas", "pyarrow", "pydantic", "quantile-forest", "scikit-learn", "scipy")
+
+
+def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None) -> None:
+    """Log the model folder under the run, and register it where a name is given; what is there already stays."""
+    import mlflow
+
+    if not folder.is_dir():
+        raise ValueError(f"the model folder {folder} is gone")
+    client = mlflow.MlflowClient(uri, uri)
+    before = mlflow.get_tracking_uri()
+    mlflow.set_tracking_uri(uri)
+    mlflow.set_registry_uri(uri)  # registering resolves the model through the global address
+    try:
+        model_id = _logged_before(client, run_id) or _log(run_id, folder)
+        if registered_as and not client.search_model_versions(f"run_id = '{run_id}'"):
+            _register(client, registered_as, run_id, model_id)
+    finally:
+        mlflow.set_tracking_uri(before)
+
+
+def _logged_before(client: MlflowClient, run_id: str) -> str | None:
+    """Id of the run's whole logged model; one that was killed while it was written is deleted."""
+    from mlflow.entities import LoggedModelStatus
+
+    experiment_id = client.get_run(run_id).info.experiment_id
+    for model in client.search_logged_models([experiment_id], f"source_run_id = '{run_id}'"):
+        if model.status == LoggedModelStatus.READY:
+            return str(model.model_id)
+        client.delete_logged_model(model.model_id)
+    return None
+
+
+def _log(run_id: str, folder: Path) -> str:
+    """Id of the model as it is logged now."""
+    import mlflow
+    import pandas as pd
+
+    hybrid = aesi.HybridModel.load(folder)
+    time_s = [float(t) for t in range(10)]
+    example = pd.DataFrame({"time_s": time_s, "current_a": [hybrid.cell.capacity_ah / 2] * len(time_s)})
+    with mlflow.start_run(run_id=run_id, log_system_metrics=False):
+        logged = mlflow.pyfunc.log_model(
+            name="model",
+            python_model=str(CODE),
+            artifacts={"model": str(folder)},
+            code_paths=[str(Path(aesi.__file__).parent)],
+            pip_requirements=[f"{name}=={version(name)}" for name in NEEDS],
+            signature=_signature(DEFAULT_SOC0 if hybrid.soc0 is None else hybrid.soc0),
+            input_example=example,
+        )
+    return str(logged.model_id)
+
+
+def _signature(soc0: float) -> ModelSignature:
+    from mlflow.models import ModelSignature
+    from mlflow.types import ColSpec, ParamSchema, ParamSpec, Schema
+
+    return ModelSignature(
+        inputs=Schema(
+            [
+                ColSpec("double", "time_s"),
+                ColSpec("double", "current_a"),
+                ColSpec("double", "voltage_v", required=False),
+            ]
+        ),
+        outputs=Schema([ColSpec("double", name) for name in ("voltage_v", "lower_v", "upper_v")]),
+        params=ParamSchema([ParamSpec("soc0", "double", soc0)]),
+    )
+
+
+def _register(client: MlflowClient, name: str, run_id: str, model_id: str) -> None:
+    """A new version of the registered model; the name is made where it is new."""
+    from mlflow.exceptions import MlflowException
+
+    try:
+        client.create_registered_model(name)
+    except MlflowException as error:
+        if error.error_code != "RESOURCE_ALREADY_EXISTS":
+            raise
+    client.create_model_version(name, f"models:/{model_id}", run_id, model_id=model_id)

@@ -1,0 +1,148 @@
+"""A queue on disk between a run and its tracking store.
+
+What is to be tracked is first written here, then delivered by a thread, in order. A store that is away, slow
+or locked costs the run nothing; a killed run loses nothing. Delivery is idempotent: an item that was sent but
+not yet crossed off when the process died is recognised by the store's own records.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from flows.base.files import write_atomically
+
+Item = dict[str, Any]
+Deliver = Callable[[Item, bool], None]
+"""Sends one item; the flag says that it may have been sent before."""
+
+RETRY_S = (1.0, 2.0, 5.0, 10.0, 20.0)
+FLUSH_S = 60.0
+"""How long a store may stand still before an ending run stops waiting for it."""
+REFUSED = "refused"
+TRIES = 3
+"""Failures of one item before a store that answers is taken to refuse it."""
+
+
+class Outbox:
+    """Items of one run below `folder`; `deliver` raises where an item could not be sent.
+
+    away : tells a passing failure (retried for ever) from an item the store refuses (put aside, and said).
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        deliver: Deliver,
+        away: Callable[[Exception], bool],
+        say: Callable[[str], None],
+    ) -> None:
+        self._folder = folder
+        self._deliver = deliver
+        self._away = away
+        self._say = say
+        self._wake = threading.Condition()
+        self._closing = False
+        self._failing_since: float | None = None
+        self._tries = 0
+        folder.mkdir(parents=True, exist_ok=True)
+        self._old = {path.name for path in self._waiting()}
+        self._next = 1 + max((int(path.stem) for path in self._waiting()), default=0)
+        self._thread = threading.Thread(target=self._run, name="aesi-outbox", daemon=True)
+        self._thread.start()
+
+    def put(self, item: Item) -> None:
+        """Keep the item on disk and deliver it when possible."""
+        with self._wake:
+            path = self._folder / f"{self._next:08d}.json"
+            self._next += 1
+            write_atomically(path, json.dumps(item).encode())
+            self._wake.notify_all()
+
+    @property
+    def pending(self) -> int:
+        """How many items are not delivered yet."""
+        return len(self._waiting())
+
+    def items(self) -> Iterator[Item]:
+        """What waits, in order."""
+        for path in self._waiting():
+            yield json.loads(path.read_bytes())
+
+    def flush(self, timeout_s: float) -> int:
+        """Wait for delivery, at most `timeout_s` after the store was last seen to work; the number left."""
+        last, since = self.pending, time.monotonic()
+        while last:
+            time.sleep(0.05)
+            left = self.pending
+            if left < last:
+                last, since = left, time.monotonic()
+            elif time.monotonic() - since > timeout_s:
+                break
+        return last
+
+    def close(self) -> None:
+        """Stop delivering; what waits stays on disk."""
+        with self._wake:
+            self._closing = True
+            self._wake.notify_all()
+        self._thread.join(timeout=30)
+
+    def _waiting(self) -> list[Path]:
+        return sorted(self._folder.glob("[0-9]*.json"))
+
+    def _run(self) -> None:
+        attempt = 0
+        while True:
+            with self._wake:
+                waiting = self._waiting()
+                if self._closing:
+                    return
+                if not waiting:
+                    self._wake.wait()
+                    continue
+            attempt = 0 if self._send(waiting[0]) else attempt + 1
+            if attempt:
+                with self._wake:
+                    self._wake.wait_for(lambda: self._closing, RETRY_S[min(attempt, len(RETRY_S)) - 1])
+
+    def _send(self, path: Path) -> bool:
+        """True where the item is dealt with."""
+        try:
+            self._deliver(json.loads(path.read_bytes()), path.name in self._old)
+        except Exception as error:
+            self._old.add(path.name)  # part of it may have arrived
+            if self._away(error):
+                self._complain(error)
+                return False
+            self._tries += 1
+            if self._tries < TRIES:
+                return False
+            self._tries = 0
+            aside = self._folder / REFUSED / path.name
+            aside.parent.mkdir(exist_ok=True)
+            path.replace(aside)
+            self._say(f"tracking: the store refused an item ({_line(error)}); it is kept in {aside}.")
+            return True
+        self._tries = 0
+        path.unlink(missing_ok=True)
+        if self._failing_since is not None:
+            self._failing_since = None
+            self._say("tracking: the store answers again; what waited is being delivered.")
+        return True
+
+    def _complain(self, error: Exception) -> None:
+        if self._failing_since is None:
+            self._failing_since = time.monotonic()
+            self._say(
+                f"tracking: the store does not answer ({_line(error)}); results are kept in {self._folder} "
+                "and delivered when it is back."
+            )
+
+
+def _line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]

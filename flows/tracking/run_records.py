@@ -1,0 +1,83 @@
+"""What is known of a run while it is not finished: its record on disk, and who is alive.
+
+.aesi/state/<run id>.json holds experiment, config digest and status; .aesi/state/<run id>.lock is held by the
+process that works on the run, and the kernel frees it with that process.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from types import TracebackType
+
+from filelock import FileLock, Timeout
+
+from flows.base import environment
+from flows.base.files import write_atomically
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """One flow run. status : running, killed, failed or finished; started_s : seconds since the epoch."""
+
+    run_id: str
+    experiment: str
+    config_digest: str
+    uri: str
+    started_s: float
+    status: str = "running"
+
+    def write(self) -> None:
+        """Keep it on disk."""
+        write_atomically(_folder() / f"{self.run_id}.json", json.dumps(asdict(self)).encode())
+
+
+def records(experiment: str | None = None) -> list[RunRecord]:
+    """All records, newest first; unreadable ones are left out."""
+    found = []
+    for path in _folder().glob("*.json"):
+        try:
+            found.append(RunRecord(**json.loads(path.read_text())))
+        except (OSError, ValueError, TypeError):
+            continue
+    found.sort(key=lambda record: record.started_s, reverse=True)
+    return [record for record in found if experiment in (None, record.experiment)]
+
+
+class RunLock:
+    """The right to work on a run; `held` says whether this process has it."""
+
+    def __init__(self, run_id: str) -> None:
+        self._lock = FileLock(_folder() / f"{run_id}.lock", thread_local=False)
+
+    @property
+    def held(self) -> bool:
+        """Whether this process works on the run."""
+        return self._lock.is_locked
+
+    def acquire(self) -> bool:
+        """Take the lock if nobody has it."""
+        _folder().mkdir(parents=True, exist_ok=True)
+        try:
+            self._lock.acquire(blocking=False)
+        except Timeout:
+            return False
+        return True
+
+    def release(self) -> None:
+        """Give it back."""
+        self._lock.release()
+
+    def __enter__(self) -> RunLock:
+        self.acquire()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.release()
+
+
+def _folder() -> Path:
+    return environment.state() / "state"

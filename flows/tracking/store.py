@@ -1,0 +1,191 @@
+"""The tracking store, spoken to through MLflow's client with explicit run ids.
+
+Nothing here decides what is tracked (`flows.tracking.tracker`) or how an item gets there (`flows.tracking.delivery`):
+this makes experiments and runs, finds them, and knows whether a failure passes.
+"""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock
+
+from aesi.errors import AesiError
+from flows.base import environment
+
+PARENT = "mlflow.parentRunId"
+NUMBER = "aesi.number"
+KIND = "aesi.kind"
+REACH_S = 5.0
+PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
+PAGE = 1000
+
+
+class StoreAway(AesiError):
+    """The tracking store does not answer."""
+
+
+def default_uri() -> str:
+    """MLFLOW_TRACKING_URI, or the SQLite file in the workspace."""
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{environment.workspace() / 'mlflow.db'}"
+
+
+class Store:
+    """One tracking store.
+
+    Raises StoreAway where it does not answer, with what to do.
+    """
+
+    def __init__(self, uri: str | None = None) -> None:
+        # A database that fails reaches the caller as an exception, and need not be told twice, with a traceback.
+        logging.getLogger("mlflow.store.db.utils").setLevel(logging.CRITICAL)
+        self.uri = uri or default_uri()
+        self._local = self.uri.startswith("sqlite:///")
+        if self.uri.startswith(("http://", "https://")):
+            _reach(self.uri)
+        with _alone(self._local):
+            if self._local:
+                _write_ahead(Path(self.uri.removeprefix("sqlite:///")))
+            try:
+                from mlflow import MlflowClient
+
+                self.client = MlflowClient(tracking_uri=self.uri, registry_uri=self.uri)
+                self.client.search_experiments(max_results=1)
+            except Exception as error:
+                raise _unusable(self.uri, error) from None
+
+    def experiment(self, name: str) -> str:
+        """Id of the experiment of that name, made if it is not there."""
+        with _alone(self._local):
+            found = self.client.get_experiment_by_name(name)
+            if found is not None:
+                if found.lifecycle_stage == "deleted":
+                    self.client.restore_experiment(found.experiment_id)
+                return str(found.experiment_id)
+            folder = environment.workspace() / "mlartifacts" / name
+            return str(self.client.create_experiment(name, folder.as_uri() if self._local else None))
+
+    def find_experiment(self, name: str) -> str | None:
+        """Id of the experiment of that name, or None."""
+        found = self.client.get_experiment_by_name(name)
+        return None if found is None else str(found.experiment_id)
+
+    def create_run(self, experiment_id: str, name: str, tags: dict[str, str]) -> str:
+        """A new running run."""
+        return str(self.client.create_run(experiment_id, run_name=name, tags=tags).info.run_id)
+
+    def runs(self, experiment_id: str, condition: str) -> Iterator[Any]:
+        """All runs of an experiment that meet an MLflow filter, newest first."""
+        token = None
+        while True:
+            page = self.client.search_runs([experiment_id], condition, max_results=PAGE, page_token=token)
+            yield from page
+            token = page.token
+            if not token:
+                return
+
+    def children(self, experiment_id: str, parent: str) -> dict[str, Any]:
+        """Nested runs of a parent by the label they were given (`candidate:7`, `model:AESI I`)."""
+        condition = f"tags.`{PARENT}` = '{parent}'"
+        return {
+            run.data.tags[NUMBER]: run
+            for run in self.runs(experiment_id, condition)
+            if NUMBER in run.data.tags
+        }
+
+    def away(self, error: Exception) -> bool:
+        """True for a failure that passes: no connection, a locked database, a full disk, a server in trouble."""
+        return _passes(error) or not self._answers()
+
+    def _answers(self) -> bool:
+        try:
+            self.client.search_experiments(max_results=1)
+        except Exception:
+            return False
+        return True
+
+
+def now_ms() -> int:
+    """Milliseconds since the epoch, as MLflow counts."""
+    return int(time.time() * 1000)
+
+
+@contextmanager
+def _alone(local: bool) -> Iterator[None]:
+    """One process at a time makes tables and experiments in a SQLite store."""
+    if not local:
+        yield
+        return
+    path = environment.state() / "mlflow.lock"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with FileLock(path):
+        yield
+
+
+def _write_ahead(database: Path) -> None:
+    """With a write-ahead log readers (the UI, another run) never block the writer; the mode stays."""
+    import sqlite3
+
+    database.parent.mkdir(parents=True, exist_ok=True)
+    connection = sqlite3.connect(database, timeout=30)
+    try:
+        connection.execute("PRAGMA journal_mode=WAL")
+    finally:
+        connection.close()
+
+
+def _reach(uri: str) -> None:
+    """Raise StoreAway unless a server answers at the address within a few seconds."""
+    try:
+        urllib.request.urlopen(f"{uri.rstrip('/')}/health", timeout=REACH_S).close()
+    except urllib.error.HTTPError:
+        return  # it answers, if not kindly; MLflow's own client says more
+    except (OSError, ValueError) as error:
+        raise _unusable(uri, error) from None
+
+
+def _unusable(uri: str, error: Exception) -> StoreAway:
+    reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+    if uri.startswith("http"):
+        advice = (
+            "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's own "
+            "SQLite file"
+        )
+    elif "is full" in reason:
+        advice = "free some space, then start again"
+    else:
+        advice = "check the address, or move the file away to start a new one"
+    return StoreAway(f"the tracking store {_without_password(uri)} cannot be used ({reason}); {advice}.")
+
+
+def _without_password(uri: str) -> str:
+    from urllib.parse import urlsplit
+
+    parts = urlsplit(uri)
+    return uri.replace(f":{parts.password}@", ":***@") if parts.password else uri
+
+
+def _passes(error: BaseException | None) -> bool:
+    """Whether an error or one of its causes speaks of a connection, a lock or a full disk."""
+    import requests
+
+    seen: set[int] = set()
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
+        if isinstance(error, ConnectionError | TimeoutError | requests.exceptions.RequestException):
+            return True
+        if isinstance(error, OSError) and error.errno in PASSING:
+            return True
+        if "database is locked" in str(error) or "disk is full" in str(error):
+            return True
+        error = error.__cause__ or error.__context__
+    return False

@@ -1,0 +1,235 @@
+"""What is tracked of a run: the parent, a nested run per candidate, the models, the data, the machine.
+
+Everything goes through the outbox, so tracking neither slows nor stops the work, and nothing is lost with it.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Protocol
+
+from aesi.pipeline.experiment.sections import TrackingConfig
+from flows.base import environment
+from flows.tracking.delivery import deliver
+from flows.tracking.outbox import FLUSH_S, Outbox
+from flows.tracking.provenance import source_tags
+from flows.tracking.store import KIND, Store, now_ms
+
+PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
+SAMPLE_S = 10.0
+
+
+class Trackable(Protocol):
+    """What a tracker has to know of a job; an experiment is one."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def seed(self) -> int: ...
+
+    @property
+    def digest(self) -> str: ...
+
+    @property
+    def tracking(self) -> TrackingConfig: ...
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A `Trackable` that is no experiment file."""
+
+    name: str
+    seed: int
+    digest: str
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+
+
+class Tracker:
+    """Tracks one flow run, new or resumed.
+
+    run_id : MLflow's id of the parent run, which also names the folder below runs/.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        config: Trackable,
+        say: Callable[[str], None],
+        run_id: str | None = None,
+    ) -> None:
+        self.store = store
+        self._config = config
+        self._experiment_id = store.experiment(config.name)
+        self._tracked: set[str] = set()
+        if run_id is None:
+            tags = {KIND: "run", "aesi.config_digest": config.digest, **source_tags()}
+            name = f"{config.name}, seed {config.seed}"
+            self.run_id = store.create_run(self._experiment_id, name, tags)
+        else:
+            self.run_id = run_id
+            store.client.update_run(run_id, status="RUNNING")
+            self._tracked = set(store.children(self._experiment_id, run_id))
+        self._outbox = Outbox(
+            environment.state() / "outbox" / self.run_id, partial(deliver, store), store.away, say
+        )
+        self._tracked |= {item["label"] for item in self._outbox.items() if item["kind"] == "run"}
+        self._stop = threading.Event()
+        if config.tracking.system_metrics:
+            threading.Thread(target=self._sample, name="aesi-system", daemon=True).start()
+
+    @property
+    def experiment_id(self) -> str:
+        """MLflow's id of the experiment."""
+        return self._experiment_id
+
+    def parameters(self, values: Mapping[str, Any], tags: Mapping[str, str] | None = None) -> None:
+        """Parameters of the parent run."""
+        self._batch(params=_texts(values), tags=dict(tags or {}))
+
+    def metrics(self, values: Mapping[str, float], step: int = 0) -> None:
+        """Metrics of the parent run."""
+        self._batch(metrics=_numbers(values), step=step)
+
+    def datasets(self, rows: Sequence[Mapping[str, str]]) -> None:
+        """Records with name, digest, source, role and profile (a JSON text)."""
+        self._outbox.put({"kind": "datasets", "run_id": self.run_id, "datasets": [dict(row) for row in rows]})
+
+    def nested(
+        self,
+        label: str,
+        name: str,
+        kind: str,
+        params: Mapping[str, Any],
+        metrics: Mapping[str, float],
+        files: Mapping[str, Any] | None = None,
+        failed: str | None = None,
+        seconds: float = 0.0,
+    ) -> None:
+        """A nested run with JSON files; one that is tracked already (in a resumed run) is not tracked again."""
+        if label in self._tracked:
+            return
+        self._tracked.add(label)
+        end = now_ms()
+        tags = {KIND: kind} | ({"aesi.failed": failed[:5000]} if failed else {})
+        self._outbox.put(
+            {
+                "kind": "run",
+                "experiment_id": self._experiment_id,
+                "parent": self.run_id,
+                "label": label,
+                "name": name,
+                "tags": tags,
+                "params": _texts(params),
+                "metrics": _numbers(metrics),
+                "files": {name: json.dumps(content) for name, content in (files or {}).items()},
+                "status": "FAILED" if failed else "FINISHED",
+                "start_ms": end - int(1000 * seconds),
+                "end_ms": end,
+            }
+        )
+
+    def files(self, path: Path, to: str | None = None) -> None:
+        """A file or a folder as artifacts of the parent run."""
+        self._outbox.put({"kind": "files", "run_id": self.run_id, "path": str(path), "to": to})
+
+    def json(self, name: str, content: Any) -> None:
+        """A JSON artifact of the parent run."""
+        self._outbox.put({"kind": "json", "run_id": self.run_id, "name": name, "content": content})
+
+    def model(self, folder: Path) -> None:
+        """The chosen model, as a pyfunc that MLflow can serve."""
+        if not self._config.tracking.log_model:
+            return
+        name = self._config.name if self._config.tracking.register_model else None
+        self._outbox.put(
+            {
+                "kind": "model",
+                "run_id": self.run_id,
+                "path": str(folder),
+                "registered_as": name,
+            }
+        )
+
+    def flush(self, wait_s: float = FLUSH_S) -> int:
+        """Wait until the store has all; returns how many items it has not taken."""
+        return self._outbox.flush(wait_s)
+
+    def end(self, status: str, wait_s: float = FLUSH_S) -> int:
+        """Close the parent run; returns how many items the store has not taken yet."""
+        self._stop.set()
+        self._outbox.put({"kind": "end", "run_id": self.run_id, "status": status, "at_ms": now_ms()})
+        left = self.flush(wait_s)
+        self._outbox.close()
+        return left
+
+    def _batch(
+        self,
+        params: dict[str, str] | None = None,
+        metrics: dict[str, float] | None = None,
+        tags: dict[str, str] | None = None,
+        step: int = 0,
+    ) -> None:
+        self._outbox.put(
+            {
+                "kind": "batch",
+                "run_id": self.run_id,
+                "params": params or {},
+                "metrics": metrics or {},
+                "tags": tags or {},
+                "at_ms": now_ms(),
+                "step": step,
+            }
+        )
+
+    def _sample(self) -> None:
+        """The machine's load under MLflow's own names, so that its system metrics page shows them."""
+        import psutil
+
+        step = 0
+        psutil.cpu_percent()
+        while not self._stop.wait(SAMPLE_S):
+            memory = psutil.virtual_memory()
+            self.metrics(
+                {
+                    "system/cpu_utilization_percentage": psutil.cpu_percent(),
+                    "system/system_memory_usage_megabytes": memory.used / 1e6,
+                    "system/system_memory_usage_percentage": memory.percent,
+                    "system/disk_usage_percentage": psutil.disk_usage("/").percent,
+                },
+                step,
+            )
+            step += 1
+
+
+def flat(content: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one level of dotted names."""
+    result: dict[str, Any] = {}
+    for name, value in content.items():
+        if isinstance(value, Mapping) and value:
+            result |= flat(value, f"{prefix}{name}.")
+        else:
+            result[f"{prefix}{name}"] = value
+    return result
+
+
+def _texts(values: Mapping[str, Any]) -> dict[str, str]:
+    return {name: _text(value) for name, value in values.items()}
+
+
+def _text(value: Any) -> str:
+    text = value if isinstance(value, str) else json.dumps(value, default=str)
+    return text if len(text) <= PARAMETER_LIMIT else text[: PARAMETER_LIMIT - 1] + "…"
+
+
+def _numbers(values: Mapping[str, float]) -> dict[str, float]:
+    """Finite values alone: MLflow turns infinity into 1.8e308, which then draws every plot's scale."""
+    return {
+        name: float(value) for name, value in values.items() if value is not None and math.isfinite(value)
+    }

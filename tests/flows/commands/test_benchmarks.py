@@ -1,0 +1,149 @@
+"""The benchmarks of the platform, small: they measure what they say, and leave nothing behind."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from aesi.errors import InputError
+from flows import benchmarks
+from flows.benchmarks.history import (
+    WATCHED,
+    Entry,
+    latest,
+    read_history,
+    regressions,
+    worth_keeping,
+    write_history,
+)
+from flows.tracking.store import KIND, Store
+
+
+def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
+    small = {"terms": 12, "n": 4000, "resamples": 10, "candidates": 2, "rounds": 1, "artifact_kb": 5.0}
+    (line,) = benchmarks.run("tracking", **small)
+    assert line["untracked_s"] > 0
+    assert 0 < line["waits_s"] < 1
+    assert line["artifact_kb"] == pytest.approx(5.0, rel=0.1)
+    assert not list(workspace.iterdir())
+
+
+@pytest.mark.slow
+def test_two_dask_workers_share_the_work_evenly(workspace):
+    smoke = Path(__file__).resolve().parents[3] / "experiments" / "smoke.yaml"
+    (line,) = benchmarks.run(
+        "scale", experiment=str(smoke), candidates=16, overrides=("search.resamples=100",)
+    )
+    assert line["ratio_by_processor"] > 1.5
+
+
+@pytest.mark.slow
+def test_tracking_adds_less_than_a_tenth_to_a_candidate_of_the_papers_size():
+    # Threads that wait for a busy machine's cores and caches cost processor time too: the best of three counts.
+    found = [next(iter(benchmarks.run("tracking", candidates=6)))["overhead_pct"] for _ in range(3)]
+    assert min(found) < 10, found
+
+
+def judged(spec, cells):
+    return {
+        "case": spec.name,
+        "cell": spec.cell,
+        "label": "none",
+        "verdict": "none",
+        "effects": [],
+        "confidence": 0.9,
+        "right": True,
+        "ours_s": 1.0,
+    }
+
+
+def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch):
+    monkeypatch.setattr("flows.benchmarks.blind.judged", judged)
+    *rows, last = benchmarks.run("blind", small=True, cases=3)
+    assert [row["case"] for row in rows] == ["b000", "b001", "b002"]
+    assert last["summary"]
+    store = Store()
+    (parent,) = store.runs(store.find_experiment("blind"), f"tags.`{KIND}` = 'run'")
+    assert parent.data.metrics["none_right_pct"] == 100.0
+    assert set(store.children(parent.info.experiment_id, parent.info.run_id)) == {
+        "case:b000",
+        "case:b001",
+        "case:b002",
+    }
+    path = store.client.download_artifacts(parent.info.run_id, "confusion.json")
+    assert json.loads(Path(path).read_text()) == {"none": {"none": 3}} == last["confusion"]
+
+
+@pytest.mark.slow
+def test_blind_cases_spread_over_dask_workers(tracked):
+    cells = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+    *rows, last = benchmarks.run("blind", cells=str(cells), small=True, cases=2, workers=2)
+    assert sorted(row["label"] for row in rows) == ["none", "self_heating"]
+    assert last["cases"] == 2
+
+
+SPEED = {"bench": "espm", "case": "drive", "ratio": 200.0, "rmse_mv": 0.05, "ours_s": 0.1}
+
+
+def entry(date="2026-01-01", **changes):
+    return Entry(date, "abcdef0123", "a machine", 0.2, ({**SPEED, **changes},))
+
+
+def test_a_history_is_read_as_it_was_written(tmp_path):
+    path = tmp_path / "h.json"
+    assert read_history(path) == []
+    write_history(path, [entry(), entry("2026-02-01", ratio=150.0)])
+    assert read_history(path) == [entry(), entry("2026-02-01", ratio=150.0)]
+    path.write_text("{}")
+    with pytest.raises(InputError, match="no history of benchmarks"):
+        read_history(path)
+
+
+@pytest.mark.parametrize(
+    ("now", "worse"),
+    [
+        ({}, 0),
+        ({"ratio": 130.0}, 0),  # within the scatter of timings
+        ({"ratio": 110.0}, 1),
+        ({"ratio": 900.0, "rmse_mv": 0.01, "ours_s": 9.9}, 0),
+        ({"rmse_mv": 0.06}, 1),
+        ({"ratio": 1.0, "rmse_mv": 1.0}, 2),
+        ({"ratio": 1.0, "case": "another"}, 0),
+        ({"ratio": None}, 0),
+    ],
+)
+def test_what_is_worse_than_when_it_was_last_recorded_is_named(now, worse):
+    found = regressions([entry("2025-01-01", ratio=1.0), entry()], [{**SPEED, **now}])
+    assert len(found) == worse
+    assert all("espm (drive): " in text and "2026-01-01, abcdef0" in text for text in found)
+
+
+def test_the_newest_of_each_case_counts():
+    entries = [entry(), entry(case="pulse"), entry("2026-03-01")]
+    assert {key: each.date for key, (each, _) in latest(entries).items()} == {
+        ("espm", "drive"): "2026-03-01",
+        ("espm", "pulse"): "2026-01-01",
+    }
+
+
+def test_a_line_that_sums_up_stands_for_the_others():
+    rows = [{"bench": "blind", "case": "a"}, {"bench": "blind", "summary": True}]
+    assert worth_keeping(rows) == (rows[1],)
+    assert worth_keeping(rows[:1]) == (rows[0],)
+
+
+def test_what_is_watched_exists():
+    assert set(WATCHED) <= set(benchmarks.BENCHMARKS)
+
+
+def test_the_command_compares_and_ends_with_1(call, monkeypatch, tmp_path):
+    path = tmp_path / "h.json"
+    write_history(path, [entry()])
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([{**SPEED, "ratio": 3.0}]))
+    code, out, err = call("bench", "espm", "--json", "--compare", path)
+    assert code == 1
+    assert json.loads(out)["ratio"] == 3.0
+    assert err == ("aesi: worse than recorded: espm (drive): ratio was 200 and is 3 (2026-01-01, abcdef0).\n")
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([SPEED]))
+    assert call("bench", "espm", "--compare", path)[0] == 0
+    assert call("bench", "espm", "--compare", tmp_path / "none.json")[0] == 2

@@ -1,0 +1,190 @@
+"""The command line: exit codes, one sentence an error, and what each command leaves."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from flows import cli
+
+
+def test_version(call):
+    assert call("--version")[:2] == (0, "aesi 0.1.0\n")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["fly"], ["run"], ["run", "a", "b"], ["simulate"], ["tables", "x", "--format", "xls"], ["--nope"]],
+)
+def test_usage_errors_are_exit_code_2(call, arguments):
+    code, out, err = call(*arguments)
+    assert code == 2
+    assert out == ""
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["run", "none.yaml"], "there is no such experiment file"),
+        (["effects", "self_heatin"], "did you mean 'self_heating'?"),
+        (["bench", "nothing"], "there is no benchmark 'nothing'"),
+        (["discover", "--data", "a.csv"], "give --cell, --data and --out"),
+        (["simulate", "--cell", "no.json", "--current", "no.csv", "--out", "o.csv"], "no.csv"),
+        (["tables", "nothing"], "no experiment 'nothing' is tracked"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, words):
+    code, _, err = call(*arguments)
+    assert code == 2
+    assert words in err
+    assert err.startswith("aesi: ")
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["deep.yaml", "deep.json"])
+def test_a_file_nested_without_end_is_one_sentence(call, tmp_path, current, name):
+    path = tmp_path / name
+    path.write_text("[" * 5000 + "]" * 5000)
+    simulate = ("simulate", "--cell", path, "--current", current, "--soc0", 0.5, "--out", tmp_path / "o.csv")
+    code, _, err = call(*(("run", path) if name == "deep.yaml" else simulate))
+    assert code == 2
+    assert err.startswith("aesi: ")
+    assert err.count("\n") == 1
+
+
+def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):
+    def broken(*_):
+        raise RuntimeError("odd\nand more")
+
+    monkeypatch.setattr("flows.jobs.worker.read_experiment", broken)
+    code, _, err = call("worker", "x.yaml")
+    assert code == 1
+    assert err == "aesi: unexpected RuntimeError: odd (AESI_DEBUG=1 shows where).\n"
+
+
+def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
+    code, _, err = call(
+        "simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o/run.csv", "--soc0", 0.6
+    )
+    assert code == 0, err
+    table = pd.read_csv(tmp_path / "o/run.csv")
+    assert {"time_s", "current_a", "voltage_v", "c_sp", "c_sn", "c_e0", "c_eL", "soc"} <= set(table)
+    assert len(table) == 600
+    assert table["soc"][0] == pytest.approx(0.6, abs=1e-3)
+
+
+def test_a_profile_with_other_headers_is_told_only_of_columns_that_it_has(call, cell, tmp_path):
+    path = tmp_path / "bad.csv"
+    path.write_text("Time [s],I [A]\n0,0\n1,1\n")
+    code, _, err = call("simulate", "--cell", cell, "--current", path, "--out", tmp_path / "o.csv")
+    assert code == 2
+    assert err.endswith("It has: 'Time [s]', 'I [A]'.\n")
+
+
+def test_what_the_reader_did_to_a_profile_is_said(call, cell, current, tmp_path):
+    arguments = ("simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o.csv", "--soc0", 0.6)
+    code, _, err = call(*arguments, "--sign", "charge-positive")
+    assert code == 0, err
+    assert f"{current.name}: The current was declared positive on charge; its sign was turned." in err
+
+
+def test_an_effect_of_the_catalogue_can_be_added(call, cell, current, tmp_path):
+    arguments = ("simulate", "--cell", cell, "--current", current, "--soc0", 0.6, "--out")
+    call(*arguments, tmp_path / "a.csv")
+    code, _, err = call(*arguments, tmp_path / "b.csv", "--effect", "series_resistance:resistance_ohm=1e-3")
+    assert code == 0, err
+    a, b = (pd.read_csv(tmp_path / name) for name in ("a.csv", "b.csv"))
+    assert np.allclose(a["voltage_v"] - b["voltage_v"], 1e-3 * a["current_a"], atol=1e-6)
+
+
+def test_without_a_voltage_the_start_has_to_be_given(call, cell, current, tmp_path):
+    code, _, err = call("simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o.csv")
+    assert code == 2
+    assert "give --soc0" in err
+
+
+def test_effects_lists_and_shows(call):
+    code, out, _ = call("effects")
+    assert code == 0
+    assert {"self_heating", "ocv_hysteresis", "clock_skew"} <= {line.split()[0] for line in out.splitlines()}
+    code, out, _ = call("effects", "series_resistance")
+    assert "resistance_ohm = " in out
+    assert "Source: " in out
+    assert (
+        "\nLeaves out its dependence on temperature. Holds wherever" in out
+    )  # said once, not "Holds: Leaves out"
+
+
+def test_data_lists_sets(call):
+    code, out, _ = call("data", "list")
+    assert code == 0
+    assert "about_energy_nmc" in out
+
+
+def test_lists_of_files_may_follow_one_option():
+    given = ["calibrate", "--data", "a", "b", "--out", "x", "--test=c", "--test", "d", "e"]
+    assert cli.repeated(given) == [
+        *["calibrate", "--data", "a", "--data", "b", "--out", "x", "--test=c", "--test", "d", "--test", "e"]
+    ]
+    assert cli.repeated(["run", "--data", "a", "b"]) == ["run", "--data", "a", "b"]
+
+
+def test_bench_prints_json_lines(call, monkeypatch):
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **options: iter([{"ours_s": 1.0, **options}]))
+    code, out, _ = call("bench", "espm", "--json", "--set", "n=3")
+    assert code == 0
+    assert json.loads(out) == {"bench": "espm", "ours_s": 1.0, "n": 3}
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(
+        st.sampled_from(
+            ["run", "simulate", "predict", "effects", "tables", "--cell", "--out", "--set", "--soc0", "--"]
+        )
+        | st.text(max_size=8),
+        max_size=5,
+    )
+)
+def test_no_arguments_make_a_traceback(call, tracked, arguments):
+    if arguments[:1] and arguments[0] in ("ui", "bench"):
+        return
+    code, _, err = call(*arguments)
+    assert code in (0, 1, 2)
+    assert "Traceback" not in err
+    assert "aesi: unexpected" not in err
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        (["aesi", "dis"], "discover"),
+        (["aesi", "effects", "self_h"], "self_heating"),
+        (["aesi", "bench", "tra"], "tracking"),
+        (["aesi", "data", "get", "about"], "about_energy_nmc"),
+    ],
+)
+def test_the_shell_is_offered_names(words, offered):
+    command = Path(sys.executable).with_name("aesi")
+    asked = {
+        "COMP_WORDS": " ".join(words),
+        "COMP_CWORD": str(len(words) - 1),
+        "_AESI_COMPLETE": "complete_bash",
+    }
+    done = subprocess.run(
+        [command], env=os.environ | asked, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.stdout.split() == [offered], done.stderr
+
+
+def test_every_command_is_told_in_one_whole_line(call):
+    _, out, _ = call("--help")
+    assert "..." not in out.split("Commands:")[1]

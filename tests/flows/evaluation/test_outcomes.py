@@ -1,0 +1,142 @@
+"""The shared store of outcomes: atomic, claimed by one process at a time, and by nobody who is dead."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from aesi.errors import InputError
+from flows.base.files import write_atomically
+from flows.evaluation.outcome_database import DatabaseOutcomes
+from flows.evaluation.outcome_files import FileOutcomes
+from flows.evaluation.outcome_store import open_outcomes
+
+KEY = "ab" * 16
+
+
+@pytest.fixture(params=["file", "database"])
+def opened(request, tmp_path):
+    """Opens the same store any number of times."""
+    stores = []
+
+    def open_one():
+        url = f"sqlite:///{tmp_path}/outcomes.db" if request.param == "database" else None
+        stores.append(open_outcomes(tmp_path / "outcomes", url))
+        return stores[-1]
+
+    yield open_one
+    for store in stores:
+        store.close()
+
+
+def test_what_is_put_is_found_by_everyone(opened):
+    one, other = opened(), opened()
+    assert other.get(KEY) is None
+    one.put(KEY, b"x" * 100_000)
+    assert other.get(KEY) == b"x" * 100_000
+    one.discard(KEY)
+    assert other.get(KEY) is None
+
+
+def test_a_claim_has_one_owner_until_it_is_released(opened):
+    one, other = opened(), opened()
+    assert one.claim(KEY)
+    assert one.claim(KEY)
+    assert not other.claim(KEY)
+    one.release(KEY)
+    assert other.claim(KEY)
+
+
+def test_a_result_can_be_put_over_a_claim(opened):
+    one, other = opened(), opened()
+    one.claim(KEY)
+    one.put(KEY, b"done")
+    one.release(KEY)
+    assert other.get(KEY) == b"done"
+
+
+def test_many_threads_agree_on_one_owner(opened):
+    stores = [opened() for _ in range(8)]
+    won = []
+    barrier = threading.Barrier(len(stores))
+
+    def try_it(store):
+        barrier.wait()
+        if store.claim(KEY):
+            won.append(store)
+
+    threads = [threading.Thread(target=try_it, args=(store,)) for store in stores]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(won) == 1
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from flows.evaluation.outcome_files import FileOutcomes
+store = FileOutcomes(Path(sys.argv[1]))
+print(store.claim(sys.argv[2]), flush=True)
+time.sleep(60)
+"""
+
+
+def test_the_claim_of_a_killed_process_is_free_at_once(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-c", HOLD, str(tmp_path), KEY], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout.readline() == "True\n"
+    store = FileOutcomes(tmp_path)
+    assert not store.claim(KEY)
+    process.kill()
+    process.communicate()
+    assert store.claim(KEY)
+    store.close()
+
+
+def test_the_claim_of_a_silent_owner_is_taken_over(tmp_path, monkeypatch):
+    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 60.0)  # as good as dead
+    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 0.5)
+    url = f"sqlite:///{tmp_path}/outcomes.db"
+    dead, alive = DatabaseOutcomes(url), DatabaseOutcomes(url)
+    assert dead.claim(KEY)
+    assert not alive.claim(KEY)
+    time.sleep(0.7)
+    assert alive.claim(KEY)
+
+
+def test_a_beating_heart_keeps_the_claim(tmp_path, monkeypatch):
+    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 0.1)
+    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 0.5)
+    url = f"sqlite:///{tmp_path}/outcomes.db"
+    owner, other = DatabaseOutcomes(url), DatabaseOutcomes(url)
+    assert owner.claim(KEY)
+    time.sleep(1.0)
+    assert not other.claim(KEY)
+    owner.close()
+    other.close()
+
+
+def test_a_database_that_is_not_there_is_one_sentence():
+    with pytest.raises(InputError, match=r"runner\.storage .* cannot be used") as caught:
+        DatabaseOutcomes("postgresql://me:secret@127.0.0.1:9/none")
+    assert "secret" not in str(caught.value)
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
+    path = tmp_path / "x"
+    write_atomically(path, b"old")
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space"):
+        write_atomically(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]

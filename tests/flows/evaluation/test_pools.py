@@ -1,0 +1,125 @@
+"""Processes that evaluate: what goes wrong in one candidate stays in it."""
+
+import os
+import signal
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from aesi.errors import FitError, InputError
+from aesi.records import Failed
+from flows.evaluation.local_pool import LocalPool
+
+
+def behave(genome):
+    """A stand-in for the evaluation whose genome says how it ends."""
+    kind, value = genome
+    if kind == "sleep":
+        time.sleep(value)
+    elif kind == "raise":
+        raise ValueError(value)
+    elif kind == "reject":
+        raise FitError(value)
+    elif kind == "eat":
+        return np.ones(value).sum()
+    elif kind == "die":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return value
+
+
+@pytest.fixture
+def pool():
+    made = LocalPool(lambda: behave, workers=2, timeout_s=2.0, memory_mb=500)
+    yield made
+    made.close()
+
+
+def outcomes(pool, genomes, timeout_s=20.0):
+    found, waiting, deadline = {}, list(enumerate(genomes)), time.monotonic() + timeout_s
+    while len(found) < len(genomes):
+        assert time.monotonic() < deadline
+        while waiting and pool.idle:
+            tag, genome = waiting.pop(0)
+            pool.start(tag, genome)
+        found |= dict(pool.collect(0.2))
+    return [found[i] for i in range(len(genomes))]
+
+
+def test_outcomes_come_back_with_their_tags(pool):
+    assert outcomes(pool, [("return", i) for i in range(20)]) == list(range(20))
+
+
+def test_a_hang_is_cut_off_and_the_pool_goes_on(pool):
+    result = outcomes(pool, [("sleep", 60), ("return", 1), ("return", 2), ("return", 3)])
+    assert result == [Failed("took longer than 2 s"), 1, 2, 3]
+
+
+def test_an_exception_is_an_outcome_that_says_where(pool):
+    odd, rejected, fine = outcomes(pool, [("raise", "odd"), ("reject", "no terms"), ("return", 1)])
+    assert odd.reason.startswith("ValueError: odd (in test_pools.py:")
+    assert rejected == Failed("no terms")
+    assert fine == 1
+
+
+@pytest.mark.skipif(os.uname().sysname != "Linux", reason="memory is limited on Linux")
+def test_eating_memory_is_an_outcome(pool):
+    eaten, fine = outcomes(pool, [("eat", 10**9), ("eat", 10**6)])
+    assert eaten == Failed("ran out of memory (search.memory_mb)")
+    assert fine == 10**6
+
+
+def test_a_lost_process_costs_one_candidate(pool):
+    result = outcomes(pool, [("die", 0), ("return", 1), ("die", 0), ("return", 2)])
+    assert [isinstance(one, Failed) for one in result] == [True, False, True, False]
+    assert "SIGKILL" in result[0].reason
+
+
+def test_a_process_that_died_idle_is_replaced(pool):
+    outcomes(pool, [("return", 0), ("return", 0)])
+    for one in pool._processes:
+        os.kill(one.process.pid, signal.SIGKILL)
+        one.process.join()
+    assert outcomes(pool, [("return", 1), ("return", 2)]) == [1, 2]
+
+
+def test_closing_ends_the_processes_at_once(pool):
+    pool.start(0, ("sleep", 60))
+    processes = [one.process for one in pool._processes]
+    started = time.monotonic()
+    pool.close()
+    assert time.monotonic() - started < 2
+    assert not any(process.is_alive() for process in processes)
+
+
+ORPHANS = """
+import os, time, sys
+from flows.evaluation.local_pool import LocalPool
+pool = LocalPool(lambda: time.sleep, 2, 600, 1000)
+pool.start(0, 600)
+print(*[p.process.pid for p in pool._processes], flush=True)
+time.sleep(600)
+"""
+
+
+def test_the_processes_of_a_killed_parent_end(tmp_path):
+    import subprocess
+    import sys
+
+    import psutil
+
+    with subprocess.Popen([sys.executable, "-c", ORPHANS], stdout=subprocess.PIPE, text=True) as parent:
+        children = [psutil.Process(int(pid)) for pid in parent.stdout.readline().split()]
+        parent.kill()
+    gone, alive = psutil.wait_procs(children, timeout=10)
+    assert not alive
+    assert len(gone) == 2
+
+
+def test_without_dask_it_says_what_to_install(monkeypatch):
+    from flows.evaluation.dask_pool import DaskPool
+
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'dask\[distributed\]'"):
+        DaskPool("{}", "", None, workers=1, timeout_s=1.0)

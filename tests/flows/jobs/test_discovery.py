@@ -1,0 +1,91 @@
+"""The discovery as a flow: files written, every hypothesis tracked, with and without Prefect."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.physics import Cell, simulate
+from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.discovery import discover as pipeline
+from aesi.pipeline.discovery.discover import Case
+from aesi.pipeline.product.hybrid import HybridModel
+from aesi.records import Measurement
+
+CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
+
+
+@pytest.fixture
+def case(monkeypatch):
+    """A small record with an ohmic drop that the cell file does not declare, and two effects to choose from."""
+    few = {name: CATALOGUE[name] for name in ("series_resistance", "voltage_sensor_offset")}
+    monkeypatch.setattr(pipeline, "CATALOGUE", few)
+    rng = np.random.default_rng(3)
+    time = np.arange(1800.0)
+    current = np.repeat(rng.normal(0.3, 0.7, 90), 20) * 45.0
+    current[:60] = 0.0
+    effect = CATALOGUE["series_resistance"].activate(resistance_ohm=2e-4)
+    voltage = simulate(Cell.from_bpx(CELL), time, current, 0.9, (effect,)).voltage_v
+    data = Measurement(
+        time, current, voltage + 1e-3 * rng.normal(size=1800), name="drive", notes=("drive: thinned.",)
+    )
+    return Case(CELL, (data,), soc0=0.9)
+
+
+def test_everything_is_written_and_tracked(tracked, case):
+    from flows.jobs.discovery import discover
+    from flows.tracking.store import Store
+
+    out = tracked / "out"
+    content = discover(case, out, use_prefect=False)
+    assert content == json.loads((out / "discovery.json").read_text())
+    assert content["schema"] == "aesi.discovery/1"
+    assert content["effects"] == ["series_resistance"]
+    assert content["after"]["test"]["rmse_mv"] < content["before"]["test"]["rmse_mv"]
+    assert content["notes"][0] == "drive: thinned."
+    report = (out / "report.html").read_text()
+    assert "series_resistance" in report
+    assert "<li>drive: thinned.</li>" in report
+    model = HybridModel.load(out / "model")
+    data = case.measurements[0]
+    voltage = model.predict(data.time_s, data.current_a, soc0=model.soc0).voltage_v
+    assert np.sqrt(np.mean((voltage - data.voltage_v) ** 2)) < 1.1e-3
+    store = Store()
+    runs = list(store.runs(store.find_experiment("discover"), ""))
+    names = {run.info.run_name for run in runs}
+    assert {"series_resistance", "voltage_sensor_offset"} <= names
+
+
+def test_a_cell_file_that_is_none_is_refused_before_anything_starts(workspace, case, tmp_path):
+    from dataclasses import replace
+
+    from aesi.errors import CellError
+    from flows.jobs.discovery import discover
+
+    path = tmp_path / "cell.json"
+    path.write_text("{}")
+    with pytest.raises(CellError) as caught:
+        discover(replace(case, cell=path), tmp_path / "out", use_prefect=False)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_under_prefect_the_finding_is_the_same(tracked, case):
+    from prefect.client.orchestration import get_client
+    from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
+    from prefect.testing.utilities import prefect_test_harness
+
+    from flows.jobs.discovery import discover
+
+    plain = discover(case, tracked / "plain", use_prefect=False)
+    with prefect_test_harness(server_startup_timeout=180):
+        found = discover(case, tracked / "out", use_prefect=True)
+        with get_client(sync_client=True) as client:
+            (run,) = client.read_flow_runs(limit=9, sort=FlowRunSort.ID_DESC)
+            tasks = client.read_task_runs(limit=9, sort=TaskRunSort.ID_DESC)
+    assert run.state.is_completed()
+    assert {task.name.rsplit("-", 1)[0] for task in tasks} == {"hypotheses", "report"}
+    assert found["effects"] == plain["effects"] == ["series_resistance"]
+    assert found["after"] == plain["after"]

@@ -1,0 +1,278 @@
+"""`aesi run`, whole, on a small virtual experiment: outputs, tracking, tables, resumption."""
+
+import json
+import re
+import time
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from flows.tracking.store import KIND, Store
+
+METRICS = {
+    "loss/oob",
+    "loss/valid",
+    "loss/sparse",
+    "fitness",
+    "pearson/train",
+    "pearson/valid",
+    "free_run/valid_mser_pct",
+    "one_step/valid_rmse_mv",
+    "intervals/valid_coverage_pct",
+    "intervals/valid_width_v",
+}
+PARAMETERS = {
+    "lambda1",
+    "lambda2",
+    "tau",
+    "p_c",
+    "d",
+    "library_terms",
+    "library_hash",
+    "seed",
+    "data_hashes",
+    "versions",
+}
+
+
+def tracked_runs(name="smoke", workspace=None):
+    store = Store(f"sqlite:///{workspace}/mlflow.db" if workspace else None)
+    experiment = store.find_experiment(name)
+    (parent, *others) = store.runs(experiment, f"tags.`{KIND}` = 'run'")
+    assert not others
+    return store, parent, store.children(experiment, parent.info.run_id)
+
+
+def candidates(children):
+    return {label: run for label, run in children.items() if label.startswith("candidate:")}
+
+
+def fingerprint(children):
+    """What decides whether two runs ended alike."""
+    return {
+        label: (run.data.params["lambda1"], run.data.params["library_hash"], run.data.metrics.get("fitness"))
+        for label, run in candidates(children).items()
+    }
+
+
+def test_a_run_leaves_its_outputs(finished):
+    (folder,) = (finished / "runs" / "smoke").iterdir()
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["schema"] == "aesi.summary/1"
+    assert summary["mlflow_run_id"] == folder.name
+    assert summary["candidates"] == 6
+    assert [row["name"] for row in summary["models"]] == ["ESPM", "ESPM + AESI I", "ESPM + ridge"]
+    assert summary["models"][0]["free_run"]["test_mser_pct"] == pytest.approx(0, abs=1e-9)
+    for name in ("report.html", "tables.md", "tables.tex", "model/model.json"):
+        assert (folder / name).stat().st_size > 100
+
+
+@pytest.mark.parametrize("page", ["report.html", "figures/paper.html"])
+def test_the_figures_of_the_paper_are_drawn(finished, page):
+    (folder,) = (finished / "runs" / "smoke").iterdir()
+    content = (folder / page).read_text()
+    for figure in ("bootstrap_coverage", "error_map_after", "violin", "ranking", "intervals_1"):
+        assert f'"{figure}":' in content
+
+
+def test_everything_is_tracked(finished):
+    store, parent, children = tracked_runs(workspace=finished)
+    assert parent.info.status == "FINISHED"
+    assert {"seed", "search.candidates", "versions", "chosen_candidate"} <= parent.data.params.keys()
+    assert "aesi.dirty" in parent.data.tags
+    roles = {tag.value for entry in parent.inputs.dataset_inputs for tag in entry.tags}
+    assert roles == {"train", "valid", "test"}
+    assert len(candidates(children)) == 6
+    for child in candidates(children).values():
+        assert child.data.params.keys() >= PARAMETERS
+        assert child.info.status == ("FAILED" if "aesi.failed" in child.data.tags else "FINISHED")
+        if child.info.status == "FINISHED":
+            assert child.data.metrics.keys() >= METRICS
+            path = store.client.download_artifacts(child.info.run_id, "coefficients.json")
+            content = json.loads(Path(path).read_text())
+            assert set(content) == {"bagging", "stability", "inclusion"}
+            assert set(content["bagging"]) <= set(content["inclusion"])
+            assert child.info.end_time > child.info.start_time
+    headlines = {name.split("/")[0] for name in parent.data.metrics} - {"system", "terms", "seconds"}
+    assert headlines == {"free_run", "one_step", "intervals", "tables"}
+    of_candidates = {name for child in candidates(children).values() for name in child.data.metrics}
+    assert not [name for name in of_candidates if "test" in name]  # only the chosen model meets the test set
+
+
+def test_the_model_is_served_by_mlflow_and_is_the_saved_one(finished):
+    import mlflow
+    import numpy as np
+    import pandas as pd
+
+    import aesi
+
+    (folder,) = (finished / "runs" / "smoke").iterdir()
+    uri = f"sqlite:///{finished}/mlflow.db"
+    assert not [path for path in (finished / "mlartifacts").rglob("*") if path.suffix in (".pkl", ".pickle")]
+    before = mlflow.get_tracking_uri()
+    mlflow.set_tracking_uri(uri)
+    try:
+        served = mlflow.pyfunc.load_model("models:/smoke/1")
+    finally:
+        mlflow.set_tracking_uri(before)
+    time_s = np.arange(0.0, 60.0, 2.0)
+    table = pd.DataFrame({"time_s": time_s, "current_a": np.full(30, 20.0)})
+    ours = aesi.HybridModel.load(folder / "model").predict(time_s, table["current_a"].to_numpy(), soc0=0.7)
+    assert np.array_equal(served.predict(table, params={"soc0": 0.7})["voltage_v"], ours.voltage_v)
+
+
+@pytest.mark.slow
+def test_the_model_answers_mlflows_own_command(finished, tmp_path):
+    import os
+    import subprocess
+    import sys
+
+    time_s = [float(t) for t in range(10)]
+    rows = {"time_s": time_s, "current_a": [20.0] * 10}
+    (tmp_path / "rows.csv").write_text(pd.DataFrame(rows).to_csv(index=False))
+    command = [sys.executable, "-m", "mlflow", "models", "predict", "--model-uri", "models:/smoke/1"]
+    command += ["--env-manager", "local", "--content-type", "csv", "--input-path", str(tmp_path / "rows.csv")]
+    uri = {"MLFLOW_TRACKING_URI": f"sqlite:///{finished}/mlflow.db"}
+    done = subprocess.run(command, env=os.environ | uri, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    answer = json.loads(done.stdout.strip().splitlines()[-1])["predictions"]
+    assert len(answer) == 10
+    assert all(row["lower_v"] < row["voltage_v"] < row["upper_v"] for row in answer)
+
+
+def test_tables_come_from_the_store_alone(finished, tmp_path, monkeypatch):
+    from flows.results.tables import tables_of
+
+    (folder,) = (finished / "runs" / "smoke").iterdir()
+    before = (folder / "tables.md").read_text()
+    uri = f"sqlite:///{finished}/mlflow.db"
+    monkeypatch.setenv("AESI_HOME", str(tmp_path))  # a workspace without runs/ and .aesi/
+    text = tables_of("smoke", uri=uri)
+    assert text.startswith(before.rstrip("\n"))
+    assert folder.name in text
+    assert tables_of("smoke", "tex", uri=uri).count(r"\begin{tabular}") == before.count("|---|")
+    assert 'model,"MSER train, %"' in tables_of("smoke", "csv", uri=uri)
+    tables_of("smoke", figures=tmp_path / "figures", uri=uri)
+    for page in ("report.html", "figures/paper.html"):
+        assert (tmp_path / "figures" / folder.name / page).read_bytes() == (folder / page).read_bytes()
+
+
+def test_predict_in_both_regimes(call, finished, current, tmp_path):
+    (model,) = (finished / "runs/smoke").glob("*/model")
+    code, _, err = call(
+        "predict", "--model", model, "--current", current, "--out", tmp_path / "p.csv", "--soc0", 0.6
+    )
+    assert code == 0, err
+    free = pd.read_csv(tmp_path / "p.csv")
+    assert {"time_s", "current_a", "voltage_v", "lower_v", "upper_v"} <= set(free)
+    code, _, err = call(
+        "predict", "--model", model, "--current", current, "--out", tmp_path / "q.csv", "--measured"
+    )
+    assert code == 2
+    assert "has no voltage_v" in err
+    free[["time_s", "current_a", "voltage_v"]].to_csv(tmp_path / "measured.csv", index=False)
+    code, _, err = call(
+        "predict",
+        "--model",
+        model,
+        "--current",
+        tmp_path / "measured.csv",
+        "--out",
+        tmp_path / "q.csv",
+        "--measured",
+    )
+    assert code == 0, err
+    assert (pd.read_csv(tmp_path / "q.csv")["upper_v"][5:] > free["voltage_v"][5:] - 1.0).all()
+
+
+def test_seeds_become_mean_and_spread(run):
+    from flows.results.tables import tables_of
+
+    one = json.loads((run("seed=0", "search.candidates=3") / "summary.json").read_text())
+    two = json.loads((run("seed=1", "search.candidates=3") / "summary.json").read_text())
+    run("search.lambda1=[1e-6, 1.0]", "search.candidates=3", "name=other")
+    text = tables_of("smoke")
+    figures = [rows["models"][1]["free_run"]["test_mser_pct"] for rows in (one, two)]
+    assert f"{sum(figures) / 2:.2f} [{min(figures):.2f}, {max(figures):.2f}]" in text
+    assert one["mlflow_run_id"] in text
+    assert two["mlflow_run_id"] in text
+
+
+def test_killed_in_the_search_and_resumed_ends_as_an_uninterrupted_run(aesi, arguments, tracked, finished):
+    process = aesi(*arguments())
+    wait_for(lambda: len(list((tracked / ".aesi/cache/candidates").glob("??/*.bin"))) >= 2, process)
+    process.kill()
+    process.wait()
+    known = set((tracked / ".aesi/cache/candidates").glob("??/*.bin"))
+    stamps = {path: path.stat().st_mtime_ns for path in known}
+    done = aesi(*arguments(), "--resume")
+    _, said = done.communicate(timeout=120)
+    assert done.returncode == 0, said
+    assert "resumed" in said
+    assert f"{len(known)} known from before" in said
+    assert {path: path.stat().st_mtime_ns for path in known} == stamps  # none was evaluated twice
+    _, parent, children = tracked_runs()
+    assert parent.info.status == "FINISHED"
+    assert len(candidates(children)) == 6
+    assert fingerprint(children) == fingerprint(tracked_runs(workspace=finished)[2])
+    (resumed,) = (tracked / "runs/smoke").glob("*/tables.md")
+    (whole,) = (finished / "runs/smoke").glob("*/tables.md")
+    assert without_times(resumed.read_text()) == without_times(whole.read_text())
+
+
+@pytest.mark.slow
+def test_interrupted_twice_says_how_to_go_on_and_resumes(aesi, arguments, tracked):
+    process = aesi(*arguments("search.candidates=12"))
+    wait_for(lambda: list((tracked / ".aesi/cache/candidates").glob("??/*.bin")), process)
+    process.send_signal(2)
+    time.sleep(0.05)
+    process.send_signal(2)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in said
+    assert "Interrupted" in said
+    done = aesi(*arguments("search.candidates=12"), "--resume")
+    _, said = done.communicate(timeout=120)
+    assert done.returncode == 0, said
+    assert "resumed" in said
+
+
+@pytest.mark.slow
+def test_a_killed_run_is_closed_by_the_next(aesi, arguments, tracked, run):
+    process = aesi(*arguments())
+    wait_for(lambda: list((tracked / ".aesi/state").glob("*.json")), process)
+    process.kill()
+    process.wait()
+    run()
+    store = Store()
+    runs = list(store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'"))
+    assert sorted(run.info.status for run in runs) == ["FINISHED", "KILLED"]
+
+
+def test_two_workers_give_the_candidates_of_one(run, finished):
+    run("search.workers=2")
+    assert fingerprint(tracked_runs()[2]) == fingerprint(tracked_runs(workspace=finished)[2])
+
+
+def test_a_server_that_is_away_is_one_sentence(aesi, arguments):
+    process = aesi(*arguments("tracking.uri=http://127.0.0.1:9"))
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert said.count("\n") == 2  # the experiment's name, then the sentence
+    assert "the tracking store http://127.0.0.1:9 cannot be used" in said
+    assert "start the server" in said
+
+
+def wait_for(condition, process, timeout_s=90):
+    deadline = time.monotonic() + timeout_s
+    while not condition():
+        if process.poll() is not None:
+            raise AssertionError(f"ended early: {process.communicate()[1]}")
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def without_times(table):
+    """Tables without their last column of seconds."""
+    return re.sub(r"\| [\d.]+ \|$", "|", table, flags=re.MULTILINE)

@@ -1,0 +1,118 @@
+"""Killed with -9 where it hurts, then resumed: the result of an uninterrupted run, nothing done or tracked twice."""
+
+import os
+import re
+import subprocess
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from flows.tracking.store import KIND, NUMBER, PARENT, Store
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[2]
+
+
+@pytest.fixture
+def killed(tracked):
+    """Runs `aesi` until it dies in the n-th call of a function; what it had said by then."""
+
+    def run(module, name, call, arguments):
+        command = [sys.executable, str(HERE / "killed_inside.py"), module, name, str(call), *arguments]
+        environ = os.environ | {"PYTHONPATH": str(ROOT)}
+        done = subprocess.run(
+            command, cwd=tracked, env=environ, capture_output=True, text=True, timeout=240, check=False
+        )
+        assert done.returncode == -9, done.stderr
+        return done.stderr
+
+    return run
+
+
+def candidates_on_disk(workspace):
+    return {path: path.stat().st_mtime_ns for path in (workspace / ".aesi/cache/candidates").glob("??/*.bin")}
+
+
+def all_tracked(workspace):
+    """The one parent run, and every nested run with its label; a label that was tracked twice is there twice."""
+    store = Store(f"sqlite:///{workspace}/mlflow.db")
+    experiment = store.find_experiment("smoke")
+    (parent,) = store.runs(experiment, f"tags.`{KIND}` = 'run'")
+    nested = list(store.runs(experiment, f"tags.`{PARENT}` = '{parent.info.run_id}'"))
+    return parent, [(run.data.tags[NUMBER], run) for run in nested]
+
+
+def what_counts(nested):
+    return {
+        label: (run.info.status, run.data.params, without_clock(run.data.metrics))
+        for label, run in nested
+        if label.startswith(("candidate:", "model:"))
+    }
+
+
+def without_clock(metrics):
+    return {name: value for name, value in metrics.items() if "seconds" not in name}
+
+
+def assert_as_uninterrupted(workspace, finished):
+    parent, nested = all_tracked(workspace)
+    assert parent.info.status == "FINISHED"
+    assert max(Counter(label for label, _ in nested).values()) == 1
+    assert what_counts(nested) == what_counts(all_tracked(finished)[1])
+    tables = [next((each / "runs/smoke").glob("*/tables.md")).read_text() for each in (workspace, finished)]
+    resumed, whole = (re.sub(r"\| [\d.]+ \|$", "|", text, flags=re.MULTILINE) for text in tables)
+    assert resumed == whole
+
+
+def resume(aesi, arguments):
+    process = aesi(*arguments, "--resume")
+    _, said = process.communicate(timeout=240)
+    assert process.returncode == 0, said
+    assert "resumed" in said
+    return said
+
+
+def test_killed_in_the_calibration_of_the_intervals(killed, aesi, arguments, tracked, finished):
+    said = killed("aesi.conformal", "FreeRunBands.fit", 2, arguments())
+    assert "final models: done" in said
+    assert "intervals: done" not in said
+    before = candidates_on_disk(tracked)
+    assert len(before) == 6
+    said = resume(aesi, arguments())
+    assert "0 candidates evaluated, 6 known from before" in said
+    assert candidates_on_disk(tracked) == before
+    assert_as_uninterrupted(tracked, finished)
+
+
+@pytest.mark.slow
+def test_killed_in_the_delivery_of_a_candidate(killed, aesi, arguments, tracked, finished):
+    killed("flows.tracking.delivery", "_write_files", 3, arguments())  # the third candidate is there in part
+    waiting = list((tracked / ".aesi/outbox").glob("*/[0-9]*.json"))
+    assert waiting
+    before = candidates_on_disk(tracked)
+    resume(aesi, arguments())
+    assert {path: stamp for path, stamp in candidates_on_disk(tracked).items() if path in before} == before
+    assert not list((tracked / ".aesi/outbox").glob("*/[0-9]*.json"))
+    assert_as_uninterrupted(tracked, finished)
+
+
+@pytest.mark.slow
+def test_killed_when_the_last_item_is_delivered(killed, aesi, arguments, tracked, finished):
+    said = killed("mlflow", "MlflowClient.set_terminated", 6 + 3 + 1, arguments())  # candidates, models, run
+    assert "report: done" in said
+    before = candidates_on_disk(tracked)
+    resume(aesi, arguments())
+    assert candidates_on_disk(tracked) == before
+    assert_as_uninterrupted(tracked, finished)
+
+
+@pytest.mark.slow
+def test_killed_after_the_model_was_registered(killed, aesi, arguments, tracked):
+    with_model = [*arguments(), "--set", "tracking.log_model=true"]
+    killed("flows.tracking.logged_model", "_register", 1, with_model)
+    resume(aesi, with_model)
+    client = Store(f"sqlite:///{tracked}/mlflow.db").client
+    assert [version.version for version in client.search_model_versions("name = 'smoke'")] == [1]
+    assert len(client.search_logged_models([client.get_experiment_by_name("smoke").experiment_id])) == 1

@@ -1,0 +1,92 @@
+"""Stages: timed, retried where that helps, shown where a person looks."""
+
+import logging
+import signal
+import time
+
+import pytest
+
+from aesi.errors import DataError
+from flows.base.console import Console
+from flows.jobs.stages import ServerAway, StageOverdue, plainly, server_in_reach
+
+
+def test_a_stage_says_when_it_is_done(said):
+    assert plainly(said.append)("sums", lambda: 2 + 2) == 4
+    assert said == ["sums: done in 0 s"]
+
+
+def test_a_stage_that_takes_too_long_is_interrupted_in_one_sentence(said):
+    started = time.monotonic()
+    with pytest.raises(
+        StageOverdue, match=r"'rest' took longer than .* \(runner\.stage_timeout_s\)"
+    ) as caught:
+        plainly(said.append, timeout_s=0.2)("rest", lambda: time.sleep(30))
+    assert time.monotonic() - started < 5
+    assert "\n" not in str(caught.value)
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_the_time_of_one_stage_is_not_taken_from_the_next(said):
+    run = plainly(said.append, timeout_s=0.5)
+    for _ in range(3):
+        run("rest", lambda: time.sleep(0.3))
+    assert len(said) == 3
+
+
+def test_a_server_that_is_away_is_one_sentence(monkeypatch):
+    monkeypatch.setenv("PREFECT_API_URL", "http://127.0.0.1:9/api")
+    with (
+        pytest.raises(ServerAway, match=r"127\.0\.0\.1:9/api does not answer; start it, or unset"),
+        server_in_reach(),
+    ):
+        raise RuntimeError("Failed to reach API at http://127.0.0.1:9/api/")
+    with pytest.raises(RuntimeError, match="of its own"), server_in_reach():
+        raise RuntimeError("of its own")
+
+
+def test_what_is_said_reaches_the_logger_that_prefect_shows(capsys):
+    lines = []
+    handler = logging.Handler()
+    handler.emit = lambda record: lines.append(record.getMessage())
+    logging.getLogger("aesi").addHandler(handler)
+    try:
+        console = Console(every_s=0.0)
+        console.say("search: done")
+        console.progress("candidates", 1, 4, time.monotonic() - 2.0, "best 0.5")
+    finally:
+        logging.getLogger("aesi").removeHandler(handler)
+    assert lines == ["search: done", "  candidates: 1/4, about 6 s left, best 0.5"]
+    assert capsys.readouterr().err.splitlines() == lines
+
+
+@pytest.mark.slow
+def test_as_tasks_a_passing_failure_is_tried_again_and_bad_input_is_not(said):
+    from prefect import flow
+    from prefect.testing.utilities import prefect_test_harness
+
+    from flows.jobs.stages import as_tasks
+
+    tries = {"network": 0, "input": 0}
+
+    def away_once():
+        tries["network"] += 1
+        if tries["network"] == 1:
+            raise ConnectionError("no route")
+        return "data"
+
+    def wrong():
+        tries["input"] += 1
+        raise DataError("row 3 is no number")
+
+    @flow
+    def job():
+        run = as_tasks(said.append)
+        found = run("data", away_once, retries=2)
+        with pytest.raises(DataError, match="row 3"):
+            run("more", wrong, retries=2)
+        return found
+
+    with prefect_test_harness(server_startup_timeout=180):
+        assert job() == "data"
+    assert tries == {"network": 2, "input": 1}

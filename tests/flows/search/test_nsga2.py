@@ -1,0 +1,194 @@
+"""The search: deterministic, resumable, shared, and cheap beside its candidates."""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import optuna
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "sparse"))
+
+from sparse_records import make_record
+
+from aesi.errors import FitError
+from aesi.records import Failed, Split
+from aesi.sparse import FitnessWeights, Genome, Options, Problem, evaluate
+from aesi.sparse.genome_space import GenomeSpace
+from flows.search.nsga2 import Constraints, search
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return Problem.build(
+        Split((make_record(500, seed=1), make_record(400, seed=2, name="second")), (), ()),
+        Options(p_c=2, d=2, mixed=False, resamples=8, block=50),
+    )
+
+
+def genomes(result):
+    return [trial.genome for trial in result.trials]
+
+
+def test_the_same_seed_gives_the_same_search(problem):
+    one, two = (search(problem, 12, seed=3, population=4) for _ in range(2))
+    assert genomes(one) == genomes(two)
+    assert [t.losses for t in one.trials] == [t.losses for t in two.trials]
+    assert genomes(search(problem, 12, seed=4, population=4)) != genomes(one)
+
+
+def test_an_interrupted_search_goes_on_as_if_it_had_not_been(problem, tmp_path):
+    whole = search(problem, 12, seed=3, population=4)
+    journal = tmp_path / "study" / "journal.log"
+    calls = 0
+
+    def stops(p, genome):
+        nonlocal calls
+        calls += 1
+        if calls == 7:
+            raise KeyboardInterrupt
+        return evaluate(p, genome)
+
+    with pytest.raises(KeyboardInterrupt):
+        search(problem, 12, seed=3, storage=journal, population=4, evaluate_one=stops)
+    resumed = search(problem, 12, seed=3, storage=journal, population=4)
+    assert genomes(resumed) == genomes(whole)
+    assert [t.losses for t in resumed.trials] == [t.losses for t in whole.trials]
+
+
+def test_the_order_of_evaluation_does_not_matter(problem):
+    def backwards(batch):
+        return [(k, evaluate(problem, batch[k])) for k in reversed(range(len(batch)))]
+
+    seen = []
+    result = search(
+        problem, 8, seed=3, population=4, evaluate_many=backwards, on_candidate=lambda n, g, o: seen.append(n)
+    )
+    assert genomes(result) == genomes(search(problem, 8, seed=3, population=4))
+    assert seen == [3, 2, 1, 0, 7, 6, 5, 4]
+
+
+def test_warm_start_and_failures_are_in_the_study(problem):
+    good = Genome.whole(problem.library, 1e-2, 1e-3, 0.5, 2, 2, feedback=False)
+    empty = Genome.of(np.zeros(len(problem.library), dtype=bool), 1.0, 0.1, 0.5, 1, 1)
+    result = search(problem, 4, seed=0, population=4, warm_start=(good, empty))
+    assert genomes(result)[:2] == [good, empty]
+    assert "no term is left" in result.trials[1].reason
+    assert result.study.trials[1].state == optuna.trial.TrialState.PRUNED
+    assert result.trials[1].losses is None
+
+
+def test_a_bug_in_the_evaluation_is_not_swallowed(problem):
+    def broken(p, genome):
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        search(problem, 4, seed=0, evaluate_one=broken)
+
+
+def test_all_infeasible_is_one_clear_error(problem):
+    result = search(problem, 4, seed=0, population=4, constraints=Constraints(2.0, 2.0))
+    with pytest.raises(FitError, match=r"none of 4 candidates is feasible .*correlation"):
+        result.best()
+
+
+def test_all_failed_is_one_clear_error(problem):
+    result = search(problem, 3, seed=0, evaluate_one=lambda p, g: Failed("out of luck"))
+    with pytest.raises(FitError, match="3 x out of luck"):
+        result.best()
+
+
+def test_the_front_is_not_dominated_and_the_pick_lies_on_it(problem):
+    result = search(problem, 30, seed=1, population=10)
+    front = result.front()
+    assert front
+    for trial in front:
+        assert not any(
+            all(a <= b for a, b in zip(o.losses, trial.losses, strict=True)) and o.losses != trial.losses
+            for o in result.feasible
+        )
+    best = result.best(FitnessWeights(0.3, 0.6, 0.1))
+    assert best.trial in front
+    assert best.fitness == max(
+        1 - 0.3 * t.losses[0] - 0.6 * t.losses[1] - 0.1 * t.losses[2] / len(problem.library) for t in front
+    )
+    assert len(result.sensitivity()) == 6
+
+
+def test_parents_are_the_elite_of_all_earlier_generations(problem):
+    result = search(problem, 24, seed=3, population=4)
+    chosen = {
+        int(key.rsplit(":", 1)[1]): {result.study.trials[number].user_attrs["index"] for number in numbers}
+        for key, numbers in result.study._storage.get_study_system_attrs(result.study._study_id).items()
+        if ":parent:" in key
+    }
+    assert sorted(chosen) == [1, 2, 3, 4, 5]
+    assert all(max(indices) < 4 * generation for generation, indices in chosen.items())
+    assert any(
+        max(indices) >= 4 * (generation - 1) for generation, indices in chosen.items() if generation > 1
+    )
+
+
+def test_evolution_beats_the_random_start(problem):
+    result = search(problem, 80, seed=2, population=10)
+    score = [t.numbers.get("fitness", -np.inf) for t in result.trials]
+    assert max(score[10:]) > max(score[:10])
+
+
+def test_two_workers_share_a_study_without_drawing_the_same_point(problem, tmp_path):
+    url = f"sqlite:///{tmp_path / 'study.db'}"
+    first = search(problem, 4, seed=0, storage=url, population=4, shared=True)
+    both = search(problem, 8, seed=0, storage=url, population=4, shared=True)
+    assert [trial.number for trial in both.trials] == list(range(8))
+    assert genomes(both)[:4] == genomes(first)
+    assert len(set(genomes(both))) == 8
+
+
+def test_what_another_worker_evaluates_now_is_left_alone(problem, tmp_path):
+    journal = tmp_path / "study.log"
+    started = []
+
+    def meanwhile(p, genome):
+        if not started:
+            started.append(True)
+            other = search(problem, 2, seed=0, storage=journal, population=4, shared=True)
+            assert [trial.number for trial in other.trials] == [4, 5]
+        return evaluate(p, genome)
+
+    both = search(problem, 6, seed=0, storage=journal, population=4, shared=True, evaluate_one=meanwhile)
+    assert [trial.number for trial in both.trials] == [0, 1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize(("journal", "limit_ms"), [(False, 10.0), (True, 40.0)])
+def test_the_genome_of_626_terms_costs_little(tmp_path, journal, limit_ms):
+    # A journal waits for the disk once a trial, which on a busy machine takes what it takes.
+    space = GenomeSpace(626)
+
+    class Sized:
+        library = range(626)
+
+    rng = np.random.default_rng(0)
+    spent = 0.0
+
+    def no_work(p, genome):
+        nonlocal spent
+        started = time.perf_counter()
+        losses = tuple(rng.random(3))
+        outcome = _outcome(genome, losses)
+        spent += time.perf_counter() - started
+        return outcome
+
+    started = time.perf_counter()
+    search(Sized(), 60, 0, tmp_path / "j.log" if journal else None, evaluate_one=no_work, space=space)
+    per_trial_ms = 1e3 * (time.perf_counter() - started - spent) / 60
+    assert per_trial_ms < limit_ms
+
+
+def _outcome(genome, losses):
+    from types import SimpleNamespace
+
+    return SimpleNamespace(
+        genome=genome, losses=losses, fitness=0.0, pearson_train=1.0, pearson_valid=1.0,
+        free_run_valid_mser_pct=0.0, one_step_valid_rmse_v=0.0,
+    )  # fmt: skip

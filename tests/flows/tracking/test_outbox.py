@@ -1,0 +1,104 @@
+"""The queue between a run and its store: in order, nothing lost, nothing doubled."""
+
+import json
+import threading
+import time
+
+import pytest
+
+from flows.tracking import outbox as module
+from flows.tracking.outbox import Outbox
+
+
+class Away(Exception):
+    """The store does not answer."""
+
+
+class Store:
+    """Takes items, unless it is away."""
+
+    def __init__(self):
+        self.items, self.again, self.here = [], [], threading.Event()
+        self.here.set()
+
+    def deliver(self, item, again):
+        if not self.here.is_set():
+            raise Away("connection refused\nwith details")
+        if item.get("bad"):
+            raise ValueError("cannot take this")
+        self.items.append(item["n"])
+        self.again.append(again)
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch):
+    monkeypatch.setattr(module, "RETRY_S", (0.05,))
+
+
+@pytest.fixture
+def store():
+    return Store()
+
+
+def opened(tmp_path, store, said):
+    return Outbox(tmp_path / "box", store.deliver, lambda error: isinstance(error, Away), said.append)
+
+
+def test_items_arrive_in_order(tmp_path, store, said):
+    box = opened(tmp_path, store, said)
+    for n in range(20):
+        box.put({"n": n})
+    assert box.flush(5) == 0
+    assert store.items == list(range(20))
+    assert not any(store.again)
+    assert not said
+
+
+def test_a_store_that_is_away_in_mid_run_loses_nothing(tmp_path, store, said):
+    box = opened(tmp_path, store, said)
+    box.put({"n": 0})
+    assert box.flush(5) == 0
+    store.here.clear()
+    for n in range(1, 6):
+        box.put({"n": n})
+    assert box.flush(0.3) == 5
+    assert len(said) == 1
+    assert "does not answer (connection refused)" in said[0]
+    store.here.set()
+    assert box.flush(5) == 0
+    assert store.items == list(range(6))
+    assert "answers again" in said[1]
+
+
+def test_what_is_left_is_delivered_by_the_next(tmp_path, store, said):
+    store.here.clear()
+    box = opened(tmp_path, store, said)
+    box.put({"n": 1})
+    box.put({"n": 2})
+    box.close()
+    store.here.set()
+    later = opened(tmp_path, store, said)
+    later.put({"n": 3})
+    assert later.flush(5) == 0
+    assert store.items == [1, 2, 3]
+    assert store.again == [True, True, False]
+
+
+def test_an_item_that_is_refused_is_put_aside_and_said(tmp_path, store, said):
+    box = opened(tmp_path, store, said)
+    box.put({"n": 1, "bad": True})
+    box.put({"n": 2})
+    assert box.flush(5) == 0
+    assert store.items == [2]
+    assert "refused an item (cannot take this)" in said[0]
+    (aside,) = (tmp_path / "box" / "refused").iterdir()
+    assert json.loads(aside.read_text())["n"] == 1
+
+
+def test_closing_does_not_wait_for_a_store_that_is_away(tmp_path, store, said):
+    store.here.clear()
+    box = opened(tmp_path, store, said)
+    box.put({"n": 1})
+    started = time.monotonic()
+    box.close()
+    assert time.monotonic() - started < 2
