@@ -25,6 +25,10 @@ class DataError(InputError):
     """A measurement is malformed, contradicts itself, or does not fit the cell."""
 
 
+class DataAway(DataError):
+    """Data that are not on this machine cannot be fetched now."""
+
+
 class CellError(InputError):
     """A cell file fails its schema or lacks a field that is needed."""
 

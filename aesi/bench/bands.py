@@ -17,7 +17,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from aesi.bench.virtual_drives import Layout, virtual_splits
+from aesi.bench.virtual_drives import SplitLayout, virtual_splits
 from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.numerics.typing import Array
@@ -25,7 +25,7 @@ from aesi.physics import Cell
 from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.records import Failed, Split
 from aesi.sparse import Genome, Options, Problem, evaluate
-from aesi.sparse.fold_models import fold_models, with_leverage
+from aesi.sparse.search.fold_models import fold_models, with_leverage
 
 ALPHA = 0.1
 HORIZONS_S = (1.0, 10.0, 60.0)
@@ -95,7 +95,7 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
     cells: int = 40,
-    layouts: Sequence[Layout] = get_args(Layout),
+    layouts: Sequence[SplitLayout] = get_args(SplitLayout),
     seed: int = 0,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:

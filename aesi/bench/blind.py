@@ -1,31 +1,31 @@
 """Does the tracer name what is missing? Labelled cases that PyBaMM made, the label kept from the tracer.
 
-A row a case, and a summary with the confusion matrix and the rates that count: right effects (or declared
-indistinguishable from them), honest silence on cells that lack nothing, `unknown` where no effect of the
-catalogue is at
-work, the error left over and how well the parameters are met.
+A row a case, and a summary: the strict rates with their intervals beside the lenient ones, by kind of case; the error
+left over, how well the parameters are met and how often their intervals cover them; the confidence shown against the
+frequency of being right; the confusion matrix. A case that runs out of its processor time, or that the tracer
+refuses, is a miss.
 """
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aesi.data.blind import BlindCase, CaseSpec, cells_in, generate, plan, small_plan
+from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
+from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, plan, small_plan
 from aesi.errors import AesiError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import to_json
 from aesi.tracer import discover
 
 MV = 1e3
-LARGEST_GROUP = 3
-NOTHING = "reaction_nonuniformity"
-"""What the order reduction leaves out counts as nothing missing on a cell that is as declared."""
+LIMIT_S = 180.0
 
 
 def chosen(
@@ -33,119 +33,152 @@ def chosen(
 ) -> list[CaseSpec]:
     """Cases of the plan, or of the small one that a test can afford.
 
-    cases : how many (None: all).  only : substring of a recipe's name.  every : take each n-th case.
+    cases : the first so many (None: all).  only : substring of a recipe's name, or a kind of case.
+    every : take each n-th case.
     """
-    specs = small_plan(seed) if small else plan(seed)
-    return [s for s in specs if only is None or only in "+".join(s.recipes)][::every][:cases]
+    specs = small_plan(seed) if small else plan(seed, FULL)
+    return [s for s in specs if only is None or only in (s.kind, *s.recipes) or only in "+".join(s.recipes)][
+        ::every
+    ][:cases]
 
 
-def judged(spec: CaseSpec, cells: str) -> dict[str, Any]:
-    """One case made and judged; cells : folder of the two declared cell files."""
-    return _judged(generate(spec, cells_in(Path(cells))))
+def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[str, Any]:
+    """One case made and judged.
+
+    cells : folder of the declared cell files.  limit_s : processor seconds of the tracer; a case that takes longer
+    is a miss.
+    """
+    return _judged(generate(spec, cells_in(Path(cells))), limit_s)
 
 
-def _judged(case: BlindCase) -> dict[str, Any]:
-    began = time.perf_counter()
+def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
+    began, processor = time.perf_counter(), time.process_time()
+    spec = case.spec
     row: dict[str, Any] = {
-        "case": case.spec.name,
-        "cell": case.spec.cell,
+        "case": spec.name,
+        "kind": spec.kind,
+        "cell": spec.cell,
+        "model": spec.model,
+        "records": "+".join(spec.records),
+        "spread": spec.spread,
+        "warmth": spec.warmth,
+        "soc0_given": spec.soc0_given,
+        "dt_s": spec.dt_s,
         "label": case.label,
-        "also": list(case.also),
-        "target_mv": case.spec.target_mv,
+        "target_mv": spec.target_mv,
+        "unexplained_mv": case.truth["rms_mv"],
     }
+    content: dict[str, Any] = {}
     try:
-        found = discover(Cell.from_bpx(case.declared), case.measurements, soc0=case.soc0)
+        with processor_limit(limit_s):
+            found = discover(Cell.from_bpx(case.declared), case.measurements, soc0=case.soc0)
+            content = to_json(found)
     except AesiError as error:
-        return row | {
-            "verdict": "error",
-            "right": False,
-            "error": str(error),
-            "ours_s": time.perf_counter() - began,
-        }
-    content = to_json(found)
-    row |= {
-        k: content[k] for k in ("verdict", "effects", "indistinguishable", "confidence", "noise_floor_mv")
+        row |= {"verdict": "error", "error": str(error)}
+    except OutOfTime:
+        row |= {"verdict": "out of time", "error": f"more than {limit_s:g} s of processor time"}
+    row |= _scored(case, content) if content else MISSED
+    return row | {
+        "processor_s": time.process_time() - processor,
+        "ours_s": time.perf_counter() - began,
     }
-    row |= {
-        f"{state}_test_mv": content[state]["test"]["rmse_mv"] for state in ("before", "recalibrated", "after")
+
+
+MISSED: dict[str, Any] = {
+    "effects": [],
+    "exact": False,
+    "grouped": False,
+    "right": False,
+    "all_named": False,
+    "false_name": False,
+    "fitted": False,
+}
+"""What a case scores that gave no answer."""
+
+
+def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
+    kept = ("verdict", "effects", "indistinguishable", "confidence", "noise_floor_mv")
+    row = {key: content[key] for key in kept}
+    for state in ("before", "recalibrated", "after"):
+        row[f"{state}_test_mv"] = content[state]["test"]["rmse_mv"]
+    judgement = judge(case.label, case.also, case.neutral, content)
+    noise_mv = MV * case.spec.voltage_noise_v
+    after_over_noise = row["after_test_mv"] / noise_mv
+    errors, covered = _parameters(case, content)
+    return row | {
+        "exact": judgement.exact,
+        "grouped": judgement.grouped,
+        "right": judgement.lenient,
+        "all_named": bool(case.effects) and judgement.named == 1.0,
+        "false_name": bool(judgement.false_names),
+        "false_names": list(judgement.false_names),
+        "after_over_noise": after_over_noise,
+        "fitted": judgement.named == 1.0 and after_over_noise <= TO_THE_NOISE,
+        "parameter_error": max(errors) if errors else None,
+        "parameters_covered": covered,
     }
-    row["right"] = is_right(case.label, case.also, content)
-    row["parameter_error"] = _parameter_error(case, content)
-    return row | {"ours_s": time.perf_counter() - began}
 
 
-def is_right(label: str, also: tuple[str, ...], content: Mapping[str, Any]) -> bool:
-    """Is this the answer of the label, or one of the others that are right as well?
-
-    Effects match where each one of the label is named or in the group of one that is, none is named beyond
-    them, and no
-    group has more than three members.
-    """
-    return any(_matches(answer, content) for answer in (label, *also))
-
-
-def _matches(answer: str, content: Mapping[str, Any]) -> bool:
-    verdict, effects = content["verdict"], list(content["effects"])
-    if answer in ("none", "unknown"):
-        return bool(verdict == answer)
-    if answer == NOTHING and verdict == "none":
-        return True
-    groups = [set(g) for g in content["indistinguishable"]]
-    if verdict != "found" or any(len(g) > LARGEST_GROUP for g in groups):
-        return False
-    wanted = answer.split("+")
-    if len(wanted) != len(effects):
-        return False
-    stands_for = [{e}.union(*(g for g in groups if e in g)) for e in effects]
-    return _assignable(wanted, stands_for)
-
-
-def _assignable(wanted: list[str], stands_for: list[set[str]]) -> bool:
-    if not wanted:
-        return True
-    first, rest = wanted[0], wanted[1:]
-    return any(
-        first in names and _assignable(rest, [*stands_for[:k], *stands_for[k + 1 :]])
-        for k, names in enumerate(stands_for)
-    )
-
-
-def _parameter_error(case: BlindCase, content: Mapping[str, Any]) -> float | None:
-    """Largest relative error among the parameters whose truth is known under the same name, or None."""
-    errors = []
+def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float], list[bool]]:
+    """Relative errors of the parameters whose truth is known under the same name, and whether the 90 % interval
+    holds the truth."""
+    errors, covered = [], []
     for candidate in content["candidates"]:
         if candidate["effect"] not in content["effects"]:
             continue
         for name, estimate in candidate["parameters"].items():
             truth = case.truth.get(f"{candidate['effect']}.{name}")
-            if truth:
+            if truth and estimate.get("value") is not None:
                 errors.append(abs(estimate["value"] - truth) / abs(truth))
-    return max(errors) if errors else None
+                if estimate.get("low") is not None and estimate.get("high") is not None:
+                    covered.append(bool(estimate["low"] <= truth <= estimate["high"]))
+    return errors, covered
 
 
-def summary(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    """Rates by kind of case, medians, and the confusion matrix (label -> answer -> cases)."""
-    kinds = {"effect": [], "none": [], "unknown": []}  # type: dict[str, list[dict[str, Any]]]
-    for row in rows:
-        kinds[row["label"] if row["label"] in ("none", "unknown") else "effect"].append(row)
-    found = [r for r in kinds["effect"] if r["right"] and r["verdict"] == "found"]
-    left = [r["after_test_mv"] / r["noise_floor_mv"] for r in found]
-    errors = [r["parameter_error"] for r in found if r.get("parameter_error") is not None]
+def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Strict rates with intervals beside the lenient ones, medians, calibration, and the confusion matrix."""
+    effect = [r for r in rows if r["label"] not in ("none", "unknown")]
+    nothing = [r for r in rows if r["label"] == "none"]
+    stranger = [r for r in rows if r["label"] == "unknown"]
+    several = [r for r in effect if r["kind"] == "pair"]
+    fitted = [{**r, "called_found": r["verdict"] == "found"} for r in effect if r["fitted"]]
+    named = [r for r in effect if r["grouped"]]
+    answered = [r for r in rows if r["verdict"] not in ("error", "out of time")]
+    unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
+    covered = [{"covered": one} for r in named for one in r["parameters_covered"]]
     confusion: dict[str, Counter[str]] = {}
     for row in rows:
-        answer = "+".join(row.get("effects") or []) if row["verdict"] == "found" else row["verdict"]
-        confusion.setdefault(row["label"], Counter())[answer] += 1
+        answer = "+".join([row["verdict"] if row["verdict"] != "found" else "", *row["effects"]]).strip("+")
+        confusion.setdefault(row["label"], Counter())[answer or "found nothing"] += 1
     return {
         "summary": True,
         "cases": len(rows),
-        **{f"{kind}_right_pct": _share(part) for kind, part in kinds.items()},
-        **{f"{kind}_cases": len(part) for kind, part in kinds.items()},
-        "after_over_noise_median": float(np.median(left)) if left else None,
-        "parameter_error_median": float(np.median(errors)) if errors else None,
-        "seconds_median": float(np.median([r["ours_s"] for r in rows])) if rows else None,
+        "no_answer": len(rows) - len(answered),
+        **rate(rows, "exact").named("exact"),
+        **rate(rows, "grouped").named("grouped"),
+        **rate(rows, "right").named("lenient"),
+        **rate(effect, "exact").named("effect_exact"),
+        **rate(effect, "grouped").named("effect_grouped"),
+        **rate(effect, "right").named("effect_lenient"),
+        **rate(several, "all_named").named("pair_both_named"),
+        **rate(nothing, "right").named("none_lenient"),
+        **rate(nothing, "false_name").named("none_false_name"),
+        **rate(stranger, "right").named("stranger_unknown"),
+        **rate(stranger, "false_name").named("stranger_false_name"),
+        **rate(effect, "false_name").named("effect_false_name"),
+        **rate(unknown, "false_name").named("false_name_beside_unknown"),
+        **rate(fitted, "called_found").named("fitted_called_found"),
+        "after_over_noise_median": _median([r["after_over_noise"] for r in named]),
+        "parameter_error_median": _median(
+            [r["parameter_error"] for r in named if r["parameter_error"] is not None]
+        ),
+        **rate(covered, "covered").named("parameters_covered"),
+        "calibration": calibration(answered),
+        "processor_s_median": _median([r["processor_s"] for r in rows]),
+        "processor_s_most": max((r["processor_s"] for r in rows), default=None),
         "confusion": {label: dict(counts) for label, counts in confusion.items()},
     }
 
 
-def _share(rows: list[dict[str, Any]]) -> float | None:
-    return 100.0 * sum(bool(r["right"]) for r in rows) / len(rows) if rows else None
+def _median(values: Sequence[float]) -> float | None:
+    return float(np.median(values)) if values else None

@@ -25,8 +25,8 @@ from aesi.physics import Cell
 from aesi.records import ErrorModel, Split
 from aesi.sparse import FitnessWeights, Options, Problem, evaluate
 from aesi.sparse.baselines.sindy_c import tuned_sindy_c
-from aesi.sparse.evolution import fittest
-from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.search.evolution import fittest
+from aesi.sparse.search.genome_space import GenomeSpace
 
 BASE = Options(inputs=INPUTS, p_c=3, d=2, mixed=False, block=100, fold=200)
 """As in the experiment on the measured drive."""

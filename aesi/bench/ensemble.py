@@ -20,16 +20,17 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
 from aesi.records import INPUT_NAMES, ErrorSeries, Failed, Split
 from aesi.sparse import Genome, Library, Options, Problem, STRidge, evaluate
-from aesi.sparse.inputs import low_pass, with_inputs
+from aesi.sparse.terms.inputs import low_pass, with_inputs
 
 CASES = ((60, 1e-3), (200, 1e-12), (626, 1e-3), (626, 1e-12))
 """Terms in the library, lambda1."""
 
 _DT_S = 0.1
-_CAPACITY_AS = 30.0 * 3600.0
+_CAPACITY_AS = 30.0 * SECONDS_PER_HOUR
 
 
 def run(

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.polynomial.chebyshev import chebval
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.profile import Bench, Profile, paper_profiles
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
@@ -26,7 +27,7 @@ from aesi.pipeline.product.error_series import error_series
 from aesi.records import ErrorSeries, Measurement, Split
 from aesi.sparse import with_inputs
 
-Layout = Literal["repeats", "schedules", "beyond"]
+SplitLayout = Literal["repeats", "schedules", "beyond"]
 """repeats : WLTC five times over the whole state of charge, training on 1, 3 and 5, test on 2 and 4.
 schedules : the paper's training, validation and test schedules.
 beyond : as repeats, but the training drives never charge, and the test drives do, at BEYOND times the current."""
@@ -43,10 +44,10 @@ TEST_REPEATS = (2, 4)
 TRAIN_REPEATS = (1, 3, 5)
 MOST_TRIES = 20
 
-Values = dict[str, float]
+DrawnValues = dict[str, float]
 
 
-def virtual_splits(cell: Cell, layout: Layout, count: int, seed: int = 0) -> Iterator[Split]:
+def virtual_splits(cell: Cell, layout: SplitLayout, count: int, seed: int = 0) -> Iterator[Split]:
     """`count` virtual cells under one drive, each with another set of undeclared differences."""
     profiles = PROFILES[layout](cell.capacity_ah)
     rng = np.random.default_rng(seed)
@@ -60,7 +61,7 @@ def random_effects(cell: Cell, rng: np.random.Generator) -> tuple[ActiveEffect, 
     return tuple(CATALOGUE[name].activate(**DIFFERENCES[name](rng, cell.capacity_ah)) for name in chosen)
 
 
-DIFFERENCES: dict[str, Callable[[np.random.Generator, float], Values]] = {
+DIFFERENCES: dict[str, Callable[[np.random.Generator, float], DrawnValues]] = {
     "ocv_hysteresis": lambda rng, q: {"magnitude_v": rng.uniform(2e-3, 15e-3), "rate": rng.uniform(10, 60)},
     "series_resistance": lambda rng, q: {"resistance_ohm": rng.uniform(0.002, 0.015) / q},
     "solid_diffusivity": lambda rng, q: _factors(rng, 0.5),
@@ -88,7 +89,7 @@ class _Made:
     open_circuit_v: Array
 
 
-def _factors(rng: np.random.Generator, spread: float) -> Values:
+def _factors(rng: np.random.Generator, spread: float) -> DrawnValues:
     negative, positive = np.exp(spread * rng.standard_normal(2))
     return {"negative_factor": float(negative), "positive_factor": float(positive)}
 
@@ -108,13 +109,13 @@ def _in_turn(
     bench = Bench(capacity_ah, DT_S)
     once = bench.drive("wltc_3b")
     drives = [(test if k + 1 in TEST_REPEATS else train)(once) for k in range(N_REPEATS)]
-    share = float(np.sum(drives)) * DT_S / 3600 / capacity_ah
+    share = float(np.sum(drives)) * DT_S / SECONDS_PER_HOUR / capacity_ah
     scale = (SOC_START - SOC_END) / share
     pieces = [bench.rest(60.0), *(scale * drive for drive in drives)]
     return {"record": (bench.profile("drive", pieces, SOC_START),)}
 
 
-PROFILES: dict[Layout, Callable[[float], dict[str, tuple[Profile, ...]]]] = {
+PROFILES: dict[SplitLayout, Callable[[float], dict[str, tuple[Profile, ...]]]] = {
     "repeats": _repeats,
     "schedules": lambda capacity_ah: paper_profiles(capacity_ah, DT_S),
     "beyond": _beyond,

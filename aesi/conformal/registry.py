@@ -11,7 +11,7 @@ from aesi.conformal.regressors.forest import ForestQuantiles
 from aesi.conformal.regressors.linear import LinearQuantiles
 from aesi.conformal.regressors.model import FitTask, QuantileModel
 from aesi.conformal.regressors.normalised import NormalisedQuantiles
-from aesi.numerics.boosting import Growth
+from aesi.numerics.trees.boosting import Growth
 
 RATE = 0.05
 """Of the adaptive step: fast enough to hold 85 % in every bin of current and charge on a measured drive, slow

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 
-SECONDS_PER_HOUR = 3600.0
 HIGHEST_VOLTAGE_V = 6.0
 HIGHEST_PLAIN_VOLT = 1000.0
 TEMPERATURE_RANGE_DEGC = (-60.0, 150.0)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from aesi.data.read import Sign, read_measurement
-from aesi.errors import DataError
+from aesi.errors import DataAway, DataError
 from aesi.records import Measurement
 
 TIMEOUT_S = 30
@@ -80,10 +80,9 @@ def _download(remote: Remote, folder: Path) -> Path:
         ) from None
     except OSError as error:
         # requests' errors are OSErrors
-        reason = type(error).__name__
-        raise DataError(
-            f"{remote.name} cannot be fetched from {remote.url} ({reason}): connect to the network and "
-            "try again, or set AESI_DATA to a folder that holds the data set."
+        raise DataAway(
+            f"{remote.name} cannot be fetched from {remote.url} ({type(error).__name__}): connect to the network "
+            "and try again, or set AESI_DATA to a folder that holds the data set.",
         ) from None
 
 

@@ -23,7 +23,7 @@ MOST_EVEN_ROWS = 20_000_000
 
 
 @dataclass(frozen=True, eq=False)
-class Intervals:
+class BetweenStamps:
     """The intervals between consecutive new stamps, over a record's old ones.
 
     time_s : (n,) old stamps.  stamps_s : (m,) new ones, inside the old range; value j of an average belongs
@@ -112,7 +112,7 @@ def decimate(measurement: Measurement, max_rows: int) -> Measurement:
 
 
 def _onto(measurement: Measurement, stamps: Array, note: str) -> Measurement:
-    intervals = Intervals(measurement.time_s, stamps)
+    intervals = BetweenStamps(measurement.time_s, stamps)
     dense = bool(np.median(np.diff(measurement.time_s)) < DENSE * np.median(np.diff(stamps)))
     along = intervals.linear if dense else intervals.sampled
     temperature = measurement.temperature_degc

@@ -15,7 +15,7 @@ import numpy as np
 from aesi.data.laboratory.changes import find_change
 from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, Model, Setup, run
-from aesi.data.profile import PULSE_C, Profile, paper_profiles
+from aesi.data.profile import OTHER_LOAD, PULSE_C, Profile, paper_profiles
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
@@ -43,6 +43,7 @@ STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
     "lithium_inventory_loss": lambda m, q: {"negative_stoichiometry": 0.02 * m},
     "active_material_loss_negative": lambda m, q: {"share": 0.05 * m},
     "active_material_loss_positive": lambda m, q: {"share": 0.05 * m},
+    "particle_size_distribution": lambda m, q: {"negative_spread": 0.3 * m, "positive_spread": 0.3 * m},
     "leakage_current": lambda m, q: {"leak_a": m * PARASITIC_SHARE * q},
 }
 """Values of a change at a magnitude (1 is typical) in a cell of q ampere-hours."""
@@ -102,7 +103,7 @@ class Laboratory:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class VirtualExperiment:
     """Records by role; soc0 : state of charge at the first row, by record name."""
 
     train: tuple[Measurement, ...]
@@ -111,18 +112,20 @@ class Experiment:
     soc0: dict[str, float]
 
 
-def paper_experiment(laboratory: Laboratory, dt_s: float = 0.1, pulse_c: float = PULSE_C) -> Experiment:
+def paper_experiment(
+    laboratory: Laboratory, dt_s: float = 0.1, pulse_c: float = PULSE_C, other_load: float = OTHER_LOAD
+) -> VirtualExperiment:
     """The paper's experiment: 88,200 training rows at the default 10 Hz, 8,820 at 1 Hz.
 
     Raises DataError or SimulationError as `Laboratory.measure` does.
     """
-    profiles = paper_profiles(laboratory.capacity_ah, dt_s, pulse_c)
+    profiles = paper_profiles(laboratory.capacity_ah, dt_s, pulse_c, other_load)
 
     def measured(role: str) -> tuple[Measurement, ...]:
         return tuple(laboratory.measure(profile) for profile in profiles[role])
 
     soc0 = {profile.name: profile.soc0 for role in profiles.values() for profile in role}
-    return Experiment(measured("train"), measured("valid"), measured("test"), soc0)
+    return VirtualExperiment(measured("train"), measured("valid"), measured("test"), soc0)
 
 
 def nominal_capacity_ah(bpx: Path) -> float:

@@ -1,9 +1,10 @@
-"""The extended single-particle model, its cells and the effects it may lack."""
+"""Models of a cell, single particle or porous electrode, and the effects they may lack."""
 
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Contribution, Effect, Record, Trace
+from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.model import EspmModel
-from aesi.physics.simulation import simulate
+from aesi.physics.simulation import ModelName, simulate
 
 __all__ = [
     "ActiveEffect",
@@ -11,8 +12,11 @@ __all__ = [
     "Contribution",
     "Effect",
     "EspmModel",
+    "InitialState",
+    "ModelName",
     "Record",
     "Trace",
     "initial_soc",
+    "initial_state",
     "simulate",
 ]

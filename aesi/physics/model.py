@@ -13,6 +13,7 @@ from aesi.physics.cell.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
 DEFAULT_ELECTROLYTE_ORDER = 3
+DEFAULT_ELECTRODE_POINTS = 5
 DEFAULT_SUBSTEP_S = 1.0
 ANY_NUMBER = 2**31
 
@@ -59,6 +60,7 @@ class EspmModel:
     region_contrast : factor of what differs between the regions of an electrode in ohmic drop and in salt.
     heat : None for a temperature that is given or constant.
     solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
+    electrode_points : of a porous electrode, where reaction and salt are resolved.
     substep_s : longest step of whatever is not stepped exactly.  most_substeps : of them between two samples.
     """
 
@@ -70,6 +72,7 @@ class EspmModel:
     heat: HeatBalance | None = None
     solid_order: int = DEFAULT_SOLID_ORDER
     electrolyte_order: int = DEFAULT_ELECTROLYTE_ORDER
+    electrode_points: int = DEFAULT_ELECTRODE_POINTS
     substep_s: float = DEFAULT_SUBSTEP_S
     most_substeps: int = ANY_NUMBER
 

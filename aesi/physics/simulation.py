@@ -1,31 +1,33 @@
-"""`simulate`: current in, voltage and internal states out.
+"""`simulate`: current in, voltage and internal states out, by one of two models of the same cell.
 
-The extended single-particle model: solid diffusion in one particle an electrode, electrolyte diffusion
-through the three layers, Butler-Volmer kinetics averaged over each electrode with the surface and local
-electrolyte concentrations, electrolyte potential with the conductivity at the mean concentration, ohmic drop
-of the solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693,
-doi:10.1149/2.0341915jes.
+"espm", the default, is the extended single-particle model: solid diffusion in one particle an electrode, electrolyte
+diffusion through the three layers, Butler-Volmer kinetics averaged over each electrode with the surface and local
+electrolyte concentrations, electrolyte potential with the conductivity at the mean concentration, ohmic drop of the
+solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693, doi:10.1149/2.0341915jes.
+"dfn" is the porous electrode, see `aesi.physics.dfn`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from aesi.errors import DataError, SimulationError
+from aesi.constants import ZERO_CELSIUS_K
+from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
-from aesi.physics.constants import ZERO_CELSIUS_K
 from aesi.physics.effect import ActiveEffect, Record, Trace
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
 
+ModelName = Literal["espm", "dfn"]
 OnDepletion = Literal["raise", "clip"]
+NO_SOLUTION = 4
 LAYERS = {1: "negative electrode", 2: "positive electrode"}
 
 
@@ -40,6 +42,7 @@ def simulate(
     *,
     rest_voltage_v: float | None = None,
     on_depletion: OnDepletion = "raise",
+    model: ModelName = "espm",
 ) -> Run:
     """Terminal voltage and states of `cell` under a current.
 
@@ -55,30 +58,33 @@ def simulate(
     "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
     at 10 V per unit of stoichiometry, every value stays finite, and `series["depleted"]` is 1 from the first
     such sample on.
+    model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both.
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
-    Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated.
+    Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated; InputError for
+    another model, or for an effect that the model already holds.
     """
     time, current = _checked_record(time_s, current_a)
     active = _instruments_first(effects)
-    model = model_with(cell, active)
+    solve = _solver(model)
+    changed = model_with(cell, active)
     record = Record(time, current, _kelvin(temperature_degc, time))
     for effect in active:
         if effect.effect.on_record is not None:
             record = effect.effect.on_record(record, **effect.parameters)
     if soc0 is None:
-        soc0 = _soc_from_rest(model, active, rest_voltage_v)
+        soc0 = _soc_from_rest(changed, active, rest_voltage_v)
     else:
-        soc0 = same_rest(cell, model.cell, soc0)
-    rows, extra, fault_at, fault = _core(model, record, soc0, hold)
-    series = _series(model.cell, rows, time) | extra
+        soc0 = same_rest(cell, changed.cell, soc0)
+    rows, extra, fault_at, fault = _solved(solve, changed, record, soc0, hold)
+    series = _series(changed.cell, rows, time) | extra
     if fault_at >= 0:
         if on_depletion == "raise":
             raise SimulationError(_depletion(cell, time, fault_at, fault))
         series["depleted"] = (np.arange(len(time)) >= fault_at).astype(float)
     elif on_depletion == "clip":
         series["depleted"] = np.zeros(len(time))
-    voltage = _voltage_effects(model, active, record, rows[0], series, hold)
+    voltage = _voltage_effects(changed, active, record, rows[0], series, hold)
     return Run(time, current, voltage, series)
 
 
@@ -108,22 +114,48 @@ def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, .
     return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
 
 
-def _core(
-    model: EspmModel, record: Record, soc0: float, hold: Hold
+Solver = Callable[
+    [EspmModel, Array, Array, Array | None, float, Hold], tuple[Array, dict[str, Array], int, int]
+]
+"""(model, time, current, temperature or None, soc0, hold) -> rows as `plain.run_plain`, further states by name, the
+first fault and what it was."""
+
+
+def _solver(name: str) -> Solver:
+    """The model of that name; it is imported, and its compiled code read, when it is first used."""
+    if name == "espm":
+        return _run_espm
+    if name == "dfn":
+        from aesi.physics.dfn.run import run_porous_electrode
+
+        return run_porous_electrode
+    raise InputError(
+        f"there is no model {name!r}; give 'espm' (single particle) or 'dfn' (porous electrode)."
+    )
+
+
+def _solved(
+    solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold
 ) -> tuple[Array, dict[str, Array], int, int]:
-    time, current = record.time_s, record.current_a
+    """One solution; a temperature that does not move becomes that of the cell."""
     temperature = record.temperature_k
     if temperature is not None and np.ptp(temperature) == 0.0:
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
         if model.heat is None:
             temperature = None
-    if model.is_plain and temperature is None:
+    return solve(model, record.time_s, record.current_a, temperature, soc0, hold)
+
+
+def _run_espm(
+    model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
+) -> tuple[Array, dict[str, Array], int, int]:
+    if model.is_plain and temperature_k is None:
         rows, fault_at, fault = run_plain(model, time, current, soc0, hold)
         kelvin = np.full(len(time), model.cell.initial_temperature_k)
         return rows, {"temperature_k": kelvin}, fault_at, fault
     from aesi.physics.espm.extended import run_extended
 
-    return run_extended(model, time, current, temperature, soc0, hold)
+    return run_extended(model, time, current, temperature_k, soc0, hold)
 
 
 def _voltage_effects(
@@ -191,6 +223,8 @@ def _soc_from_rest(model: EspmModel, effects: Sequence[ActiveEffect], rest_volta
 def _depletion(cell: Cell, time: Array, at: int, fault: int) -> str:
     if fault in LAYERS:
         what = f"the surface of the {LAYERS[fault]} left the stoichiometry range [0, 1]"
+    elif fault == NO_SOLUTION:
+        what = "no reaction was found that carries the current"
     else:
         what = "the electrolyte ran out of salt"
     return (

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
-from aesi.physics.constants import SECONDS_PER_HOUR
 from aesi.physics.effect import Trace
 
 

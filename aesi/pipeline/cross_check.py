@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array, IntArray
 from aesi.physics import Cell, simulate
@@ -26,7 +27,6 @@ FINE_MESH = {"x_n": 30, "x_s": 20, "x_p": 30, "r_n": 60, "r_p": 60}
 TOLERANCE = 1e-6
 CHARGE_SHARE = 1e-5
 """Of the nominal capacity: how much the charge may differ."""
-SECONDS_PER_HOUR = 3600.0
 BEND = 1e-9
 """Of the largest current: by how much a row may leave the line through its neighbours."""
 

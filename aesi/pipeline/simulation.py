@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +12,10 @@ import numpy as np
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.read import Sign
 from aesi.errors import DataError, InputError
-from aesi.physics import simulate
+from aesi.physics import ModelName, initial_state, simulate
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Hold, Run
+from aesi.records import Hold, Measurement, Run
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,30 +36,28 @@ def simulate_file(
     columns: Mapping[str, str | None] | None = None,
     sign: Sign = "discharge-positive",
     say_notes: SayNotes | None = None,
+    model: ModelName = "espm",
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
-    soc0 : None takes it from the first voltage of the file, where it has one, else from the saved model.
+    soc0 : None takes it from the file's voltage, where it has one (see `initial_state`), else from the saved model.
     say_notes : is given what the reader dropped or mapped, one sentence each.
+    model : "espm" or "dfn".
     """
     profile = _read(current, columns, sign, say_notes)
     declared = declared_model(cell)
     active = (*declared.effects, *_activated(effects, effect_files))
-    if soc0 is None and profile.voltage_v is None:
-        soc0 = declared.soc0
-        if soc0 is None:
-            raise DataError(f"{current.name} has no voltage to start from; give --soc0.")
-    rest = None if profile.voltage_v is None else float(profile.voltage_v[0])
+    start = _start(replace(declared, effects=active, hold=hold), profile, current, soc0, say_notes)
     run = simulate(
         declared.cell,
         profile.time_s,
         profile.current_a,
-        soc0,
+        start,
         active,
         profile.temperature_degc,
         hold,
-        rest_voltage_v=rest,
+        model=model,
     )
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out)
@@ -86,7 +85,7 @@ def predict_file(
     prediction = hybrid.predict(
         profile.time_s,
         profile.current_a,
-        soc0=_start(hybrid, profile, soc0),
+        soc0=_start(hybrid, profile, current, soc0, say_notes),
         voltage_v=profile.voltage_v if measured else None,
         temperature_degc=profile.temperature_degc,
     )
@@ -112,12 +111,22 @@ def _read(
     return profile
 
 
-def _start(hybrid: HybridModel, profile: CurrentProfile, soc0: float | None) -> float | None:
-    if soc0 is not None or profile.voltage_v is None:
-        return soc0
-    from aesi.physics import initial_soc
-
-    return initial_soc(hybrid.cell, float(profile.voltage_v[0]))
+def _start(
+    model: HybridModel, profile: CurrentProfile, file: Path, soc0: float | None, say_notes: SayNotes | None
+) -> float:
+    """State of charge at the first row: as given, from the voltage, or the saved model's; it is said."""
+    voltage = profile.voltage_v
+    if voltage is None and soc0 is None:
+        soc0 = model.soc0
+    if voltage is None:
+        voltage = np.full_like(profile.time_s, np.nan)
+    record = Measurement(
+        profile.time_s, profile.current_a, voltage, profile.temperature_degc, file.name.split(".")[0]
+    )
+    start = initial_state(model.cell, record, soc0, model.hold, model.effects)
+    if say_notes is not None:
+        say_notes([start.sentence])
+    return start.soc
 
 
 def _write(path: Path, frame: pd.DataFrame) -> None:

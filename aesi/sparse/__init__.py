@@ -1,12 +1,12 @@
 """Ensemble sparse learning of the voltage error: library, STRidge, ensembles, free run, search problem."""
 
-from aesi.sparse.evaluate import Candidate, FitnessWeights, HonestResiduals, evaluate, fitness
-from aesi.sparse.genome import Genome
-from aesi.sparse.inputs import with_inputs
-from aesi.sparse.library import Library, Term
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Options, Problem
+from aesi.sparse.search.evaluate import Candidate, FitnessWeights, HonestResiduals, evaluate, fitness
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.problem import Options, Problem
 from aesi.sparse.stridge import STRidge
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.library import Library, Term
 
 __all__ = [
     "Candidate",

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.sparse.basis import FUNCTIONS, clipped_values, slope, value
+from aesi.sparse.terms.basis import FUNCTIONS, clipped_values, slope, value
 
 LIMIT = 10.0
 """A prediction beyond this many times the trained half-range counts as diverged."""

@@ -26,10 +26,10 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
-from aesi.sparse.inputs import with_inputs
 from aesi.sparse.leverage import Leverage
-from aesi.sparse.library import Library, Term, evaluate_terms
-from aesi.sparse.scaling import Scaling
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.library import Library, Term, evaluate_terms
+from aesi.sparse.terms.scaling import Scaling
 
 SCHEMA = "aesi.sparse_model/2"
 

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.sparse.library import Library
 from aesi.sparse.stridge import STRidge
+from aesi.sparse.terms.library import Library
 
 
 def chebyshev_library(library: Library) -> Any:

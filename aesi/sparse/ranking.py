@@ -16,9 +16,9 @@ from scipy.linalg import lapack
 
 from aesi.numerics.typing import Array
 from aesi.records import ErrorSeries
-from aesi.sparse.inputs import with_inputs
-from aesi.sparse.library import evaluate_terms
 from aesi.sparse.model import SparseModel
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.library import evaluate_terms
 
 
 def svd_scores(features: Array) -> Array:

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
-from aesi.physics.constants import SECONDS_PER_HOUR
 from aesi.records import Measurement
 from aesi.tracer.cycler_zero import flowing
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.constants import SECONDS_PER_HOUR
 from aesi.records import Measurement
 from aesi.tracer.records import Record
 

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from aesi.parameters import Parameter
-from aesi.physics.cell.relations import Sum, Table
+from aesi.physics.cell.relations import LookupTable, Sum
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
@@ -54,7 +54,7 @@ def correct(soc: tuple[float, ...], model: EspmModel, **volts: float) -> EspmMod
     spline = CubicSpline(at, [volts[f"knot_{k:02d}_v"] for k in range(len(soc))], bc_type="natural")
     x = np.linspace(max(p.theta_min - BEYOND, 1e-3), min(p.theta_max + BEYOND, 1.0 - 1e-3), GRID)
     y = spline(np.clip(x, p.theta_min, p.theta_max))
-    table = Table(tuple(map(float, x)), tuple(map(float, y)))
+    table = LookupTable(tuple(map(float, x)), tuple(map(float, y)))
     return model.with_cell(positive=replace(p, ocp=Sum(p.ocp, table)))
 
 

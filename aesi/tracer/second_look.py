@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
@@ -81,7 +82,9 @@ def is_possible(problem: Problem) -> bool:
 
 def _is_slow_and_wide(cell: Cell, record: Record) -> bool:
     seen = record.thin.take(slice(0, record.n_fit))
-    moved_ah = np.concatenate([[0.0], np.cumsum(seen.current_a[1:] * np.diff(seen.time_s))]) / 3600.0
+    moved_ah = (
+        np.concatenate([[0.0], np.cumsum(seen.current_a[1:] * np.diff(seen.time_s))]) / SECONDS_PER_HOUR
+    )
     return is_slow(cell, record) and float(np.ptp(moved_ah)) >= SPAN * cell.capacity_ah
 
 

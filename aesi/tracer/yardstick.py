@@ -16,7 +16,7 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.records import INPUT_NAMES, ErrorSeries, Failed, Run, Split
 from aesi.sparse import Candidate, Genome, Library, Options, Problem, evaluate, with_inputs
-from aesi.sparse.library import ERROR
+from aesi.sparse.terms.library import ERROR
 
 POINTS_TO: Mapping[str, tuple[str, ...]] = {
     "current: an ohmic or a kinetic drop": ("I",),

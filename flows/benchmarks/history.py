@@ -47,7 +47,8 @@ WATCHED = {
     "bands": Watch(("layout", "horizon_s", "method", "cells", "seed"), lower={"score_ratio": RESULT}),
     "blind": Watch(
         ("summary", "cases"),
-        higher={"effect_right_pct": RATE, "none_right_pct": RATE, "unknown_right_pct": RATE},
+        higher={"effect_exact_pct": RATE, "effect_grouped_pct": RATE, "stranger_unknown_pct": RATE},
+        lower={"none_false_name_pct": RATE},
     ),
     "tracking": Watch(("rows", "terms", "resamples", "artifact_kb"), lower={"overhead_pct": TIMING}),
     "scale": Watch(("runner", "rows", "terms", "workers"), higher={"ratio_by_processor": RESULT}),

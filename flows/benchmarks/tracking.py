@@ -24,7 +24,7 @@ from aesi.bench.ensemble import synthetic_record
 from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.records import INPUT_NAMES, Split
 from aesi.sparse import Genome, Library, Options, Problem, evaluate
-from aesi.sparse.inputs import with_inputs
+from aesi.sparse.terms.inputs import with_inputs
 from flows.base import environment
 
 METRICS = 10

@@ -21,6 +21,7 @@ def simulate(
     hold: options.Hold = "linear",
     column: options.Columns = None,
     sign: options.Sign = "discharge-positive",
+    model: options.Model = "espm",
 ) -> None:
     """The physics model alone, under a current profile."""
     from aesi.pipeline.simulation import simulate_file
@@ -36,6 +37,7 @@ def simulate(
         columns=options.columns(column),
         sign=sign,
         say_notes=options.say_notes,
+        model=model,
     )
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
     typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)

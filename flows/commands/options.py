@@ -35,6 +35,13 @@ Hold = Annotated[
     Literal["linear", "backward"], typer.Option("--hold", help="How the current runs between rows.")
 ]
 
+Model = Annotated[
+    Literal["espm", "dfn"],
+    typer.Option(
+        "--model", help="Single particle with electrolyte, or porous electrode (Doyle-Fuller-Newman)."
+    ),
+]
+
 
 def columns(pairs: list[str] | None) -> dict[str, str | None]:
     """`quantity=name` pairs as a mapping; an empty name leaves the quantity out."""

@@ -6,12 +6,12 @@ import json
 from functools import partial
 from pathlib import Path
 
-from aesi.pipeline.experiment.candidate import Scored, scorer
+from aesi.pipeline.experiment.candidate import ScoredCandidate, scorer
 from aesi.records import Failed
 from flows.base import environment
 
 
-def build_scorer(content: str, base: str) -> partial[Scored | Failed]:
+def build_scorer(content: str, base: str) -> partial[ScoredCandidate | Failed]:
     """The evaluating function of an experiment given as JSON; `base` is the folder its paths start from."""
     from aesi.pipeline.experiment.config import parse_experiment
     from aesi.pipeline.experiment.fit import build_problem

@@ -13,7 +13,6 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.jobs.run_request import RunRequest
@@ -33,7 +32,7 @@ def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
     console.say(f"{config.name}: {config.note}" if config.note else config.name)
     store = Store(config.tracking.uri)
     with working_on(request, store, console) as tracker:
-        folder = _stages(config, request, tracker, run, console, started)
+        folder = _stages(request, tracker, run, console, started)
     console.say(f"Finished in {duration(time.monotonic() - started)}.")
     console.say(f"Report: {_shown(folder / 'report.html')}")
     console.say(f"Runs:   aesi ui        Tables: aesi tables {config.name}")
@@ -41,7 +40,6 @@ def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
 
 
 def _stages(
-    config: ExperimentConfig,
     request: RunRequest,
     tracker: Tracker,
     run: Run,
@@ -58,7 +56,8 @@ def _stages(
     from flows.search.study import run_study
     from flows.tracking.experiment_log import CandidateTracker, track_result, track_start
 
-    loaded = run("data and physics", lambda: load(config), retries=2)
+    loaded = run("data and physics", lambda: load(request.config()), retries=2)
+    config = loaded.config  # that of the fallback where it fell back to one
     for note in together(loaded.notes):
         console.say(f"  {note}")
     track_start(tracker, config, loaded)

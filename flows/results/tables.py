@@ -16,8 +16,6 @@ from aesi.errors import InputError
 from aesi.pipeline.report import tables
 from flows.tracking.store import KIND, Store
 
-Row = dict[str, Any]
-
 
 def tables_of(
     experiment: str,
@@ -43,7 +41,7 @@ def tables_of(
     return f"{text}\n{_footer(name, runs, format)}"
 
 
-def merged(runs: Sequence[Sequence[Row]]) -> list[Row]:
+def merged(runs: Sequence[Sequence[dict[str, Any]]]) -> list[dict[str, Any]]:
     """Rows of several runs as one set: the mean of every number, and the range over seeds."""
     if len(runs) == 1:
         return list(runs[0])
@@ -51,7 +49,7 @@ def merged(runs: Sequence[Sequence[Row]]) -> list[Row]:
     return [_mean([row for rows in runs for row in rows if row["name"] == name]) for name in names]
 
 
-def _mean(rows: Sequence[Row]) -> Row:
+def _mean(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     row = _mean_value(rows)
     msers = [_at(each, "free_run", "test_mser_pct") for each in rows]
     found = [value for value in msers if value is not None]
@@ -149,4 +147,7 @@ def _footer(name: str, runs: Sequence[Any], format: str) -> str:
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {ids}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
+    for run in runs:
+        if "aesi.fallback" in run.data.tags:
+            text = f"{text} {run.data.tags['aesi.fallback']}"
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]

@@ -25,7 +25,7 @@ from optuna.trial import FrozenTrial, TrialState
 from aesi.errors import ConfigError
 from aesi.records import Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
-from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.search.genome_space import GenomeSpace
 from flows.search.result import FINISHED, RECORD, RECORDED, SearchResult
 from flows.search.term_sampler import INDEX, TermSampler
 

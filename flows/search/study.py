@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aesi.errors import FitError
-from aesi.pipeline.experiment.candidate import Scored, genome_space, weights
+from aesi.pipeline.experiment.candidate import ScoredCandidate, genome_space, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, Problem
@@ -21,7 +21,7 @@ from flows.evaluation.outcome_store import Outcomes, open_outcomes
 from flows.search.nsga2 import Constraints, search
 from flows.search.result import SearchResult
 
-OnScored = Callable[[int, Genome, Scored | Failed], None]
+OnScored = Callable[[int, Genome, ScoredCandidate | Failed], None]
 """Told of each candidate: its number, its genome, what became of it."""
 
 
@@ -36,7 +36,7 @@ class Found:
     number: int
     chosen: Candidate
     key: str
-    scored: dict[int, Scored | Failed]
+    scored: dict[int, ScoredCandidate | Failed]
 
     def rows(self) -> list[dict[str, Any]]:
         """The candidates that were evaluated, as the report draws them."""
@@ -73,8 +73,8 @@ def run_study(
     pool = open_pool(problem, config)
     tally = tally or Tally()
     evaluation = Evaluation(pool, outcomes, study_key(problem, config), console.say, tally, reuse)
-    scored: dict[int, Scored | Failed] = {}
-    waiting: dict[Genome, list[Scored | Failed]] = {}
+    scored: dict[int, ScoredCandidate | Failed] = {}
+    waiting: dict[Genome, list[ScoredCandidate | Failed]] = {}
     started = time.monotonic()
 
     def evaluate_many(genomes: Sequence[Genome]) -> Iterator[tuple[int, Candidate | Failed]]:
@@ -134,6 +134,6 @@ def study_key(problem: Problem, config: ExperimentConfig) -> str:
     )
 
 
-def _best(scored: dict[int, Scored | Failed]) -> str:
-    values = [one.candidate.fitness for one in scored.values() if isinstance(one, Scored)]
+def _best(scored: dict[int, ScoredCandidate | Failed]) -> str:
+    values = [one.candidate.fitness for one in scored.values() if isinstance(one, ScoredCandidate)]
     return f"best fitness {max(values):.3f}" if values else "none feasible yet"

@@ -24,8 +24,8 @@ from optuna.samplers import NSGAIISampler
 from optuna.study import Study
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
-from aesi.sparse.genome import Genome
-from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.genome_space import GenomeSpace
 
 __all__ = ["GenomeSpace", "TermSampler", "distributions", "genome_of", "violation"]
 

@@ -8,7 +8,7 @@ from math import log10
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline.experiment.candidate import Scored
+from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.load import Loaded
 from aesi.records import ROLES, Failed
@@ -28,11 +28,13 @@ WITH_UNIT = {
 
 
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded) -> None:
-    """Settings, versions and data of a run."""
-    content = config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
-    tags = {"mlflow.note.content": config.note, "aesi.setting": config.setting}
+    """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
+    content = loaded.config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
+    tags = {"mlflow.note.content": config.note, "aesi.setting": loaded.setting}
+    if loaded.fallback:
+        tags["aesi.fallback"] = loaded.fallback
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
-    tracker.json("experiment.json", config.model_dump(mode="json"))
+    tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
     tracker.datasets(
         [
             {
@@ -61,7 +63,7 @@ class CandidateTracker:
             "resamples": config.search.resamples,
         }
 
-    def __call__(self, number: int, genome: Genome, outcome: Scored | Failed) -> None:
+    def __call__(self, number: int, genome: Genome, outcome: ScoredCandidate | Failed) -> None:
         """Log candidate `number`; a failed one carries its reason as a tag."""
         params = {
             "number": number,
@@ -105,7 +107,7 @@ def track_result(tracker: Tracker, folder: Path, summary: Mapping[str, Any], num
     tracker.model(folder / "model")
 
 
-def coefficients(scored: Scored) -> dict[str, dict[str, float]]:
+def coefficients(scored: ScoredCandidate) -> dict[str, dict[str, float]]:
     """term -> coefficient for both ensembles, and term -> inclusion probability."""
     bagging, stability = scored.candidate.bagging, scored.candidate.stability
     return {
@@ -115,7 +117,7 @@ def coefficients(scored: Scored) -> dict[str, dict[str, float]]:
     }
 
 
-def _metrics(scored: Scored) -> dict[str, Any]:
+def _metrics(scored: ScoredCandidate) -> dict[str, Any]:
     candidate = scored.candidate
     return {
         "loss/oob": candidate.loss_oob,

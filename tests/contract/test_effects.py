@@ -36,11 +36,21 @@ SUFFIXES = {
 each = pytest.mark.parametrize("effect", CATALOGUE.values(), ids=CATALOGUE)
 
 
+both = pytest.mark.parametrize("model", ["espm", "dfn"])
+OF_ESPM_ALONE = {"reaction_nonuniformity"}
+
+
 def run(*effects, **options):
     return simulate(CELL, TIME, CURRENT, soc0=0.8, effects=effects, on_depletion="clip", **options)
 
 
-BASE = run()
+def skip_what_the_model_holds(effect, model):
+    if model == "dfn" and effect.id in OF_ESPM_ALONE:
+        pytest.skip("the porous electrode has it of itself")
+
+
+BASES = {model: run(model=model) for model in ("espm", "dfn")}
+BASE = BASES["espm"]
 
 
 def test_the_catalogue_holds_what_was_promised():
@@ -61,9 +71,11 @@ def test_it_says_what_it_is(effect):
     assert all(name in page for name in effect.parameters)
 
 
+@both
 @each
-def test_it_keeps_the_shape_and_is_finite(effect):
-    result = run(effect.activate())
+def test_it_keeps_the_shape_and_is_finite(effect, model):
+    skip_what_the_model_holds(effect, model)
+    result = run(effect.activate(), model=model)
     assert result.voltage_v.shape == TIME.shape
     assert np.isfinite(result.voltage_v).all()
     for name, values in result.series.items():
@@ -73,30 +85,39 @@ def test_it_keeps_the_shape_and_is_finite(effect):
     assert (result.current_a == CURRENT).all()  # what was recorded, whatever the cell saw
 
 
+@both
 @each
-def test_it_acts(effect):
-    moved = np.abs(run(effect.activate()).voltage_v - BASE.voltage_v).max()
+def test_it_acts(effect, model):
+    skip_what_the_model_holds(effect, model)
+    moved = np.abs(run(effect.activate(), model=model).voltage_v - BASES[model].voltage_v).max()
     assert moved > (0.0 if effect.id == "numerical_error" else 1e-5)
 
 
+@both
 @each
-def test_it_is_pure(effect):
+def test_it_is_pure(effect, model):
+    skip_what_the_model_holds(effect, model)
     time, current = TIME.copy(), CURRENT.copy()
     active = effect.activate()
-    first = simulate(CELL, time, current, soc0=0.8, effects=[active], on_depletion="clip")
-    second = simulate(CELL, time, current, soc0=0.8, effects=[active], on_depletion="clip")
+    first = simulate(CELL, time, current, soc0=0.8, effects=[active], on_depletion="clip", model=model)
+    second = simulate(CELL, time, current, soc0=0.8, effects=[active], on_depletion="clip", model=model)
     assert (first.voltage_v == second.voltage_v).all()
     assert (time == TIME).all()
     assert (current == CURRENT).all()
-    assert (run().voltage_v == BASE.voltage_v).all()
+    assert (run(model=model).voltage_v == BASES[model].voltage_v).all()
 
 
+@both
 @each
-def test_it_vanishes_at_its_neutral_values(effect):
+def test_it_vanishes_at_its_neutral_values(effect, model):
+    skip_what_the_model_holds(effect, model)
     neutral = {name: p.neutral for name, p in effect.parameters.items() if p.neutral is not None}
     if not neutral:
         pytest.skip("has no point at which it vanishes")
-    assert np.abs(run(effect.activate(**neutral)).voltage_v - BASE.voltage_v).max() < NEUTRAL_V
+    assert (
+        np.abs(run(effect.activate(**neutral), model=model).voltage_v - BASES[model].voltage_v).max()
+        < NEUTRAL_V
+    )
 
 
 @each
@@ -122,11 +143,16 @@ def test_bounds_hold_defaults_and_neutral_values_and_are_enforced(effect):
         effect.activate(no_such_parameter=1.0)
 
 
+@both
 @each
-def test_both_ends_of_every_range_can_be_simulated(effect):
+def test_both_ends_of_every_range_can_be_simulated(effect, model):
+    skip_what_the_model_holds(effect, model)
     for name, p in effect.parameters.items():
         for value in p.bounds:
-            assert np.isfinite(run(effect.activate(**{name: value})).voltage_v).all(), (name, value)
+            assert np.isfinite(run(effect.activate(**{name: value}), model=model).voltage_v).all(), (
+                name,
+                value,
+            )
 
 
 @each
@@ -136,6 +162,11 @@ def test_units_are_units_and_agree_with_the_names(effect):
         endings = [s for s in SUFFIXES if name.endswith(s) or name == s[1:]]
         wanted = SUFFIXES[max(endings, key=len)] if endings else "dimensionless"
         assert registry.parse_units(p.unit) == registry.parse_units(wanted), name
+
+
+def test_what_a_model_holds_of_itself_is_refused_in_one_sentence():
+    with pytest.raises(InputError, match="of itself"):
+        run(CATALOGUE["reaction_nonuniformity"].activate(), model="dfn")
 
 
 def test_the_units_of_voltage_laws_add_up():

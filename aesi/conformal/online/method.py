@@ -25,7 +25,7 @@ MIN_WINDOW = 10
 
 
 @dataclass(frozen=True, eq=False)
-class Calibration:
+class CalibrationData:
     """What a method calibrates on: checked records (n_i,) V, their currents (n_i,) A or None, and settings."""
 
     records: list[Array]
@@ -70,11 +70,11 @@ class Method(ABC):
         floor = width_floor(records, marginal)
         currents = checked_currents(current_a, records)
         rng = rng or np.random.default_rng(0)
-        band, scale = self.band(Calibration(records, currents, alpha, window, marginal, floor, rng))
+        band, scale = self.band(CalibrationData(records, currents, alpha, window, marginal, floor, rng))
         return Calibrated(self.name, alpha, window, band, scale, self.rate, marginal, floor)
 
     @abstractmethod
-    def band(self, data: Calibration) -> tuple[Band, Scale]:
+    def band(self, data: CalibrationData) -> tuple[Band, Scale]:
         """The raw band, and the factor on its half-width that calibrates it."""
 
     def adaptive(self, rate: float) -> Method:
@@ -112,7 +112,7 @@ class SplitConformal(Method):
 
     name: str = "split"
 
-    def band(self, data: Calibration) -> tuple[Band, Scale]:
+    def band(self, data: CalibrationData) -> tuple[Band, Scale]:
         return FixedBand(*data.marginal_v), Scale.none()
 
 
@@ -123,7 +123,7 @@ class EnbPI(Method):
     name: str = "enbpi"
     n_betas: int = 5
 
-    def band(self, data: Calibration) -> tuple[Band, Scale]:
+    def band(self, data: CalibrationData) -> tuple[Band, Scale]:
         alpha, window = data.alpha, data.window
         needed = int(np.ceil(2 / alpha)) - 1
         if needed > window:

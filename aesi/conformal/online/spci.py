@@ -18,9 +18,9 @@ from aesi.conformal.bands.band import Band
 from aesi.conformal.bands.history import History, View
 from aesi.conformal.bands.narrowest import level_pairs
 from aesi.conformal.bands.regression import RegressionBand
-from aesi.conformal.online.method import Calibration, Method
+from aesi.conformal.online.method import CalibrationData, Method
 from aesi.conformal.online.scale import Scale
-from aesi.conformal.regressors.model import FitTask, Fitter
+from aesi.conformal.regressors.model import FitTask, RegressorFit
 from aesi.errors import FitError
 from aesi.numerics.typing import Array, BoolArray
 
@@ -36,13 +36,13 @@ class SPCI(Method):
     use_current : whether the current, where given, is among its features and its groups.
     rows_a_column : calibration rows that the regressor needs for each feature."""
 
-    fitter: Fitter
+    fitter: RegressorFit
     view: View = "features"
     n_betas: int = 5
     use_current: bool = True
     rows_a_column: int = 10
 
-    def band(self, data: Calibration) -> tuple[Band, Scale]:
+    def band(self, data: CalibrationData) -> tuple[Band, Scale]:
         currents = data.currents if self.use_current else None
         history = History(data.window, self.view, currents is not None)
         rows, targets, current = stacked(data.records, currents, history)

@@ -1,4 +1,4 @@
-"""Gradient-boosted quantiles (`numerics.boosting`), one sum of trees a level; meant for normalised rows."""
+"""Gradient-boosted quantiles (`aesi.numerics.trees.boosting`), one sum of trees a level; meant for normalised rows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
-from aesi.numerics.boosting import BoostedTrees, Growth, bin_edges, binned, fit_boosted
+from aesi.numerics.trees.boosting import BoostedTrees, Growth, bin_edges, binned, fit_boosted
 from aesi.numerics.typing import Array, SavedState
 
 

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
-from aesi.numerics.trees import Splits, flatten, forest_quantiles
+from aesi.numerics.trees.forest import Splits, flatten, forest_quantiles
 from aesi.numerics.typing import Array, SavedState
 
 GRID_POINTS = 512

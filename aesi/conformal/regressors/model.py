@@ -55,6 +55,6 @@ class QuantileModel(ABC):
         """Inverse of `to_state`; `kinds` holds the regressors that may stand inside this one."""
 
 
-Fitter = Callable[[FitTask], QuantileModel]
+RegressorFit = Callable[[FitTask], QuantileModel]
 Kinds = Mapping[str, type[QuantileModel]]
 """Regressors by their `kind`, the word that a saved state names them by."""

@@ -15,7 +15,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from aesi.conformal.regressors.linear import LinearQuantiles
-from aesi.conformal.regressors.model import FitTask, Fitter, Kinds, QuantileModel
+from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel, RegressorFit
 from aesi.numerics.typing import Array, SavedState
 
 
@@ -30,7 +30,7 @@ class NormalisedQuantiles(QuantileModel):
     kind: ClassVar[str] = "normalised"
 
     @classmethod
-    def fit(cls, task: FitTask, inner: Fitter) -> Self:
+    def fit(cls, task: FitTask, inner: RegressorFit) -> Self:
         """Fit the line, then `inner` on what it leaves."""
         outer = np.array(
             [task.levels[: len(task.levels) // 2].mean(), task.levels[len(task.levels) // 2 :].mean()]

@@ -5,21 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from aesi.data.laboratory.simulator import Model
 from aesi.records import Measurement
+
+RecordKind = Literal["slow", "pulses", "drive", "fast_charge"]
+Warmth = Literal["none", "ambient", "course"]
 
 
 @dataclass(frozen=True)
 class CaseSpec:
     """One case to make.
 
-    cell : name of one of the cell files handed to `generate`.
-    recipes : names in `recipes.RECIPES` or `strangers.STRANGERS`; none for a cell that is as declared.
+    cell : name of one of `cells.CELLS`.
+    recipes : names in `recipes.RECIPES` or `strangers.STRANGERS`; none for a cell that lacks nothing.
     target_mv : RMS change of the voltage that each recipe is scaled to.
-    rate : the drive's currents, as a share of those of the default vehicle (3.2C at the highest under US06).
-    tolerance : largest relative error of the two solid diffusivities.
-    temperature : whether there is a temperature column.
+    records : what was run, each from a rest.  rate : of the currents, times those of the default vehicle.
+    spread : whether the own parameters are off by `spread.SPREADS` (as declared otherwise).
+    warmth : 'none': no temperature column, and the cell is at its reference; 'ambient': the column of a cell in a
+    chamber at another temperature; 'course': of one that also warms up.
+    soc0_given : whether the finder is told the state of charge.  dt_s : rows of drives and pulses.
     """
 
     name: str
@@ -27,20 +33,34 @@ class CaseSpec:
     recipes: tuple[str, ...] = ()
     target_mv: float = 5.0
     model: Model = "SPMe"
+    records: tuple[RecordKind, ...] = ("drive",)
     rate: float = 1.0
-    tolerance: float = 0.0
-    temperature: bool = False
-    soc0: float = 0.95
+    spread: bool = False
+    warmth: Warmth = "none"
+    soc0: float = 0.8
+    soc0_given: bool = True
+    dt_s: float = 1.0
     seed: int = 0
     voltage_noise_v: float = 1e-3
     current_noise_a: float = 4e-3
+
+    @property
+    def kind(self) -> str:
+        """'none', 'single', 'pair', 'triple' or 'stranger'."""
+        from aesi.data.blind.strangers import STRANGERS
+
+        if any(name in STRANGERS for name in self.recipes):
+            return "stranger"
+        return ("none", "single", "pair", "triple")[len(self.recipes)]
 
 
 @dataclass(frozen=True, eq=False)
 class BlindCase:
     """A case made.
 
-    label : 'none', 'unknown', or the ids of the effects joined by '+'.  also : answers that are right as well.
+    label : 'none', 'unknown', or the ids of the effects joined by '+'.  also : answers that a lenient judge takes.
+    neutral : names that are neither right nor wrong here (what the reduction of a porous electrode leaves).
+    soc0 : state of charge at the first sample of every record, None where the finder is not told.
     declared : the cell file the finder is given.  truth : what was changed and by how much, units in the names;
     `rms_mv` in it is the RMS of what the model without effects leaves of the noise-free voltage.
     """
@@ -49,7 +69,8 @@ class BlindCase:
     measurements: tuple[Measurement, ...]
     label: str
     also: tuple[str, ...]
-    soc0: float
+    neutral: tuple[str, ...]
+    soc0: float | None
     declared: Path
     truth: Mapping[str, float] = field(default_factory=dict)
 

@@ -1,49 +1,108 @@
-"""Random duties: a rest, then drive schedules with rests and charge pulses between, for some two hours at 1 Hz."""
+"""The tests of a case: a drive, pulses, a slow discharge, each from a rest and 20 to 60 minutes or a discharge long."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
+from aesi.data.blind.case import RecordKind
 from aesi.data.profile import Bench, Profile
 from aesi.numerics.typing import Array
 
 SCHEDULES = ("udds", "hwfet", "us06", "wltc_3b", "artemis_urban", "sc03", "nedc")
 FIRST_REST_S = 120.0
-SHORTEST_S = 5000.0
-LONGEST_S = 8000.0
+SHORTEST_S = 1500.0
+LONGEST_S = 3600.0
 PULSE_C = 2.0
+SLOW_DT_S = 10.0
+SLOW_C = 0.2
+LEAST_SOC = 0.1
 
 
-def duty(capacity_ah: float, rate: float, soc0: float, rng: np.random.Generator) -> Profile:
-    """Schedules in random order until at least 5,000 s are full; each followed by rest, charge pulse, rest.
+@dataclass(frozen=True)
+class Asked:
+    """capacity_ah, rate : of the cell and of the currents.  soc0 : at the first row.  dt_s : seconds a row."""
 
-    rate : scale of the currents.  Pulses are 2C times the rate, 20 to 60 s.
-    """
-    bench = Bench(capacity_ah, dt_s=1.0, scale=rate)
+    capacity_ah: float
+    rate: float
+    soc0: float
+    dt_s: float = 1.0
+
+    @property
+    def bench(self) -> Bench:
+        """What turns pieces into currents."""
+        return Bench(self.capacity_ah, dt_s=self.dt_s, scale=self.rate)
+
+
+def drive(asked: Asked, rng: np.random.Generator) -> Profile:
+    """Schedules in random order until 1,500 s are full; each followed by rest, charge pulse of 20 to 60 s, rest."""
+    bench = asked.bench
     pieces: list[Array] = [bench.rest(FIRST_REST_S)]
-    while sum(map(len, pieces)) < SHORTEST_S:
-        room = LONGEST_S - sum(map(len, pieces))
-        name = str(rng.choice(SCHEDULES))
+    while _seconds(pieces, asked) < SHORTEST_S:
+        room = LONGEST_S - _seconds(pieces, asked)
         piece = [
-            bench.drive(name),
+            bench.drive(str(rng.choice(SCHEDULES))),
             bench.rest(float(rng.integers(60, 240))),
-            bench.pulse(-PULSE_C * rate, float(rng.integers(20, 60))),
+            bench.pulse(-PULSE_C * asked.rate, float(rng.integers(20, 60))),
             bench.rest(float(rng.integers(60, 300))),
         ]
-        if sum(map(len, piece)) <= room:
+        if _seconds(piece, asked) <= room:
             pieces += piece
-    return bench.profile("duty", pieces, soc0)
+    return bench.profile("drive", pieces, asked.soc0)
 
 
-def fast_charge(capacity_ah: float, rate: float, soc0: float, rng: np.random.Generator) -> Profile:
+def fast_charge(asked: Asked, rng: np.random.Generator) -> Profile:
     """Drive pieces with long 3C charges at a high state of charge, where lithium plates."""
-    bench = Bench(capacity_ah, dt_s=1.0, scale=rate)
+    bench = asked.bench
     pieces: list[Array] = [bench.rest(FIRST_REST_S)]
-    while sum(map(len, pieces)) < SHORTEST_S:
+    while _seconds(pieces, asked) < SHORTEST_S:
         pieces += [
             bench.drive(str(rng.choice(("us06", "sc03", "artemis_urban")))),
             bench.rest(float(rng.integers(60, 180))),
-            bench.pulse(-3.0 * rate, float(rng.integers(60, 120))),
+            bench.pulse(-3.0 * asked.rate, float(rng.integers(60, 120))),
             bench.rest(float(rng.integers(200, 400))),
         ]
-    return bench.profile("duty", pieces, soc0)
+    return bench.profile("fast_charge", pieces, asked.soc0)
+
+
+def pulses(asked: Asked, rng: np.random.Generator) -> Profile:
+    """Discharge and charge pulses of 10 s with rests, 8 % of the charge taken out at 1C between them."""
+    bench = asked.bench
+    pieces: list[Array] = [bench.rest(FIRST_REST_S)]
+    while _seconds(pieces, asked) < SHORTEST_S:
+        strength = asked.rate * float(rng.uniform(1.0, 2.0))
+        pieces += [
+            bench.pulse(strength, 10.0),
+            bench.rest(60.0),
+            bench.pulse(-0.75 * strength, 10.0),
+            bench.rest(60.0),
+            bench.pulse(asked.rate, 0.08 * SECONDS_PER_HOUR / asked.rate),
+            bench.rest(float(rng.integers(120, 300))),
+        ]
+    return bench.profile("pulses", pieces, asked.soc0)
+
+
+def slow(asked: Asked, rng: np.random.Generator) -> Profile:
+    """A discharge at C/5 down to a tenth of the charge, a row every 10 s, with rests before and after."""
+    bench = Bench(asked.capacity_ah, dt_s=SLOW_DT_S)
+    pieces = [
+        bench.rest(FIRST_REST_S),
+        bench.pulse(SLOW_C, (asked.soc0 - LEAST_SOC) / SLOW_C * SECONDS_PER_HOUR),
+        bench.rest(1200.0),
+    ]
+    return bench.profile("slow", pieces, asked.soc0)
+
+
+TESTS: Mapping[RecordKind, Callable[[Asked, np.random.Generator], Profile]] = {
+    "drive": drive,
+    "pulses": pulses,
+    "slow": slow,
+    "fast_charge": fast_charge,
+}
+
+
+def _seconds(pieces: list[Array], asked: Asked) -> float:
+    return sum(map(len, pieces)) * asked.dt_s

@@ -1,8 +1,8 @@
-"""Make one blind case: base run, effects scaled to the size asked for, instruments, label."""
+"""Make one blind case: base runs, effects scaled to the size asked for, instruments, label."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -10,111 +10,128 @@ from pathlib import Path
 import numpy as np
 
 from aesi.data.blind.case import BlindCase, CaseSpec
-from aesi.data.blind.duty import duty
+from aesi.data.blind.cells import CELLS
+from aesi.data.blind.duty import TESTS, Asked
 from aesi.data.blind.recipes import RECIPES, Recipe, Written
+from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Setup, Trace, run
+from aesi.data.laboratory.simulator import Applied, Model, Setup, TrueRun, run
 from aesi.data.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
-MODERATE_RATE = 0.55
-"""Up to this share of the default currents, a full porous-electrode cell counts as no effect as well."""
 COARSE_POINTS = 15
-"""Radial points of the runs that find the size of an effect; the error of the mesh cancels in a difference."""
+"""Radial points of the runs that find the size of an effect, always with the single particle: the error of mesh and
+model cancels in a difference to within what `CLOSE_ENOUGH` allows."""
 CLOSE_ENOUGH = 0.2
-HARDER = 1.25
-"""Times the rate asked for, where an effect at its most does not show as much as it should: more would leave the window
-of voltage."""
 MOST_TRIES = 4
+SHOWN = 0.6
+"""Of the target, that an effect has to move the voltage by at least."""
 MILLIVOLTS = 1e3
+CHAMBER_K = 15.0
+"""A chamber stands at most so far from the reference of the cell file, either way."""
+COOLING_W_M2_K = 10.0
+OTHER_SOC = (-0.1, 0.05)
+"""Where the finder is not told, further records start so far from the first."""
+REDUCTION = "reaction_nonuniformity"
+"""What the single particle leaves out of a porous electrode: no lack of the cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class _Bench:
-    """What all runs of a case share."""
+    """What all runs of a case share. own : changes that are no effect (own parameters, temperature of the chamber)."""
 
     declared: Path
     spec: CaseSpec
-    profile: Profile
+    profiles: tuple[Profile, ...]
     capacity_ah: float
-    tolerance: tuple[Applied, ...]
-    base: Trace
+    own: tuple[Applied, ...]
 
-    def run(self, applied: tuple[Applied, ...], radial_points: int | None = None) -> Trace:
-        """The cell with these changes under the duty."""
-        setup = Setup(self.declared, self.spec.model, (*self.tolerance, *applied), radial_points)
-        return run(setup, self.profile)
+    def run(
+        self,
+        applied: tuple[Applied, ...] = (),
+        model: Model | None = None,
+        radial_points: int | None = None,
+        profiles: Sequence[Profile] | None = None,
+    ) -> list[TrueRun]:
+        """The cell with these changes under its tests."""
+        setup = Setup(self.declared, model or self.spec.model, (*self.own, *applied), radial_points)
+        return [run(setup, profile) for profile in profiles or self.profiles]
 
-    def unexplained(self, written: Written, radial_points: int | None = None) -> Array:
-        """(n,) V: what was written less what the cell without effects would do under the current written."""
-        current = self.profile.current_a
-        if np.array_equal(written.current_a, current):
-            return written.voltage_v - self.run((), radial_points).voltage_v
-        believed = Profile("believed", self.profile.time_s, written.current_a, self.profile.soc0)
-        setup = Setup(self.declared, self.spec.model, self.tolerance, radial_points)
-        return written.voltage_v - run(setup, believed).voltage_v
+    def unexplained(
+        self, written: Sequence[Written], model: Model | None = None, radial_points: int | None = None
+    ) -> Array:
+        """(rows of all records,) V: what was written less what the cell without effects does under that current."""
+        believed = [
+            profile
+            if np.array_equal(one.current_a, profile.current_a)
+            else Profile("believed", profile.time_s, one.current_a, profile.soc0)
+            for one, profile in zip(written, self.profiles, strict=True)
+        ]
+        base = self.run((), model, radial_points, believed)
+        return np.concatenate([w.voltage_v - b.voltage_v for w, b in zip(written, base, strict=True)])
 
 
-def generate(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator | None = None) -> BlindCase:
-    """The case of a specification.
+def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
+    """The case of a specification; the same specification gives the same case.
 
-    cells : name -> declared BPX file.  rng : of duty, tolerance and noise; by default from the seed of the
-    specification, so that the same specification gives the same case.
+    cells : name -> declared BPX file.
     Raises DataError for an unknown cell or recipe; SimulationError where the cell cannot be simulated.
     """
-    rng = rng or np.random.default_rng(spec.seed)
-    known = [name for name in spec.recipes if name in RECIPES]
-    bench, sizes = _shown(spec, cells, rng, known)
-    spec = bench.spec
+    bench, sizes, rng = _shown(spec, cells)
+    spec, known = bench.spec, list(sizes)
     strange = [name for name in spec.recipes if name in STRANGERS]
-    truth: dict[str, float] = {f"tolerance.{k}": v for a in bench.tolerance for k, v in a.values.items()}
-    added = np.zeros(len(bench.profile))
-    warmth = bench.base.temperature_degc
-    together: list[Applied] = []
-    for name in known:
-        recipe, values = RECIPES[name], sizes[name]
-        truth.update({f"{recipe.label}.{k}": v for k, v in values.items()})
-        if recipe.change and not recipe.reference:
-            together.append(Applied(recipe.change, values))
-        elif recipe.change:
-            added += _difference(recipe, values, bench)
-    changed = bench.run(tuple(together)) if together else bench.base
-    voltage = changed.voltage_v + added
-    warmth = changed.temperature_degc
+    truth = {f"own.{a.change}.{k}": v for a in bench.own for k, v in a.values.items()}
+    truth.update({f"{RECIPES[n].label}.{k}": v for n, values in sizes.items() for k, v in values.items()})
+    traces = _changed(bench, sizes)
     for name in strange:
-        shift = STRANGERS[name].shift(changed, bench.capacity_ah, rng)
-        magnitude = spec.target_mv / MILLIVOLTS / _rms(shift)
-        truth[f"{name}.magnitude"] = magnitude
-        voltage = voltage + magnitude * shift
-    written = Written(bench.profile.time_s, bench.profile.current_a, voltage)
+        traces = _with_stranger(name, traces, bench, truth, int(rng.integers(2**31)))
+    written = [Written(t.time_s, t.current_a, t.voltage_v) for t in traces]
     for name in known:
-        values = {k.split(".", 1)[1]: v for k, v in truth.items() if k.startswith(f"{RECIPES[name].label}.")}
-        written = RECIPES[name].instrument(written, values)
+        written = [RECIPES[name].instrument(one, sizes[name]) for one in written]
     truth["rms_mv"] = MILLIVOLTS * _rms(bench.unexplained(written))
-    label, also = _label(spec, known, strange)
-    measurement = _measured(spec, written, warmth, rng)
-    return BlindCase(spec, (measurement,), label, also, spec.soc0, bench.declared, truth)
+    label, also = _label(known, strange)
+    neutral = (REDUCTION,) if spec.model == "DFN" else ()
+    measurements = tuple(_measured(spec, one, t, rng) for one, t in zip(written, traces, strict=True))
+    soc0 = spec.soc0 if spec.soc0_given else None
+    return BlindCase(spec, measurements, label, also, neutral, soc0, bench.declared, truth)
 
 
 def _shown(
-    spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator, known: list[str]
-) -> tuple[_Bench, dict[str, dict[str, float]]]:
-    """The bench, driven somewhat harder where that is needed for an effect to show, and the values of each recipe."""
-    drawn = rng.bit_generator.state
-    bench = _prepare(spec, cells, rng)
-    sizes = {name: _scaled(RECIPES[name], bench) for name in known}
-    if not all(reached for _, reached in sizes.values()):
-        rng.bit_generator.state = drawn
-        bench = _prepare(replace(spec, rate=HARDER * spec.rate), cells, rng)
-        sizes = {name: _scaled(RECIPES[name], bench) for name in known}
-    return bench, {name: values for name, (values, _) in sizes.items()}
+    spec: CaseSpec, cells: Mapping[str, Path]
+) -> tuple[_Bench, dict[str, dict[str, float]], np.random.Generator]:
+    """The bench, the values of each recipe, and the generator as it stands, on the first cell that shows all effects.
+
+    That of the specification, or one after it: a particle of 50 nm does not show its diffusivity. The specification's
+    own where none shows them.
+    """
+    _check(spec, cells)
+    after = [*CELLS][[*CELLS].index(spec.cell) + 1 :] + [*CELLS][: [*CELLS].index(spec.cell)]
+    allowed = [n for n in after if all(n in RECIPES[r].cells for r in spec.recipes if r in RECIPES)]
+    tried = []
+    for name in (spec.cell, *allowed):
+        there = spec if name == spec.cell else _moved(spec, name)
+        rng = np.random.default_rng(there.seed)
+        bench = _prepare(there, cells, rng)
+        sizes = {n: _scaled(RECIPES[n], bench) for n in there.recipes if n in RECIPES}
+        tried.append((bench, {n: values for n, (values, _) in sizes.items()}, rng))
+        if all(moved >= SHOWN * spec.target_mv / MILLIVOLTS for _, moved in sizes.values()):
+            return tried[-1]
+    return tried[0]
 
 
-def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator) -> _Bench:
+def _moved(spec: CaseSpec, cell: str) -> CaseSpec:
+    """The same case on another cell, as deep in its range of charge and as far up its rates."""
+    old, new = CELLS[spec.cell], CELLS[cell]
+    share = (spec.soc0 - old.soc0[0]) / (old.soc0[1] - old.soc0[0])
+    soc0 = round(new.soc0[0] + share * (new.soc0[1] - new.soc0[0]), 3)
+    return replace(spec, cell=cell, soc0=soc0, rate=round(spec.rate / old.rate * new.rate, 4))
+
+
+def _check(spec: CaseSpec, cells: Mapping[str, Path]) -> None:
     if spec.cell not in cells:
         raise DataError(f"{spec.name}: there is no cell {spec.cell!r}; given are {', '.join(cells)}.")
     for name in spec.recipes:
@@ -122,70 +139,115 @@ def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator
             near = get_close_matches(name, [*RECIPES, *STRANGERS], n=1)
             hint = f"; did you mean {near[0]!r}?" if near else "."
             raise DataError(f"{spec.name}: there is no recipe {name!r}{hint}")
+
+
+def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator) -> _Bench:
     declared = cells[spec.cell]
     capacity = nominal_capacity_ah(declared)
-    made = next((RECIPES[name].duty for name in spec.recipes if name in RECIPES), duty)
-    profile = made(capacity, spec.rate, spec.soc0, rng)
-    tolerance: tuple[Applied, ...] = ()
-    if spec.tolerance:
-        off = 1 + rng.uniform(-spec.tolerance, spec.tolerance, 2)
-        factors = {"negative_factor": float(off[0]), "positive_factor": float(off[1])}
-        tolerance = (Applied("solid_diffusivity", factors),)
-    base = run(Setup(declared, spec.model, tolerance), profile)
-    return _Bench(declared, spec, profile, capacity, tolerance, base)
+    profiles = []
+    for number, kind in enumerate(spec.records):
+        other = 0.0 if spec.soc0_given or number == 0 else float(rng.uniform(*OTHER_SOC))
+        profiles.append(TESTS[kind](Asked(capacity, spec.rate, spec.soc0 + other, spec.dt_s), rng))
+    own = parametrisation(rng) if spec.spread else ()
+    return _Bench(declared, spec, tuple(profiles), capacity, (*own, *_warmth(spec, rng)))
 
 
-def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], bool]:
-    """Values at which the recipe alone moves the voltage by about the target, or the most it may be, and whether that
-    is enough."""
+def _warmth(spec: CaseSpec, rng: np.random.Generator) -> tuple[Applied, ...]:
+    if spec.warmth == "none":
+        return ()
+    chamber = Applied("ambient_temperature", {"shift_k": float(rng.uniform(-CHAMBER_K, CHAMBER_K))})
+    heat = Applied("self_heating", {"cooling_w_m2_k": COOLING_W_M2_K})
+    return (chamber, heat) if spec.warmth == "course" else (chamber,)
+
+
+def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], float]:
+    """Values at which the recipe alone moves the voltage by about the target, or its least or most; and by how much
+    it does, V RMS."""
     target = bench.spec.target_mv / MILLIVOLTS
-    magnitude = 1.0
-    values = recipe.values(magnitude, bench.capacity_ah)
+
+    def values_at(magnitude: float) -> dict[str, float]:
+        return recipe.values(magnitude, bench.capacity_ah, bench.spec.soc0)
+
+    magnitude = max(1.0, recipe.least)
+    moved = 0.0
     for _ in range(MOST_TRIES):
-        moved = _rms(_effect_alone(recipe, values, bench))
-        if abs(moved / target - 1) < CLOSE_ENOUGH:
+        moved = _rms(_effect_alone(recipe, values_at(magnitude), bench))
+        wanted = magnitude * target / max(moved, 1e-6)
+        another = float(np.clip(wanted, recipe.least, recipe.most))
+        if abs(moved / target - 1) < CLOSE_ENOUGH or another == magnitude:
             break
-        if magnitude >= recipe.most and moved < target:
-            return values, False
-        magnitude = float(np.clip(magnitude * target / max(moved, 1e-6), 0.02, recipe.most))
-        values = recipe.values(magnitude, bench.capacity_ah)
-    return values, True
+        magnitude = another
+    return values_at(magnitude), moved
 
 
 def _effect_alone(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> Array:
-    """(n,) V: what the recipe alone changes in the voltage, on a coarse mesh."""
+    """(rows,) V: what the recipe alone changes in the voltage, of a coarse single particle."""
     if recipe.reference:
-        return _difference(recipe, values, bench)
+        return np.concatenate(_difference(recipe, values, bench))
     applied = (Applied(recipe.change, dict(values)),) if recipe.change else ()
-    voltage = bench.run(applied, COARSE_POINTS).voltage_v
-    written = Written(bench.profile.time_s, bench.profile.current_a, voltage)
-    return bench.unexplained(recipe.instrument(written, values), COARSE_POINTS)
+    written = [
+        recipe.instrument(Written(t.time_s, t.current_a, t.voltage_v), values)
+        for t in bench.run(applied, "SPMe", COARSE_POINTS)
+    ]
+    return bench.unexplained(written, "SPMe", COARSE_POINTS)
 
 
-def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> Array:
+def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> list[Array]:
+    """What an option of the single particle changes against the same option without effect, a record each."""
     assert recipe.change is not None
     assert recipe.reference is not None
     points = recipe.radial_points
-    changed = bench.run((Applied(recipe.change, dict(values)),), points).voltage_v
-    return changed - bench.run((recipe.reference(),), points).voltage_v
+    changed = bench.run((Applied(recipe.change, dict(values)),), "SPMe", points)
+    without = bench.run((recipe.reference(),), "SPMe", points)
+    return [c.voltage_v - w.voltage_v for c, w in zip(changed, without, strict=True)]
 
 
-def _label(spec: CaseSpec, known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
-    also = tuple(dict.fromkeys(a for name in known for a in RECIPES[name].also))
-    full = spec.model == "DFN"
+def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]]) -> list[TrueRun]:
+    """The noise-free records of the cell with all its effects."""
+    together = [
+        Applied(str(RECIPES[n].change), v)
+        for n, v in sizes.items()
+        if RECIPES[n].change and not RECIPES[n].reference
+    ]
+    traces = bench.run(tuple(together))
+    for name, values in sizes.items():
+        if RECIPES[name].reference:
+            added = _difference(RECIPES[name], values, bench)
+            traces = [_shifted(t, a) for t, a in zip(traces, added, strict=True)]
+    return traces
+
+
+def _with_stranger(
+    name: str, traces: list[TrueRun], bench: _Bench, truth: dict[str, float], seed: int
+) -> list[TrueRun]:
+    """The records with a stranger of the size asked for, of the same constants in each."""
+    shifts = [
+        STRANGERS[name].shift(trace, bench.capacity_ah, np.random.default_rng(seed)) for trace in traces
+    ]
+    magnitude = bench.spec.target_mv / MILLIVOLTS / _rms(np.concatenate(shifts))
+    truth[f"{name}.magnitude"] = magnitude
+    return [_shifted(trace, magnitude * shift) for trace, shift in zip(traces, shifts, strict=True)]
+
+
+def _shifted(trace: TrueRun, added_v: Array) -> TrueRun:
+    return TrueRun(
+        trace.time_s, trace.current_a, trace.voltage_v + added_v, trace.temperature_degc, trace.soc
+    )
+
+
+def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
     if strange:
         return "unknown", tuple(dict.fromkeys(a for name in strange for a in STRANGERS[name].also))
-    if known:
-        return "+".join(dict.fromkeys(RECIPES[name].label for name in known)), also
-    if full and spec.rate > MODERATE_RATE:
-        return "reaction_nonuniformity", ("electrolyte_transport",)
-    return "none", ("reaction_nonuniformity",) if full else ()
+    if not known:
+        return "none", (REDUCTION,)
+    also = tuple(dict.fromkeys(a for name in known for a in RECIPES[name].also))
+    return "+".join(dict.fromkeys(RECIPES[name].label for name in known)), also
 
 
-def _measured(spec: CaseSpec, written: Written, warmth: Array, rng: np.random.Generator) -> Measurement:
+def _measured(spec: CaseSpec, written: Written, trace: TrueRun, rng: np.random.Generator) -> Measurement:
     instrument = Instrument(spec.voltage_noise_v, spec.current_noise_a)
-    trace = Trace(written.time_s, written.current_a, written.voltage_v, warmth, np.empty(0))
-    return instrument.write(trace, spec.name, rng, spec.temperature)
+    shown = TrueRun(written.time_s, written.current_a, written.voltage_v, trace.temperature_degc, trace.soc)
+    return instrument.write(shown, spec.name, rng, spec.warmth != "none")
 
 
 def _rms(values: Array) -> float:

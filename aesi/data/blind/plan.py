@@ -1,30 +1,45 @@
-"""Which cases there are: every effect at several sizes on both cells, pairs, nothing at all, and strangers."""
+"""Which cases there are. A case is a function of seed and index, and the first N of a seed are a fair small set.
+
+Cases come in blocks of fifteen, shuffled: five that lack nothing, six with one effect, two pairs, a stranger, and a
+triple or another stranger. Within each kind every factor (cell, model, records, spread, temperature, state of charge,
+rows a second, size) runs through all its values before one comes again.
+"""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from functools import cache
+from typing import Any
 
 import numpy as np
 
-from aesi.data.blind.case import CaseSpec
-from aesi.data.blind.duty import duty
+from aesi.data.blind.case import CaseSpec, RecordKind, Warmth
+from aesi.data.blind.cells import CELLS
 from aesi.data.blind.recipes import RECIPES
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.simulator import Model
 
-NMC = "nmc"
-M50 = "lg_m50"
-FILES = {NMC: "nmc_30ah.bpx.json", M50: "lg_m50_chen2020.bpx.json"}
-RATES = {NMC: 1.0, M50: 0.7}
-"""The LG M50 is an energy cell, with higher resistances; its currents stay lower."""
-SOC0 = {NMC: (0.8, 0.95), M50: (0.6, 0.75)}
-"""From higher up, charge pulses take the LG M50 to 4.34 V, beyond its upper voltage."""
-PLATING_SOC0 = (0.65, 0.75)
+FULL = 360
+"""Cases of the full set: 120 lack nothing, 144 have one effect, 48 two, 12 three, 36 are strangers."""
+BLOCK = ("none",) * 5 + ("single",) * 6 + ("pair",) * 2 + ("stranger",)
+LAST_OF_BLOCK = ("triple", "stranger")
+TARGETS_MV = (1.5, 3.0, 6.0, 12.0)
+"""RMS, from just above the noise of 1 mV up."""
+MODELS: tuple[Model, ...] = ("DFN", "SPMe")
+RECORDS: tuple[tuple[RecordKind, ...], ...] = (
+    ("drive",),
+    ("slow", "drive"),
+    ("drive",),
+    ("pulses", "drive"),
+    ("drive",),
+    ("slow", "pulses", "drive"),
+    ("pulses",),
+    ("drive", "drive"),
+)
+WARMTHS: tuple[Warmth, ...] = ("none", "ambient", "none", "course")
+ROWS_S = (1.0, 1.0, 0.1)
+FAST_CHARGE_SOC0 = (0.65, 0.75)
 """Fast charges go on from there without leaving the window of voltage by more than pulses do."""
-TARGETS_MV = (2.0, 4.0, 8.0)
-TOLERANCE = 0.05
-SLOW = ("particle_size_distribution",)
-"""Recipes that take a minute a run: one size on one cell."""
 PAIRS = (
     ("series_resistance", "self_heating"),
     ("ocv_hysteresis", "series_resistance"),
@@ -34,70 +49,104 @@ PAIRS = (
     ("current_sensor_gain", "ocv_hysteresis"),
     ("slow_negative_kinetics", "positive_ocp"),
     ("film_growth", "negative_diffusivity"),
+    ("active_material_loss_negative", "series_resistance"),
+    ("lithium_inventory_loss", "film_growth"),
+    ("colder", "ocv_hysteresis"),
+    ("voltage_lag", "series_resistance"),
+)
+TRIPLES = (
+    ("series_resistance", "ocv_hysteresis", "self_heating"),
+    ("active_material_loss_positive", "series_resistance", "ocv_hysteresis"),
+    ("current_sensor_gain", "series_resistance", "positive_ocp"),
+    ("lithium_inventory_loss", "film_growth", "colder"),
 )
 
 
-def cells_in(folder: Path) -> dict[str, Path]:
-    """The two cells of the plan, from a folder of cell files such as experiments/cells."""
-    return {name: folder / file for name, file in FILES.items()}
+def plan(seed: int = 0, cases: int = FULL) -> tuple[CaseSpec, ...]:
+    """The first cases of a seed."""
+    return _all(seed)[:cases]
 
 
-def plan(seed: int = 0) -> tuple[CaseSpec, ...]:
-    """The full set, over 100 cases, in a fixed order for a seed."""
-    rng = np.random.default_rng(seed)
-    wanted: list[tuple[tuple[str, ...], str, float, Model]] = []
-    for name in RECIPES:
-        if name in SLOW:
-            wanted.append(((name,), NMC, TARGETS_MV[1], "SPMe"))
-            continue
-        wanted += [((name,), NMC, target, "SPMe") for target in TARGETS_MV[:2]]
-        if RECIPES[name].duty is duty:  # fast charges take the LG M50 far beyond its upper voltage
-            wanted.append(((name,), M50, TARGETS_MV[2], "SPMe"))
-    wanted += [(("series_resistance",), NMC, 6.0, "DFN"), (("ocv_hysteresis",), M50, 6.0, "DFN")]
-    wanted += [(pair, cell, 6.0, "SPMe") for pair, cell in zip(PAIRS, (NMC, M50) * 4, strict=True)]
-    wanted += [((name,), cell, 6.0, "SPMe") for name in STRANGERS for cell in (NMC, M50)]
-    wanted += [((), cell, 0.0, "SPMe") for cell in (NMC, M50) for _ in range(4)]
-    wanted += [((), cell, 0.0, "DFN") for cell in (NMC, M50) for _ in range(2)]
-    cases = [_spec(k, *one, rng) for k, one in enumerate(wanted)]
-    fast = len(cases)
-    cases += [_strong(fast + k, cell, rng) for k, cell in enumerate((NMC, M50))]
-    return tuple(cases)
+def case(seed: int, index: int) -> CaseSpec:
+    """One case of a seed."""
+    return _all(seed)[index]
 
 
 def small_plan(seed: int = 0) -> tuple[CaseSpec, ...]:
-    """Six cases that a test can afford: nothing, heat, resistance, hysteresis, a gain, a stranger."""
-    rng = np.random.default_rng(seed)
+    """Six easy cases that a test can afford: nothing, heat, resistance, hysteresis, a gain, a stranger."""
     recipes = ((), ("self_heating",), ("series_resistance",), ("ocv_hysteresis",))
     more = (("current_sensor_gain",), ("breathing",))
-    return tuple(_spec(k, names, NMC, 6.0, "SPMe", rng) for k, names in enumerate((*recipes, *more)))
-
-
-def _spec(
-    number: int, recipes: tuple[str, ...], cell: str, target_mv: float, model: Model, rng: np.random.Generator
-) -> CaseSpec:
-    moderate = model == "DFN"
-    low, high = PLATING_SOC0 if recipes == ("lithium_plating",) else SOC0[cell]
-    return CaseSpec(
-        name=f"b{number:03d}",
-        cell=cell,
-        recipes=recipes,
-        target_mv=target_mv,
-        model=model,
-        rate=RATES[cell] * (0.5 if moderate else float(rng.uniform(0.75, 1.0))),
-        tolerance=TOLERANCE if rng.random() < 0.4 else 0.0,
-        temperature=bool(rng.random() < 0.4),
-        soc0=round(float(rng.uniform(low, high)), 3),
-        seed=int(rng.integers(2**31)),
+    return tuple(
+        CaseSpec(f"b{k:03d}", "nmc", names, 6.0, soc0=0.85, seed=1000 * seed + k)
+        for k, names in enumerate((*recipes, *more))
     )
 
 
-def _strong(number: int, cell: str, rng: np.random.Generator) -> CaseSpec:
-    """A full porous-electrode cell driven hard: its reaction is not uniform, and that shows."""
-    return CaseSpec(
-        name=f"b{number:03d}",
-        cell=cell,
-        model="DFN",
-        rate=1.2 if cell == NMC else 0.9,
-        soc0=min(0.9, SOC0[cell][1]),
-        seed=int(rng.integers(2**31)),
-    )
+@cache
+def _all(seed: int) -> tuple[CaseSpec, ...]:
+    rng = np.random.default_rng([seed, FULL])
+    drawn = {kind: _Draws(kind, rng) for kind in ("none", "single", "pair", "triple", "stranger")}
+    kinds: list[str] = []
+    for block in range(FULL // (len(BLOCK) + 1)):
+        kinds += [str(k) for k in rng.permutation([*BLOCK, LAST_OF_BLOCK[block % 2]])]
+    return tuple(drawn[kind].case(number) for number, kind in enumerate(kinds))
+
+
+class _Draws:
+    """The cases of one kind, one after the other, each factor balanced."""
+
+    def __init__(self, kind: str, rng: np.random.Generator) -> None:
+        contents: dict[str, Sequence[Any]] = {
+            "none": ((),),
+            "single": [(name,) for name in RECIPES],
+            "pair": PAIRS,
+            "triple": TRIPLES,
+            "stranger": [(name,) for name in STRANGERS],
+        }
+        self.rng = rng
+        self.recipes = _balanced(contents[kind], rng)
+        self.cells = _balanced(tuple(CELLS), rng)
+        self.models = _balanced(MODELS, rng)
+        self.records = _balanced(RECORDS, rng)
+        self.spreads = _balanced((True, False), rng)
+        self.warmths = _balanced(WARMTHS, rng)
+        self.given = _balanced((True, False), rng)
+        self.rows_s = _balanced(ROWS_S, rng)
+        self.targets = _balanced(TARGETS_MV, rng)
+
+    def case(self, number: int) -> CaseSpec:
+        """The next case; its name counts all kinds."""
+        names = next(self.recipes)
+        known = [RECIPES[name] for name in names if name in RECIPES]
+        cell, records = next(self.cells), next(self.records)
+        spread, warmth, given = next(self.spreads), next(self.warmths), next(self.given)
+        low, high = CELLS[cell].soc0
+        for recipe in known:
+            if cell not in recipe.cells:
+                cell = recipe.cells[0]
+            if recipe.test != "drive":
+                records = tuple(recipe.test if record == "drive" else record for record in records)
+                low, high = FAST_CHARGE_SOC0
+            warmth = "none" if recipe.warm else warmth
+            given = given or recipe.needs_soc0
+        return CaseSpec(
+            name=f"b{number:03d}",
+            cell=cell,
+            recipes=names,
+            target_mv=next(self.targets) if names else 0.0,
+            model=next(self.models),
+            records=records,
+            rate=round(CELLS[cell].rate * float(self.rng.uniform(0.75, 1.0)), 4),
+            spread=spread,
+            warmth=warmth,
+            soc0=round(float(self.rng.uniform(low, high)), 3),
+            soc0_given=given,
+            dt_s=next(self.rows_s),
+            seed=int(self.rng.integers(2**31)),
+        )
+
+
+def _balanced(values: Sequence[Any], rng: np.random.Generator) -> Iterator[Any]:
+    """Each value once in a random order, then again in another."""
+    while True:
+        yield from (values[k] for k in rng.permutation(len(values)))

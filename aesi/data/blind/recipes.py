@@ -7,17 +7,18 @@ difference of the two runs is what is added to the base run, so that one effect 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.data.blind.duty import duty, fast_charge
+from aesi.data.blind.case import RecordKind
+from aesi.data.blind.cells import CELLS
+from aesi.data.blind.spread import BEYOND, SPREADS
+from aesi.data.laboratory.changes import Values
 from aesi.data.laboratory.simulator import Applied
-from aesi.data.profile import Profile
 from aesi.numerics.typing import Array
-
-Values = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,21 +38,35 @@ def _as_is(written: Written, values: Values) -> Written:
 class Recipe:
     """One effect.
 
-    values : magnitude m and capacity in Ah -> values of the laboratory's change, or of the instrument's fault.
+    values : magnitude m, capacity in Ah and first state of charge -> values of the laboratory's change, or of the
+    instrument's fault.
     change : the laboratory's change, or None where the fault is the instrument's.
-    also : answers that data of this kind cannot tell from it.  most : the largest m that is still physical.
+    also : answers that a lenient judge takes as well.  least, most : magnitudes between which it is an effect: below,
+    a wrong parameter is within what parametrisations of one cell differ by; above, it is not physical.
+    test : what shows it; it takes the place of a drive.  cells : on which it can be made.
+    needs_soc0 : whether an unknown state of charge takes it up.  warm : whether it is about the temperature, which
+    no column then gives away.
     radial_points : of the two runs whose difference counts; their mesh error cancels.
     """
 
     label: str
-    values: Callable[[float, float], dict[str, float]]
+    values: Callable[[float, float, float], dict[str, float]]
     change: str | None = None
     reference: Callable[[], Applied] | None = None
     instrument: Callable[[Written, Values], Written] = _as_is
     also: tuple[str, ...] = ()
+    least: float = 0.02
     most: float = 8.0
-    duty: Callable[[float, float, float, np.random.Generator], Profile] = duty
+    test: RecordKind = "drive"
+    cells: tuple[str, ...] = tuple(CELLS)
+    needs_soc0: bool = False
+    warm: bool = False
     radial_points: int | None = None
+
+
+def _beyond(parameter: str, base: float) -> float:
+    """Magnitude m at which base**-m is outside what parametrisations of one cell differ by."""
+    return BEYOND * SPREADS[parameter] / math.log(base)
 
 
 def _algebraic() -> Applied:
@@ -92,36 +107,49 @@ def _rate(written: Written, values: Values) -> Written:
 
 RECIPES: dict[str, Recipe] = {
     "self_heating": Recipe(
-        "self_heating", lambda m, q: {"cooling_w_m2_k": 10.0 / m}, "self_heating", most=40.0
+        "self_heating",
+        lambda m, q, s: {"cooling_w_m2_k": 10.0 / m},
+        "self_heating",
+        most=40.0,
+        warm=True,
     ),
-    "colder": Recipe("ambient_temperature", lambda m, q: {"shift_k": -3.0 * m}, "ambient_temperature"),
-    "warmer": Recipe("ambient_temperature", lambda m, q: {"shift_k": 4.0 * m}, "ambient_temperature"),
+    "colder": Recipe(
+        "ambient_temperature", lambda m, q, s: {"shift_k": -3.0 * m}, "ambient_temperature", warm=True
+    ),
+    "warmer": Recipe(
+        "ambient_temperature", lambda m, q, s: {"shift_k": 4.0 * m}, "ambient_temperature", warm=True
+    ),
     "series_resistance": Recipe(
         "series_resistance",
-        lambda m, q: {"resistance_ohm": m * 8e-3 / q},
+        lambda m, q, s: {"resistance_ohm": m * 8e-3 / q},
         "series_resistance",
         also=("electrolyte_transport",),
     ),
-    "film_growth": Recipe("film_growth", lambda m, q: {"growth_ohm_ah": m * 0.03 / q**2}, "film_growth"),
+    "film_growth": Recipe("film_growth", lambda m, q, s: {"growth_ohm_ah": m * 0.03 / q**2}, "film_growth"),
     "ocv_hysteresis": Recipe(
-        "ocv_hysteresis", lambda m, q: {"negative_v": 8e-3 * m, "decay": 50.0}, "ocv_hysteresis"
+        "ocv_hysteresis", lambda m, q, s: {"negative_v": 8e-3 * m, "decay": 50.0}, "ocv_hysteresis"
     ),
     "positive_hysteresis": Recipe(
-        "ocv_hysteresis", lambda m, q: {"negative_v": 0.0, "positive_v": 8e-3 * m}, "ocv_hysteresis"
+        "ocv_hysteresis", lambda m, q, s: {"negative_v": 0.0, "positive_v": 8e-3 * m}, "ocv_hysteresis"
     ),
     "positive_ocp": Recipe(
         "ocp_shape",
-        lambda m, q: {"positive_v": 8e-3 * m, "centre_soc": 0.75, "width_soc": 0.12},
+        lambda m, q, s: {"positive_v": 8e-3 * m, "centre_soc": s - 0.12, "width_soc": 0.12},
         "ocp_shape",
     ),
     "negative_ocp": Recipe(
         "ocp_shape",
-        lambda m, q: {"positive_v": 0.0, "negative_v": 8e-3 * m, "centre_soc": 0.8, "width_soc": 0.15},
+        lambda m, q, s: {
+            "positive_v": 0.0,
+            "negative_v": 8e-3 * m,
+            "centre_soc": s - 0.12,
+            "width_soc": 0.15,
+        },
         "ocp_shape",
     ),
     "double_layer": Recipe(
         "double_layer",
-        lambda m, q: {"capacity_f_m2": 2.0 * m},
+        lambda m, q, s: {"capacity_f_m2": 2.0 * m},
         "double_layer",
         _algebraic,
         most=30.0,
@@ -130,27 +158,35 @@ RECIPES: dict[str, Recipe] = {
     ),
     "negative_sloped_diffusivity": Recipe(
         "concentration_dependent_diffusivity",
-        lambda m, q: {"negative_slope": -3.0 * m, "centre_soc": 0.5},
+        lambda m, q, s: {"negative_slope": -3.0 * m, "centre_soc": 0.5},
         "concentration_dependent_diffusivity",
         also=("solid_diffusivity",),
         most=3.0,
     ),
     "positive_sloped_diffusivity": Recipe(
         "concentration_dependent_diffusivity",
-        lambda m, q: {"positive_slope": 5.0 * m, "centre_soc": 0.5},
+        lambda m, q, s: {"positive_slope": 5.0 * m, "centre_soc": 0.5},
         "concentration_dependent_diffusivity",
         also=("solid_diffusivity",),
         most=3.0,
     ),
     "negative_diffusivity": Recipe(
-        "solid_diffusivity", lambda m, q: {"negative_factor": 1.5**-m}, "solid_diffusivity", most=5.0
+        "solid_diffusivity",
+        lambda m, q, s: {"negative_factor": 1.5**-m},
+        "solid_diffusivity",
+        least=_beyond("diffusivity", 1.5),
+        most=5.0,
     ),
     "positive_diffusivity": Recipe(
-        "solid_diffusivity", lambda m, q: {"positive_factor": 1.5**-m}, "solid_diffusivity", most=5.0
+        "solid_diffusivity",
+        lambda m, q, s: {"positive_factor": 1.5**-m},
+        "solid_diffusivity",
+        least=_beyond("diffusivity", 1.5),
+        most=5.0,
     ),
     "particle_size_distribution": Recipe(
         "particle_size_distribution",
-        lambda m, q: {"negative_spread": min(0.3 * m, 0.9), "positive_spread": min(0.3 * m, 0.9)},
+        lambda m, q, s: {"negative_spread": min(0.3 * m, 0.9), "positive_spread": min(0.3 * m, 0.9)},
         "particle_size_distribution",
         _one_size,
         most=3.0,
@@ -159,67 +195,78 @@ RECIPES: dict[str, Recipe] = {
     ),
     "poor_electrolyte": Recipe(
         "electrolyte_transport",
-        lambda m, q: {"conductivity_factor": 1.25**-m, "diffusivity_factor": 1.25**-m},
+        lambda m, q, s: {"conductivity_factor": 1.25**-m, "diffusivity_factor": 1.25**-m},
         "electrolyte_transport",
+        least=_beyond("conductivity", 1.25),
         most=5.0,
     ),
     "slow_negative_kinetics": Recipe(
-        "charge_transfer_kinetics", lambda m, q: {"negative_factor": 1.3**-m}, "charge_transfer_kinetics"
+        "charge_transfer_kinetics",
+        lambda m, q, s: {"negative_factor": 1.3**-m},
+        "charge_transfer_kinetics",
+        least=_beyond("kinetics", 1.3),
     ),
     "slow_positive_kinetics": Recipe(
-        "charge_transfer_kinetics", lambda m, q: {"positive_factor": 1.3**-m}, "charge_transfer_kinetics"
+        "charge_transfer_kinetics",
+        lambda m, q, s: {"positive_factor": 1.3**-m},
+        "charge_transfer_kinetics",
+        least=_beyond("kinetics", 1.3),
     ),
     "asymmetric_kinetics": Recipe(
         "asymmetric_kinetics",
-        lambda m, q: {"negative_alpha": min(0.5 + 0.1 * m, 0.85)},
+        lambda m, q, s: {"negative_alpha": min(0.5 + 0.1 * m, 0.85)},
         "asymmetric_kinetics",
         _algebraic,
         most=3.5,
         radial_points=25,
     ),
     "lithium_inventory_loss": Recipe(
-        "lithium_inventory_loss", lambda m, q: {"negative_stoichiometry": 0.02 * m}, "lithium_inventory_loss"
+        "lithium_inventory_loss",
+        lambda m, q, s: {"negative_stoichiometry": 0.02 * m},
+        "lithium_inventory_loss",
     ),
     "active_material_loss_negative": Recipe(
         "active_material_loss_negative",
-        lambda m, q: {"share": 1 - 0.92**m},
+        lambda m, q, s: {"share": 1 - 0.92**m},
         "active_material_loss_negative",
     ),
     "active_material_loss_positive": Recipe(
         "active_material_loss_positive",
-        lambda m, q: {"share": 1 - 0.95**m},
+        lambda m, q, s: {"share": 1 - 0.95**m},
         "active_material_loss_positive",
     ),
     "leakage_current": Recipe(
         "leakage_current",
-        lambda m, q: {"leak_a": 0.006 * m * q},
+        lambda m, q, s: {"leak_a": 0.006 * m * q},
         "leakage_current",
         also=("current_sensor_offset",),
     ),
     "lithium_plating": Recipe(
         "lithium_plating",
-        lambda m, q: {"rate_m_s": 1e-9 * m},
+        lambda m, q, s: {"rate_m_s": 1e-9 * m},
         "lithium_plating",
         _algebraic,
         most=100.0,
-        duty=fast_charge,
+        test="fast_charge",
+        cells=("nmc",),
         radial_points=25,
     ),
     "current_sensor_gain": Recipe(
-        "current_sensor_gain", lambda m, q: {"gain": 1 + 0.03 * m}, instrument=_gain
+        "current_sensor_gain", lambda m, q, s: {"gain": 1 + 0.03 * m}, instrument=_gain
     ),
     "current_sensor_offset": Recipe(
         "current_sensor_offset",
-        lambda m, q: {"offset_a": 0.006 * m * q},
+        lambda m, q, s: {"offset_a": 0.006 * m * q},
         instrument=_current_offset,
         also=("leakage_current",),
     ),
     "voltage_sensor_offset": Recipe(
         "voltage_sensor_offset",
-        lambda m, q: {"offset_v": 4e-3 * m},
+        lambda m, q, s: {"offset_v": 4e-3 * m},
         instrument=_voltage_offset,
         also=("ocp_shape",),
+        needs_soc0=True,
     ),
-    "voltage_lag": Recipe("clock_skew", lambda m, q: {"lag_s": 0.3 * m}, instrument=_lag, most=10.0),
-    "clock_rate": Recipe("clock_skew", lambda m, q: {"skew": 0.02 * m}, instrument=_rate, most=4.0),
+    "voltage_lag": Recipe("clock_skew", lambda m, q, s: {"lag_s": 0.3 * m}, instrument=_lag, most=10.0),
+    "clock_rate": Recipe("clock_skew", lambda m, q, s: {"skew": 0.02 * m}, instrument=_rate, most=4.0),
 }

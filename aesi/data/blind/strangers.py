@@ -11,21 +11,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.data.laboratory.simulator import Trace
+from aesi.constants import SECONDS_PER_HOUR
+from aesi.data.laboratory.simulator import TrueRun
 from aesi.numerics.typing import Array
-
-SECONDS_PER_HOUR = 3600.0
 
 
 @dataclass(frozen=True)
 class Stranger:
     """shift : trace, capacity in Ah, random generator -> (n,) V added to the voltage at magnitude 1."""
 
-    shift: Callable[[Trace, float, np.random.Generator], Array]
+    shift: Callable[[TrueRun, float, np.random.Generator], Array]
     also: tuple[str, ...] = ()
 
 
-def _throughput(trace: Trace) -> Array:
+def _throughput(trace: TrueRun) -> Array:
     """(n,) Ah through the cell, either way."""
     step = 0.5 * (np.abs(trace.current_a[1:]) + np.abs(trace.current_a[:-1])) * np.diff(trace.time_s)
     return np.concatenate([[0.0], np.cumsum(step)]) / SECONDS_PER_HOUR
@@ -41,14 +40,14 @@ def _lagged(values: Array, time_s: Array, constant_s: float) -> Array:
     return out
 
 
-def _breathing(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+def _breathing(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
     """Waves of the open-circuit voltage along the charge that went through, whichever way it went."""
     wave = rng.uniform(0.06, 0.12) * capacity_ah
     shift: Array = 6e-3 * np.sin(2 * np.pi * _throughput(trace) / wave)
     return shift
 
 
-def _memory(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+def _memory(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
     """Two lags of the current against each other: a first answer that is taken back some minutes later."""
     rate = trace.current_a / capacity_ah
     fast = _lagged(rate, trace.time_s, rng.uniform(40, 80))
@@ -56,20 +55,18 @@ def _memory(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array
     return 0.03 * (slow - fast) * np.sign(slow)
 
 
-def _loose_contact(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+def _loose_contact(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
     """A contact that opens a little at random for tens of seconds."""
-    n = len(trace.time_s)
-    bad = np.zeros(n)
-    start = 0
-    while start < n:
-        start += int(rng.exponential(250)) + 1
-        stop = start + int(rng.exponential(60)) + 5
-        bad[start:stop] = rng.uniform(0.5, 1.5)
-        start = stop
+    bad = np.zeros(len(trace.time_s))
+    now_s = 0.0
+    while now_s < trace.time_s[-1]:
+        opens_s = now_s + rng.exponential(250) + 1.0
+        now_s = opens_s + rng.exponential(60) + 5.0
+        bad[(opens_s <= trace.time_s) & (trace.time_s < now_s)] = rng.uniform(0.5, 1.5)
     return -0.03 * bad * trace.current_a / capacity_ah
 
 
-def _wandering(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+def _wandering(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
     """A reference that wanders with the air of the room, whatever the cell does."""
     period = rng.uniform(900, 2000)
     phase = rng.uniform(0, 2 * np.pi)
@@ -77,14 +74,14 @@ def _wandering(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Ar
     return shift
 
 
-def _uneven_converter(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+def _uneven_converter(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
     """A converter whose steps are not equal: an error that repeats every tens of millivolts."""
     pitch = rng.uniform(0.03, 0.05)
     shift: Array = 6e-3 * np.sin(2 * np.pi * trace.voltage_v / pitch)
     return shift
 
 
-def _fatigue(trace: Trace, capacity_ah: float, rng: np.random.Generator) -> Array:
+def _fatigue(trace: TrueRun, capacity_ah: float, rng: np.random.Generator) -> Array:
     """A resistance that grows in the first seconds of every load and forgets at rest, on discharge only."""
     effort = _lagged(np.maximum(trace.current_a, 0.0) / capacity_ah, trace.time_s, rng.uniform(60, 120))
     shift: Array = -0.05 * effort * np.maximum(trace.current_a, 0.0) / capacity_ah

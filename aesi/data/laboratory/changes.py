@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 Values = Mapping[str, float]
-SECONDS_PER_HOUR = 3600.0
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
-KELVIN = 273.15
 
 
 def _nothing(parameters: Any, values: Values) -> None:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.data.laboratory.simulator import Trace
+from aesi.data.laboratory.simulator import TrueRun
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
@@ -24,7 +24,7 @@ class Instrument:
 
     def write(
         self,
-        trace: Trace,
+        trace: TrueRun,
         name: str,
         rng: np.random.Generator,
         temperature: bool,

@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.cache import key_of, remember
 from aesi.data.laboratory.changes import CONTACT_RESISTANCE, Change, find_change
 from aesi.data.profile import Profile
@@ -27,7 +28,6 @@ Model = Literal["SPMe", "DFN"]
 VERSION = 4
 """Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
 
-SECONDS_PER_HOUR = 3600.0
 EDGE_SHARE = 0.15
 """A change of the current between two rows by this share of its range is an edge."""
 MOST_EDGES = 400
@@ -40,6 +40,10 @@ MESH: dict[Model, dict[str, int]] = {
     "DFN": {"x_n": 20, "x_s": 12, "x_p": 20, "r_n": 40, "r_p": 40, "R_n": 12, "R_p": 12},
 }
 """10 points across move a DFN under SC03 and a 5C pulse by 0.35 mV RMS against 20."""
+SIZES_MESH = {"x_n": 8, "x_s": 5, "x_p": 8, "r_n": 15, "r_p": 15, "R_n": 8, "R_p": 8}
+"""Of a DFN with particles of several sizes, where each point across holds a particle of each size. Against 10, 6 and
+10 points across, 20 along the radius and 10 sizes, it moves the 30 Ah cell with heat, hysteresis and D(x) by 0.05 mV
+RMS under US06 at 10 Hz, in 58 instead of 134 s of processor time."""
 STRETCH = 2.3
 """Of the radial mesh towards the surface. Against 240 even points on the LG M50 under US06, 60 even ones err by
 0.35 mV RMS, 60 of these by 0.006 mV."""
@@ -57,7 +61,7 @@ class Applied:
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class TrueRun:
     """What the cell did, without noise. voltage_v, temperature_degc, soc : (n,)."""
 
     time_s: Array
@@ -81,7 +85,7 @@ class Setup:
         return [(find_change(a.change), find_change(a.change).complete(a.values)) for a in self.applied]
 
 
-def run(setup: Setup, profile: Profile) -> Trace:
+def run(setup: Setup, profile: Profile) -> TrueRun:
     """The trace of a set-up under a profile, from the cache where it is there.
 
     Raises SimulationError where the model stops early or loses charge; DataError for a cell file that cannot
@@ -93,8 +97,10 @@ def run(setup: Setup, profile: Profile) -> Trace:
         content = setup.bpx.read_bytes()
     except OSError as error:
         raise DataError(f"The cell file {setup.bpx} cannot be opened: {error.strerror}.") from None
+    mesh = {"mesh": SIZES_MESH} if _many_sizes(setup) else {}
     key = key_of(
         {
+            **mesh,
             "version": VERSION,
             "pybamm": pybamm.__version__,
             "bpx": content,
@@ -107,7 +113,9 @@ def run(setup: Setup, profile: Profile) -> Trace:
         }
     )
     kept = remember("laboratory", key, lambda: _simulate(setup, profile))
-    return Trace(profile.time_s, profile.current_a, kept["voltage_v"], kept["temperature_degc"], kept["soc"])
+    return TrueRun(
+        profile.time_s, profile.current_a, kept["voltage_v"], kept["temperature_degc"], kept["soc"]
+    )
 
 
 def edges(profile: Profile) -> Array:
@@ -181,6 +189,13 @@ def _simulate(setup: Setup, profile: Profile) -> dict[str, Array]:
     }
 
 
+def _many_sizes(setup: Setup) -> bool:
+    """Whether every point across a DFN holds particles of many sizes."""
+    return setup.model == "DFN" and any(
+        change.options.get("particle size") == "distribution" for change, _ in setup.changes()
+    )
+
+
 def _options(asked: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     options: dict[str, Any] = {}
     for wanted in asked:
@@ -208,7 +223,7 @@ def _solve(setup: Setup, profile: Profile, values: Any, options: dict[str, Any])
             "Discharge capacity [A.h]",
         ],
     )
-    mesh = dict(MESH[setup.model])
+    mesh = dict(SIZES_MESH if _many_sizes(setup) else MESH[setup.model])
     if setup.radial_points:
         mesh.update(r_n=setup.radial_points, r_p=setup.radial_points)
     radial = pybamm.MeshGenerator(pybamm.Exponential1DSubMesh, {"side": "right", "stretch": STRETCH})

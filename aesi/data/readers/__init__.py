@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from aesi.data.readers.table import Table
+from aesi.data.readers.table import TableFile
 from aesi.errors import DataError
 
 GZIP_MAGIC = b"\x1f\x8b"
@@ -14,7 +14,7 @@ CYCLER_SUFFIXES = (".mpt", ".nda", ".ndax")
 MATLAB_MAGIC = (b"MATLAB", b"\x89HDF")
 
 
-def open_table(path: str | Path) -> Table:
+def open_table(path: str | Path) -> TableFile:
     """The reader for a file: cyclers' own by their suffix, all others by their first bytes.
 
     Raises DataError where there is no such file, it is empty, or it is no text table and no Parquet file.

@@ -18,7 +18,7 @@ from aesi.numerics.typing import Array
 
 
 class CyclerTable:
-    """A cycler's own file; see `aesi.data.readers.table.Table`."""
+    """A cycler's own file; see `aesi.data.readers.table.TableFile`."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -12,7 +12,7 @@ from aesi.numerics.typing import Array
 
 
 class ParquetTable:
-    """A Parquet file; see `aesi.data.readers.table.Table`."""
+    """A Parquet file; see `aesi.data.readers.table.TableFile`."""
 
     def __init__(self, path: Path) -> None:
         import pyarrow as pa

@@ -8,7 +8,7 @@ from typing import Protocol
 from aesi.numerics.typing import Array
 
 
-class Table(Protocol):
+class TableFile(Protocol):
     """One table on disk, whatever its format."""
 
     path: Path

@@ -54,7 +54,7 @@ class Layout:
 
 
 class TextTable:
-    """A delimited text file; see `aesi.data.readers.table.Table`."""
+    """A delimited text file; see `aesi.data.readers.table.TableFile`."""
 
     def __init__(self, path: Path, compressed: bool = False) -> None:
         self.path = path

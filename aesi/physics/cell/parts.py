@@ -10,10 +10,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from aesi.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell.relations import Constant, Relation
-from aesi.physics.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
 
 NO_ENTROPY = Constant(0.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"

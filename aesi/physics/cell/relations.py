@@ -47,7 +47,7 @@ class Expression:
 
 
 @dataclass(frozen=True)
-class Table:
+class LookupTable:
     """Straight lines between points; constant beyond the first and the last."""
 
     x: tuple[float, ...]
@@ -115,7 +115,7 @@ class PowerSeries:
         return out
 
 
-Relation = Constant | Expression | Table | PowerSeries | Scaled | Sum | Product
+Relation = Constant | Expression | LookupTable | PowerSeries | Scaled | Sum | Product
 
 
 def scaled(relation: Relation, factor: float) -> Relation:
@@ -144,7 +144,7 @@ def relation(value: object, what: str) -> Relation:
         if isinstance(value, str):
             return Expression(str(value))
         if isinstance(value, dict) and set(value) == {"x", "y"}:
-            return Table(tuple(map(float, value["x"])), tuple(map(float, value["y"])))
+            return LookupTable(tuple(map(float, value["x"])), tuple(map(float, value["y"])))
     except CellError as error:
         raise CellError(f"{what}: {error}") from None
     raise CellError(f"{what} is {type(value).__name__}; give {ADMISSIBLE}.")
@@ -157,7 +157,7 @@ def to_bpx(item: Relation, low: float = 0.0, high: float = 1.0) -> float | str |
             return value
         case Expression(text):
             return text
-        case Table(x, y):
+        case LookupTable(x, y):
             return {"x": list(x), "y": list(y)}
         case _:
             closed = _as_text(item)
@@ -173,7 +173,7 @@ def _as_text(item: Relation) -> str | None:
             return f"{value!r}"
         case Expression(text):
             return f"({text})"
-        case Table():
+        case LookupTable():
             return None
         case PowerSeries(coefficients):
             return "(" + " + ".join(f"({c!r}) * x ** {k}" for k, c in enumerate(coefficients)) + ")"

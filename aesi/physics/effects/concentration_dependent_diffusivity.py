@@ -16,7 +16,7 @@ import numpy as np
 
 from aesi.parameters import Parameter
 from aesi.physics.cell import Electrode
-from aesi.physics.cell.relations import Constant, Product, Table, scaled
+from aesi.physics.cell.relations import Constant, LookupTable, Product, scaled
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
@@ -62,7 +62,7 @@ def _varied(electrode: Electrode, slope: float, curvature: float) -> Electrode:
     s = np.linspace(-BEYOND_LIMITS, 1.0 + BEYOND_LIMITS, POINTS)
     factor = np.exp(slope * (s - 0.5) + curvature * ((2.0 * s - 1.0) ** 2 - 1.0 / 3.0))
     x = electrode.theta_min + s * (electrode.theta_max - electrode.theta_min)
-    table = Table(tuple(x.tolist()), tuple(factor.tolist()))
+    table = LookupTable(tuple(x.tolist()), tuple(factor.tolist()))
     if isinstance(electrode.diffusivity, Constant):
         return replace(electrode, diffusivity=scaled(table, electrode.diffusivity.value))
     return replace(electrode, diffusivity=Product(electrode.diffusivity, table))

@@ -11,8 +11,8 @@ throughput: Smith et al., Appl. Energy 2012, NREL/CP-5400-53817.
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.parameters import Parameter
-from aesi.physics.constants import SECONDS_PER_HOUR
 from aesi.physics.effect import Contribution, Effect, Trace
 from aesi.physics.throughput import throughput_ah
 

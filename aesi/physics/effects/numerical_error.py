@@ -33,6 +33,7 @@ def refine(model: EspmModel, *, refinement: float) -> EspmModel:
         model,
         solid_order=round(model.solid_order * factor),
         electrolyte_order=round(model.electrolyte_order * factor),
+        electrode_points=round(model.electrode_points * factor),
         substep_s=model.substep_s / factor,
     )
 

@@ -21,7 +21,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.parameters import Parameter
 from aesi.physics.cell import Electrode
-from aesi.physics.cell.relations import Sum, Table
+from aesi.physics.cell.relations import LookupTable, Sum
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
@@ -81,7 +81,7 @@ def _corrected(electrode: Electrode, change_v: Array) -> Electrode:
     if not change_v.any():
         return electrode
     x = np.linspace(electrode.theta_min, electrode.theta_max, POINTS)
-    table = Table(tuple(x.tolist()), tuple(change_v.tolist()))
+    table = LookupTable(tuple(x.tolist()), tuple(change_v.tolist()))
     return replace(electrode, ocp=Sum(electrode.ocp, table))
 
 

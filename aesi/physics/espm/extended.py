@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
-from aesi.physics.constants import FARADAY_C_MOL
 from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
     DiffusionTable,

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.numerics.galerkin import StackModes, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.relations import Constant, Relation, Scaled, Sum
-from aesi.physics.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table
 from aesi.physics.model import EspmModel
 from aesi.records import Hold

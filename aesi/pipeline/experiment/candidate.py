@@ -15,7 +15,7 @@ from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import ErrorSeries, Failed
 from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
-from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.search.genome_space import GenomeSpace
 
 CALIBRATION_RESIDUALS = 26_000
 """What a candidate's intervals are calibrated on. Thinned to pieces that each lose their first window, this leaves
@@ -23,7 +23,7 @@ the 20,000 rows from which SPCI needs one fit instead of six: 0.5 instead of 1.8
 
 
 @dataclass(frozen=True, eq=False)
-class Scored:
+class ScoredCandidate:
     """A candidate with the one-step intervals of its AESI I.
 
     coverage_pct, width_v : share of validation samples covered, and mean width in V; None where the residuals
@@ -37,7 +37,7 @@ class Scored:
     seconds: float = 0.0
 
 
-def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> Scored | Failed:
+def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> ScoredCandidate | Failed:
     """Evaluate a genome, calibrate its intervals on honest residuals, and judge them on validation data."""
     started = time.perf_counter()
     outcome = evaluate(problem, genome, weights(config))
@@ -46,7 +46,7 @@ def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> Scored 
     return replace(_with_intervals(outcome, problem, config), seconds=time.perf_counter() - started)
 
 
-def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConfig) -> Scored:
+def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConfig) -> ScoredCandidate:
     calibration, judged = _roles(problem, outcome)
     conformal = config.conformal
     try:
@@ -62,8 +62,8 @@ def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConf
             max_residuals=CALIBRATION_RESIDUALS,
         )
     except AesiError as error:
-        return Scored(outcome, note=str(error))
-    return Scored(outcome, coverage_pct=100.0 * scores.coverage, width_v=scores.mean_width_v)
+        return ScoredCandidate(outcome, note=str(error))
+    return ScoredCandidate(outcome, coverage_pct=100.0 * scores.coverage, width_v=scores.mean_width_v)
 
 
 _Driven = tuple[Array, Array]
@@ -91,7 +91,7 @@ def _residual(candidate: Candidate, record: ErrorSeries) -> _Driven:
     return (record.error_v - candidate.bagging.one_step(record))[1:], record.current_a[1:]
 
 
-def scorer(problem: Problem, config: ExperimentConfig) -> partial[Scored | Failed]:
+def scorer(problem: Problem, config: ExperimentConfig) -> partial[ScoredCandidate | Failed]:
     """`score` with the problem and the experiment given: what a worker process calls with a genome."""
     return partial(score, problem, config)
 

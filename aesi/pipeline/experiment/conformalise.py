@@ -17,7 +17,7 @@ from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.sparse import Candidate, Problem, SparseModel
-from aesi.sparse.fold_models import fold_models, with_leverage
+from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
 
 SEARCHED = ("AESI I", "AESI II")

@@ -20,7 +20,7 @@ from aesi.numerics.metrics import mser, rmse
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.bands import error_ahead, reach
 from aesi.pipeline.experiment.fit import Fitted
-from aesi.pipeline.report.views import Prediction, Trace
+from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
 
 MILLIVOLT_PER_VOLT = 1e3
@@ -28,11 +28,11 @@ HORIZONS_S = (1.0, 10.0, 60.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Evaluation:
+class EvaluatedModels:
     """rows : one a model, as in summary.json.  traces : every record with every model's prediction."""
 
     rows: tuple[dict[str, Any], ...]
-    traces: tuple[Trace, ...]
+    traces: tuple[RecordTrace, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +47,9 @@ class _Judged:
     compared: dict[str, Intervals]
 
 
-def evaluate(fitted: Sequence[Fitted], split: Split) -> Evaluation:
+def evaluate(fitted: Sequence[Fitted], split: Split) -> EvaluatedModels:
     """Figures of every model on train, validation and test records, and the traces that the report draws."""
-    traces: dict[tuple[Role, str], dict[str, Prediction]] = {}
+    traces: dict[tuple[Role, str], dict[str, ModelVoltage]] = {}
     rows, outside = [], {}
     for one in fitted:
         started = time.monotonic()
@@ -62,7 +62,7 @@ def evaluate(fitted: Sequence[Fitted], split: Split) -> Evaluation:
                 traces.setdefault(key, {})[one.model.name] = _prediction(record)
                 if one.terms:
                     outside[key] = record.free.outside
-    return Evaluation(
+    return EvaluatedModels(
         rows=tuple(rows),
         traces=tuple(
             _trace(role, series, traces[role, series.name], outside.get((role, series.name)))
@@ -210,11 +210,11 @@ def _interval_figures(
     }
 
 
-def _prediction(record: _Judged) -> Prediction:
+def _prediction(record: _Judged) -> ModelVoltage:
     model_v = record.series.model_v
     free_v, step_v = model_v + record.free.error_v, model_v + record.one_step
     bands, intervals = record.bands, record.intervals
-    return Prediction(
+    return ModelVoltage(
         free_run_v=free_v,
         free_run_lower_v=None if bands is None else free_v + bands.lower_v,
         free_run_upper_v=None if bands is None else free_v + bands.upper_v,
@@ -225,8 +225,10 @@ def _prediction(record: _Judged) -> Prediction:
     )
 
 
-def _trace(role: Role, series: ErrorSeries, predictions: dict[str, Prediction], outside: Any) -> Trace:
-    return Trace(
+def _trace(
+    role: Role, series: ErrorSeries, predictions: dict[str, ModelVoltage], outside: Any
+) -> RecordTrace:
+    return RecordTrace(
         name=series.name,
         role=role,
         time_s=series.time_s,

@@ -6,6 +6,7 @@ the states that its history gave it.
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,24 +17,25 @@ import numpy as np
 
 from aesi.data import read_measurement
 from aesi.data.resample import to_even
-from aesi.errors import ConfigError, DataError
-from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.data.virtual import DEFAULT_MIX
+from aesi.errors import ConfigError, DataAway, DataError
+from aesi.physics import ActiveEffect, Cell, initial_state, simulate
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.error_series import error_series
-from aesi.pipeline.product.initial_state import rest_soc
 from aesi.records import ROLES, ErrorSeries, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
-    from aesi.data.virtual import Experiment
+    from aesi.data.virtual import VirtualExperiment
 
 
 @dataclass(frozen=True, eq=False)
 class Loaded:
     """What an experiment works on.
 
+    config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
     """
@@ -45,6 +47,14 @@ class Loaded:
     soc0: dict[str, float]
     digests: dict[str, str]
     notes: tuple[str, ...]
+    config: ExperimentConfig
+    fallback: str = ""
+
+    @property
+    def setting(self) -> str:
+        """Hash of what was run and on which data, without the seed: runs that share it differ by chance alone."""
+        data = "".join(f"|{name} {digest}" for name, digest in sorted(self.digests.items()))
+        return hashlib.sha256(f"{self.config.setting}{data}".encode()).hexdigest()[:16]
 
 
 def load(config: ExperimentConfig) -> Loaded:
@@ -63,9 +73,27 @@ def load(config: ExperimentConfig) -> Loaded:
         fallback = config.model_copy(
             update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None}
         )
-        note = f"Fallback: {error} The same job runs on the bundled virtual cell instead."
+        why = (
+            "no copy on this machine and no network"
+            if isinstance(error, DataAway)
+            else str(error).rstrip(".")
+        )
+        reason = (
+            f"The data set {config.data.set} cannot be had ({why}), so this is the same job on {_called(fallback)}; "
+            "it says nothing about the measured cell."
+        )
         loaded = _load(fallback)
-        return replace(loaded, notes=(note, *loaded.notes))
+        return replace(loaded, notes=(reason, *loaded.notes), fallback=reason)
+
+
+def _called(config: ExperimentConfig) -> str:
+    """What the data of an experiment are, as a person says it."""
+    if config.data.kind != "virtual":
+        return str(config.data.set or config.cell.bpx)
+    virtual = config.data.virtual
+    effects = DEFAULT_MIX if virtual.effects is None else virtual.effects
+    mix = ", ".join(effects) or "nothing added"
+    return f"a virtual cell ({virtual.model} of {Path(config.cell.bpx).name} with {mix})"
 
 
 def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
@@ -102,7 +130,9 @@ def _load(config: ExperimentConfig) -> Loaded:
     notes: list[str] = []
     for name, (measurement, known_soc0) in sources.records.items():
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        soc0[name] = rest_soc(cell, measurement) if declared is None else declared
+        start = initial_state(cell, measurement, declared, config.data.hold, effects)
+        soc0[name] = start.soc
+        notes.append(start.sentence)
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         run = simulate(
@@ -119,6 +149,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         soc0=soc0,
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
+        config=config,
     )
 
 
@@ -142,14 +173,14 @@ def _sources(config: ExperimentConfig) -> _Sources:
     return _Sources(records, roles)
 
 
-def virtual_experiment(config: ExperimentConfig, cell: Path) -> Experiment:
+def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
     """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
-    from aesi.data.virtual import DEFAULT_MIX, Laboratory, paper_experiment
+    from aesi.data.virtual import Laboratory, paper_experiment
 
     wanted = config.data.virtual
     effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
     laboratory = Laboratory(cell, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
-    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c)
+    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c, wanted.other_load)
 
 
 def _virtual(config: ExperimentConfig, cell: Path) -> _Sources:

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any
 
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.evaluate import Evaluation
+from aesi.pipeline.experiment.evaluate import EvaluatedModels
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import tables, write_figures, write_run_report
 from aesi.pipeline.report.figures import paper_figures
-from aesi.pipeline.report.views import BootstrapView, RunView, Trace
+from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
@@ -43,7 +43,7 @@ class Result:
     chosen: Candidate
     candidates: Sequence[Mapping[str, Any]]
     fitted: Sequence[Fitted]
-    evaluation: Evaluation
+    evaluation: EvaluatedModels
     run_id: str
     seconds: float
     failed: int = 0
@@ -69,6 +69,8 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "chosen": published(result.best),
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
+        "data": result.loaded.config.data.kind,
+        "fallback": result.loaded.fallback or None,
         "notes": list(notes(result)),
         "models": rows,
     }
@@ -94,7 +96,7 @@ def published(name: str) -> str:
     return name if name == PHYSICS else f"{PHYSICS} + {name}"
 
 
-def _published_trace(trace: Trace) -> Trace:
+def _published_trace(trace: RecordTrace) -> RecordTrace:
     return replace(trace, predictions={published(name): each for name, each in trace.predictions.items()})
 
 
@@ -107,8 +109,8 @@ def hybrid(result: Result) -> HybridModel:
         correction=one.model if isinstance(one.model, SparseModel) else None,
         intervals=one.intervals,
         bands=one.bands,
-        dt_s=result.config.data.dt_s,
-        hold=result.config.data.hold,
+        dt_s=result.loaded.config.data.dt_s,
+        hold=result.loaded.config.data.hold,
         soc0=next(iter(result.loaded.soc0.values()), None),
     )
 
@@ -117,7 +119,6 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
     """What the report shows."""
     counts = result.problem.counts
     genome = result.chosen.genome
-    options = result.problem.options
     return RunView(
         experiment=result.config.name,
         note=result.config.note,
@@ -128,7 +129,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result)),
         bootstrap=BootstrapView(
-            n=counts.shape[1], block=options.block or 0, unique_fraction=(counts > 0).mean(axis=1)
+            n=counts.shape[1], block=result.problem.block, unique_fraction=(counts > 0).mean(axis=1)
         ),
         settings={
             "lambda1": f"{genome.lambda1:.3g}",
@@ -142,6 +143,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
         mlflow_run_id=result.run_id,
         seconds=result.seconds,
+        fallback=result.loaded.fallback,
     )
 
 

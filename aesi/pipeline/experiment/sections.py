@@ -8,7 +8,6 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator, model_valida
 
 from aesi.records import Hold
 
-Range = tuple[float, float]
 Share = Annotated[float, Field(gt=0, lt=1)]
 Positive = Annotated[float, Field(gt=0)]
 Count = Annotated[int, Field(ge=1)]
@@ -44,13 +43,15 @@ class VirtualConfig(Section):
     """How a virtual measurement is made (kind: virtual): the paper's profiles on a cell that has more than the ESPM.
 
     effects : what the cell has beyond its declared parameters; None for the laboratory's default mix.
-    magnitude : 1 is typical.  pulse_c : C-rate of the charge pulse after each schedule.
+    magnitude : 1 is typical.  pulse_c : C-rate of the charge pulse after each training schedule.
+    other_load : times the vehicle's current in the validation and test schedules; 2 takes them to 3.1C.
     """
 
     model: Literal["DFN", "SPMe"] = "DFN"
     effects: tuple[str, ...] | None = None
     magnitude: Positive = 1.0
     pulse_c: Annotated[float, Field(ge=0)] = 5.0
+    other_load: Positive = 2.0
     seed: int = 0
 
 
@@ -109,8 +110,9 @@ class LibraryConfig(Section):
 
     p_c, d : range of the highest polynomial order and of the total degree; their upper ends make the library.
     factors : most variables in a product.  special : with trigonometric and hyperbolic functions.
-    mixed : and their products with first-order terms.  inputs : None takes the paper's; `aesi.sparse.inputs` names
-    those that can be derived, such as I_next, the current that flows while the predicted error arises.
+    mixed : and their products with first-order terms.
+    inputs : None takes the paper's; `aesi.sparse.terms.inputs` names those that can be derived, such as I_next, the
+    current that flows while the predicted error arises.
     """
 
     p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (0, 3)
@@ -160,7 +162,7 @@ class SearchConfig(Section):
 
     @field_validator("lambda1", "lambda2", "tau")
     @classmethod
-    def _ordered(cls, value: Range) -> Range:
+    def _ordered(cls, value: tuple[float, float]) -> tuple[float, float]:
         if not value[0] < value[1]:
             raise ValueError(f"the range [{value[0]:g}, {value[1]:g}] is empty; give low < high")
         return value

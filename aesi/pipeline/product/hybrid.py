@@ -16,10 +16,9 @@ from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
-from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics import ActiveEffect, Cell, initial_state, simulate
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.error_series import error_series
-from aesi.pipeline.product.initial_state import rest_soc
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
@@ -117,7 +116,7 @@ class HybridModel:
         if soc0 is not None:
             return soc0
         if measured:
-            return rest_soc(self.cell, record)
+            return initial_state(self.cell, record, None, self.hold, self.effects).soc
         if self.soc0 is None:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
         return self.soc0

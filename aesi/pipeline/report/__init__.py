@@ -11,9 +11,9 @@ from aesi.pipeline.report.views import (
     DiscoveryTrace,
     DiscoveryView,
     EffectView,
-    Prediction,
+    ModelVoltage,
+    RecordTrace,
     RunView,
-    Trace,
 )
 
 if TYPE_CHECKING:
@@ -31,9 +31,9 @@ __all__ = [
     "DiscoveryTrace",
     "DiscoveryView",
     "EffectView",
-    "Prediction",
+    "ModelVoltage",
+    "RecordTrace",
     "RunView",
-    "Trace",
     "write_discovery_report",
     "write_figures",
     "write_run_report",

@@ -24,7 +24,7 @@ class ErrorMap:
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class BinnedQuartiles:
     """Quartiles of y in bins of x, (n_bins,) each; empty bins are left out."""
 
     x: Array
@@ -49,7 +49,7 @@ def error_map(current_a: Array, soc: Array, error: Array, bins: int = 24) -> Err
     return ErrorMap(_centres(edges_current), _centres(edges_soc), mean, count)
 
 
-def profile(x: Array, y: Array, bins: int = 30) -> Profile:
+def profile(x: Array, y: Array, bins: int = 30) -> BinnedQuartiles:
     """Median and quartiles of `y` in equal bins of `x`; (n,) each; rows that are not finite are left out."""
     x, y = _finite(x, y)
     edges = _edges(x, bins)
@@ -59,7 +59,7 @@ def profile(x: Array, y: Array, bins: int = 30) -> Profile:
     full = [i for i in range(bins) if starts[i + 1] - starts[i] >= LEAST_SAMPLES]
     groups = [y[order[starts[i] : starts[i + 1]]] for i in full]
     low, median, high = (np.array([np.percentile(g, q) for g in groups]) for q in (25, 50, 75))
-    return Profile(_centres(edges)[full], low, median, high)
+    return BinnedQuartiles(_centres(edges)[full], low, median, high)
 
 
 def _finite(*columns: Array) -> tuple[Array, ...]:

@@ -28,7 +28,7 @@ STORED = 200_000
 
 
 @dataclass(eq=False)
-class Store:
+class ArrayStore:
     """Arrays of a page, each once: id -> {dtype, data} with base64 data."""
 
     arrays: dict[str, dict[str, str]] = field(default_factory=dict)
@@ -53,7 +53,7 @@ class Embedded:
     kept: int
 
 
-def embed(fig: Figure, store: Store) -> Embedded:
+def embed(fig: Figure, store: ArrayStore) -> Embedded:
     """Thin the series of `fig` for display and put their samples into `store`."""
     names = [(trace.name, trace.yaxis, _keep(trace)) for trace in fig.data if _keep(trace)]
     limit = max(DISPLAYED // max((names.count(name) for name in names), default=1), 200)

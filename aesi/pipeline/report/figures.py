@@ -12,7 +12,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
 from aesi.pipeline.report.plots import ensemble, maps, records
-from aesi.pipeline.report.views import RunView, Trace
+from aesi.pipeline.report.views import RecordTrace, RunView
 from aesi.records import ROLES
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def predicted_models(view: RunView) -> list[str]:
     return sorted(names, key=lambda name: name != view.chosen)
 
 
-def _joined(traces: tuple[Trace, ...] | list[Trace]) -> tuple[Array, Array, Array]:
+def _joined(traces: tuple[RecordTrace, ...] | list[RecordTrace]) -> tuple[Array, Array, Array]:
     """Current, SOC and error of the physics model over several records."""
     return (
         np.concatenate([t.current_a for t in traces]),

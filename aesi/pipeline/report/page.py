@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.report.embed import Embedded, Store, embed
+from aesi.pipeline.report.embed import ArrayStore, Embedded, embed
 from aesi.pipeline.report.table_formats import ABSENT
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def write_page(path: str | Path, template: str, figures: Mapping[str, Figure], *
         lstrip_blocks=True,
     )
     environment.filters |= FILTERS
-    store = Store()
+    store = ArrayStore()
     embedded = {name: embed(fig, store) for name, fig in figures.items()}
     html = environment.get_template(template).render(
         **context,

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from aesi.constants import SECONDS_PER_HOUR
+
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
@@ -30,7 +32,6 @@ DIVERGING = "PuOr_r"
 SEQUENTIAL = "Cividis"
 
 MILLIVOLT = 1e3
-SECONDS_PER_HOUR = 3600.0
 LONGEST_IN_SECONDS = 20_000.0
 
 

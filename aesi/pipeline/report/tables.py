@@ -23,8 +23,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
 from aesi.pipeline.report.table_formats import ABSENT, Table, to_csv, to_latex, to_markdown
+from aesi.pipeline.report.views import Row
 
-Row = Mapping[str, Any]
 Format = Literal["md", "tex", "csv"]
 
 MILLIVOLT_PER_VOLT = 1e3

@@ -14,13 +14,12 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.records import Role
 
 Row = Mapping[str, Any]
-Part = Literal["fit", "test"]
 
 KIND_ORDER = ("physics", "parameter", "instrument", "placebo")
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction:
+class ModelVoltage:
     """One model's voltage over one record, (n,) V each; None where it was not computed.
 
     free_run_* : no measured voltage after the first sample.  one_step_* : the step before is given.
@@ -36,7 +35,7 @@ class Prediction:
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class RecordTrace:
     """One record: what was measured, what the physics says, and what each model says.
 
     time_s, current_a, soc, measured_v, physics_v : (n,).  outside : (n,) True where an input lies outside the
@@ -50,7 +49,7 @@ class Trace:
     soc: Array
     measured_v: Array
     physics_v: Array
-    predictions: Mapping[str, Prediction] = field(default_factory=dict)
+    predictions: Mapping[str, ModelVoltage] = field(default_factory=dict)
     outside: BoolArray | None = None
 
 
@@ -71,6 +70,7 @@ class RunView:
     candidates : rows with oob, valid, terms and, where known, fitness, number, feasible, front, chosen.
     terms : rows with term and, where known, importance (SVD), bagging, stability, inclusion.
     settings : what the search picked (lambda1, lambda2, tau, ...), as text.
+    fallback : why the run is not on the data that were asked for; empty where it is.
     """
 
     experiment: str
@@ -78,7 +78,7 @@ class RunView:
     cell: str
     chosen: str
     models: tuple[Row, ...]
-    traces: tuple[Trace, ...]
+    traces: tuple[RecordTrace, ...]
     candidates: tuple[Row, ...] = ()
     terms: tuple[Row, ...] = ()
     bootstrap: BootstrapView | None = None
@@ -88,8 +88,9 @@ class RunView:
     mlflow_run_id: str = ""
     seconds: float | None = None
     physics: str = "ESPM"
+    fallback: str = ""
 
-    def of(self, role: Role) -> tuple[Trace, ...]:
+    def of(self, role: Role) -> tuple[RecordTrace, ...]:
         """The records of one role, in order."""
         return tuple(trace for trace in self.traces if trace.role == role)
 
@@ -103,7 +104,7 @@ class DiscoveryTrace:
     """One measured file: (n,) V of the model as declared, with its own parameters refitted, and augmented."""
 
     name: str
-    part: Part
+    part: Literal["fit", "test"]
     time_s: Array
     current_a: Array
     soc: Array
@@ -157,6 +158,6 @@ class DiscoveryView:
     mlflow_run_id: str = ""
     seconds: float | None = None
 
-    def of(self, part: Part) -> tuple[DiscoveryTrace, ...]:
+    def of(self, part: Literal["fit", "test"]) -> tuple[DiscoveryTrace, ...]:
         """The files of one part, in order."""
         return tuple(trace for trace in self.traces if trace.part == part)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
-from aesi.pipeline.report.style import SECONDS_PER_HOUR
 from aesi.pipeline.report.views import DiscoveryView, Row, RunView
 
 SAME_SHARE = 0.98

@@ -7,8 +7,8 @@ from aesi.records import ErrorModel
 from aesi.sparse.baselines.boosting import gradient_boosting
 from aesi.sparse.baselines.ridge import plain_ridge
 from aesi.sparse.baselines.sindy_c import tuned_sindy_c
-from aesi.sparse.genome_space import GenomeSpace
-from aesi.sparse.problem import Problem
+from aesi.sparse.search.genome_space import GenomeSpace
+from aesi.sparse.search.problem import Problem
 
 
 @dataclass(frozen=True)

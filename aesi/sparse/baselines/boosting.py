@@ -17,16 +17,16 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
-from aesi.sparse.inputs import with_inputs
-from aesi.sparse.judge import memory_of
-from aesi.sparse.problem import Problem
-from aesi.sparse.scaling import Scaling
+from aesi.sparse.search.judge import memory_of
+from aesi.sparse.search.problem import Problem
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.scaling import Scaling
 
 _ITERATIONS = 200
 
 
 @dataclass(frozen=True, eq=False)
-class BoostedTrees:
+class BoostedErrorModel:
     """A fitted regressor of the scaled next error on the scaled inputs."""
 
     regressor: Any
@@ -63,7 +63,7 @@ class BoostedTrees:
         return np.asarray(self.regressor.predict(self.scaling.apply(variables)[:-1, 1:]), dtype=float)
 
 
-def gradient_boosting(problem: Problem, seed: int = 0) -> BoostedTrees:
+def gradient_boosting(problem: Problem, seed: int = 0) -> BoostedErrorModel:
     """The best of the grid on the left-out pieces, fitted on all training rows."""
     rows = np.vstack(
         [
@@ -78,7 +78,7 @@ def gradient_boosting(problem: Problem, seed: int = 0) -> BoostedTrees:
         trials.append((float(np.mean(left**2)), leaves, rate, memory_of(problem, given)))
     _, leaves, rate, memory = min(trials)
     regressor = _regressor(leaves, rate, seed).fit(rows, problem.target)
-    return BoostedTrees(regressor, problem.scaling, problem.library.variables[1:], memory)
+    return BoostedErrorModel(regressor, problem.scaling, problem.library.variables[1:], memory)
 
 
 def _left_out(

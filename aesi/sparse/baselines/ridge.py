@@ -11,10 +11,10 @@ import numpy as np
 
 from aesi.errors import FitError
 from aesi.sparse.baselines.single import Single, evaluate_single
-from aesi.sparse.evaluate import FitnessWeights
-from aesi.sparse.genome import Genome
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem
+from aesi.sparse.search.evaluate import FitnessWeights
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
 
 # Sparsity is no aim here.

@@ -19,11 +19,11 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import Failed
 from aesi.sparse.baselines.single import Single, evaluate_single
-from aesi.sparse.evolution import fittest
-from aesi.sparse.genome import Genome
-from aesi.sparse.genome_space import GenomeSpace
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem
+from aesi.sparse.search.evolution import fittest
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.genome_space import GenomeSpace
+from aesi.sparse.search.problem import Problem
 
 NAME = "SINDy-C"
 

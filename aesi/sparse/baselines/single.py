@@ -9,13 +9,13 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.records import Failed
-from aesi.sparse.evaluate import FitnessWeights, fitness, sparse_model
-from aesi.sparse.genome import Genome
-from aesi.sparse.judge import Judged, fold_runs, on_validation
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem
+from aesi.sparse.search.evaluate import FitnessWeights, fitness, sparse_model
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.judge import Judged, fold_runs, on_validation
+from aesi.sparse.search.problem import Problem
 
-Fit = Callable[[Array], Array]
+FactorFit = Callable[[Array], Array]
 """Coefficients (m,) from a factor (any, m + 1) of the problem, see `STRidge.fit_factor`."""
 
 
@@ -30,7 +30,7 @@ class Single:
 
 
 def evaluate_single(
-    problem: Problem, genome: Genome, fit: Fit, name: str, weights: FitnessWeights | None = None
+    problem: Problem, genome: Genome, fit: FactorFit, name: str, weights: FitnessWeights | None = None
 ) -> Single | Failed:
     """Fit all training rows at once, and judge.
 

@@ -44,15 +44,21 @@ def test_tracking_adds_less_than_a_tenth_to_a_candidate_of_the_papers_size():
     assert min(found) < 10, found
 
 
-def judged(spec, cells):
+def judged(spec, cells, limit_s):
     return {
         "case": spec.name,
+        "kind": "none",
         "cell": spec.cell,
         "label": "none",
         "verdict": "none",
         "effects": [],
         "confidence": 0.9,
         "right": True,
+        "exact": True,
+        "grouped": True,
+        "false_name": False,
+        "fitted": False,
+        "processor_s": 1.0,
         "ours_s": 1.0,
     }
 
@@ -64,7 +70,8 @@ def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch):
     assert last["summary"]
     store = Store()
     (parent,) = store.runs(store.find_experiment("blind"), f"tags.`{KIND}` = 'run'")
-    assert parent.data.metrics["none_right_pct"] == 100.0
+    assert parent.data.metrics["none_false_name_pct"] == 0.0
+    assert parent.data.metrics["exact_pct"] == 100.0
     assert set(store.children(parent.info.experiment_id, parent.info.run_id)) == {
         "case:b000",
         "case:b001",
@@ -75,7 +82,7 @@ def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch):
 
 
 @pytest.mark.slow
-def test_blind_cases_spread_over_dask_workers(tracked):
+def test_blind_cases_spread_over_processes(tracked):
     cells = Path(__file__).resolve().parents[3] / "experiments" / "cells"
     *rows, last = benchmarks.run("blind", cells=str(cells), small=True, cases=2, workers=2)
     assert sorted(row["label"] for row in rows) == ["none", "self_heating"]

@@ -15,7 +15,7 @@ from sparse_records import make_record
 from aesi.errors import FitError
 from aesi.records import Failed, Split
 from aesi.sparse import FitnessWeights, Genome, Options, Problem, evaluate
-from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.search.genome_space import GenomeSpace
 from flows.search.nsga2 import Constraints, search
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.numerics.boosting import Growth, bin_edges, binned, fit_boosted
+from aesi.numerics.trees.boosting import Growth, bin_edges, binned, fit_boosted
 
 
 @pytest.mark.parametrize("tau", [0.05, 0.95])

@@ -31,8 +31,10 @@ class Peer:
     current: np.ndarray
     soc0: float = SOC0
 
-    def solve(self, model="SPMe", options=None, update=None, radial=60, through=20, tolerance=1e-7):
-        """PyBaMM's solution on a fine mesh."""
+    def solve(
+        self, model="SPMe", options=None, update=None, radial=60, through=20, tolerance=1e-7, graded=False
+    ):
+        """PyBaMM's solution on a fine mesh; graded : finer towards the surfaces of the particles."""
         import pybamm
 
         with warnings.catch_warnings():
@@ -59,8 +61,17 @@ class Peer:
                 "R_n": 15,
                 "R_p": 15,
             }
+            built = getattr(pybamm.lithium_ion, model)(options or {})
+            grids = dict(built.default_submesh_types)
+            if graded:
+                towards_surface = {"side": "right", "stretch": 2.0}
+                for side in ("negative particle", "positive particle"):
+                    grids[side] = pybamm.MeshGenerator(
+                        pybamm.Exponential1DSubMesh, submesh_params=towards_surface
+                    )
             simulation = pybamm.Simulation(
-                getattr(pybamm.lithium_ion, model)(options or {}),
+                built,
+                submesh_types=grids,
                 parameter_values=values,
                 var_pts=mesh,
                 solver=pybamm.IDAKLUSolver(rtol=tolerance, atol=tolerance),

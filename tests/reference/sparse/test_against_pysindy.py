@@ -6,8 +6,8 @@ import pytest
 from aesi.bench.ensemble import synthetic_record
 from aesi.records import Split
 from aesi.sparse import Library, Options, Problem, STRidge
-from aesi.sparse.inputs import with_inputs
 from aesi.sparse.pysindy_adapter import chebyshev_library, stridge_optimizer
+from aesi.sparse.terms.inputs import with_inputs
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from aesi.bench.blind import is_right
+from aesi.bench.scoring import is_right
 from aesi.data import read_measurement
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE

@@ -6,10 +6,11 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from aesi.data.blind import CaseSpec, cells_in, generate, plan, small_plan
+from aesi.data.blind import CELLS, FULL, CaseSpec, case, cells_in, generate, plan, small_plan
 from aesi.data.blind.recipes import RECIPES, Written
+from aesi.data.blind.spread import DIFFERENCES, SPREADS, parametrisation, published_differences
 from aesi.data.blind.strangers import STRANGERS
-from aesi.data.laboratory.simulator import Trace
+from aesi.data.laboratory.simulator import TrueRun
 from aesi.errors import DataError
 
 LABELS = {
@@ -40,58 +41,113 @@ LABELS = {
 
 @pytest.fixture
 def short_duty(monkeypatch, laboratory_cache):
-    """Duties of a few minutes instead of two hours."""
+    """Drives of a few minutes."""
     from aesi.data.blind import duty
 
     monkeypatch.setattr(duty, "SHORTEST_S", 600.0)
     monkeypatch.setattr(duty, "SCHEDULES", ("us06",))
 
 
-def test_the_plan_covers_both_cells_and_every_effect():
-    cases = plan(0)
-    assert len(cases) >= 100
-    assert len({case.name for case in cases}) == len(cases)
-    assert {RECIPES[name].label for case in cases for name in case.recipes if name in RECIPES} == LABELS
-    assert {name for case in cases for name in case.recipes if name in STRANGERS} == set(STRANGERS)
-    kinds = Counter((case.cell, len(case.recipes)) for case in cases)
-    for cell in ("nmc", "lg_m50"):
-        assert kinds[cell, 0] >= 5
-        assert kinds[cell, 1] >= 25
-        assert kinds[cell, 2] >= 4
-    assert {case.temperature for case in cases} == {True, False}
-    assert {case.model for case in cases} == {"SPMe", "DFN"}
-    assert plan(0) == cases
-    assert plan(1) != cases
+def share(cases, of):
+    return sum(map(of, cases)) / len(cases)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 7])
+def test_the_plan_is_hard_and_covers_all(seed):
+    cases = plan(seed)
+    assert len(cases) == FULL >= 300
+    assert len({one.name for one in cases}) == len(cases)
+    kinds = Counter(one.kind for one in cases)
+    assert kinds["none"] >= 100
+    assert kinds["pair"] >= 40
+    assert kinds["triple"] >= 6
+    assert kinds["stranger"] >= 30
+    singles = [one.recipes[0] for one in cases if one.kind == "single"]
+    assert set(singles) == set(RECIPES)
+    assert {RECIPES[name].label for name in RECIPES} == LABELS
+    assert {name for one in cases for name in one.recipes if name in STRANGERS} == set(STRANGERS)
+    assert min(Counter(one.cell for one in cases).values()) > len(cases) / 5
+    # Halves, to within what recipes that rule a value out take away.
+    assert share(cases, lambda one: one.model == "DFN") == pytest.approx(0.5, abs=0.02)
+    assert share(cases, lambda one: not one.soc0_given) == pytest.approx(0.5, abs=0.05)
+    assert share(cases, lambda one: len(one.records) > 1) == pytest.approx(0.5, abs=0.02)
+    assert share(cases, lambda one: one.spread) == pytest.approx(0.5, abs=0.02)
+    assert share(cases, lambda one: one.warmth != "none") == pytest.approx(0.5, abs=0.06)
+    assert {one.dt_s for one in cases} == {1.0, 0.1}
+    assert plan(seed) == cases
+    assert plan(seed + 1) != cases
+
+
+@pytest.mark.parametrize("first", [15, 30, 60])
+def test_the_first_cases_of_a_seed_are_a_fair_small_set(first):
+    cases = plan(3, first)
+    assert cases == plan(3)[:first]
+    assert case(3, first - 1) == cases[-1]
+    assert Counter(one.kind for one in cases)["none"] == first // 3
+    assert Counter(one.kind for one in cases)["pair"] == 2 * first // 15
+    assert set(CELLS) == {one.cell for one in cases}
+    assert share(cases, lambda one: one.model == "DFN") == pytest.approx(0.5, abs=0.2)
+
+
+def test_a_temperature_that_is_the_answer_is_in_no_column():
+    for one in plan(0):
+        if any(RECIPES[name].warm for name in one.recipes if name in RECIPES):
+            assert one.warmth == "none"
+
+
+def test_wrong_parameters_are_beyond_what_parametrisations_differ_by():
+    slow = RECIPES["negative_diffusivity"]
+    factor = slow.values(slow.least, 30.0, 0.8)["negative_factor"]
+    assert factor == pytest.approx(np.exp(-2.5 * SPREADS["diffusivity"]))
+    draws = [parametrisation(np.random.default_rng(k))[0].values["negative_factor"] for k in range(200)]
+    assert np.std(np.log(draws)) == pytest.approx(SPREADS["diffusivity"], rel=0.15)
+    assert min(draws) > factor
+
+
+def test_the_spreads_are_what_two_published_sets_of_one_cell_differ_by():
+    differences = published_differences()
+    # The closer electrode of each, as the module says.
+    assert abs(differences["Positive diffusivity"]) == pytest.approx(DIFFERENCES["diffusivity"], abs=0.01)
+    assert abs(differences["Positive kinetics"]) == pytest.approx(DIFFERENCES["kinetics"], abs=0.01)
+    assert abs(differences["electrolyte diffusivity"]) == pytest.approx(
+        DIFFERENCES["electrolyte_diffusivity"], abs=0.01
+    )
+    assert abs(differences["electrolyte conductivity"]) == pytest.approx(
+        DIFFERENCES["conductivity"], abs=0.001
+    )
 
 
 def test_the_small_plan_is_small_and_mixed():
     cases = small_plan()
     assert len(cases) == 6
-    assert () in [case.recipes for case in cases]
+    assert () in [one.recipes for one in cases]
 
 
 @pytest.mark.parametrize(
     "recipe", ["series_resistance", "ocv_hysteresis", "current_sensor_gain", "voltage_lag"]
 )
 def test_an_effect_has_the_size_asked_for(short_duty, cells, recipe):
-    spec = CaseSpec("c", "nmc", (recipe,), target_mv=4.0, soc0=0.6, tolerance=0.05, seed=1)
-    case = generate(spec, cells_in(cells))
-    assert case.label == RECIPES[recipe].label
-    assert case.effects == (case.label,)
+    spec = CaseSpec("c", "nmc", (recipe,), target_mv=4.0, soc0=0.6, spread=True, seed=1)
+    made = generate(spec, cells_in(cells))
+    assert made.label == RECIPES[recipe].label
+    assert made.effects == (made.label,)
     # The size is found on a coarse mesh to 20 %.
-    assert case.truth["rms_mv"] == pytest.approx(4.0, rel=0.3)
-    assert case.soc0 == 0.6
-    record = case.measurements[0]
+    assert made.truth["rms_mv"] == pytest.approx(4.0, rel=0.3)
+    assert made.soc0 == 0.6
+    record = made.measurements[0]
     assert np.all(np.diff(record.time_s) == 1.0)
     assert record.temperature_degc is None
 
 
 def test_nothing_is_nothing_and_the_noise_is_what_was_said(short_duty, cells):
-    case = generate(CaseSpec("c", "nmc", soc0=0.6, seed=2, temperature=True), cells_in(cells))
-    assert (case.label, case.effects, case.also) == ("none", (), ())
-    assert case.truth["rms_mv"] == 0.0
-    record = case.measurements[0]
-    assert record.temperature_degc is not None
+    made = generate(CaseSpec("c", "nmc", soc0=0.6, seed=2, warmth="course"), cells_in(cells))
+    assert (made.label, made.effects) == ("none", ())
+    assert made.truth["rms_mv"] == 0.0
+    record = made.measurements[0]
+    # The column is the temperature of the cell: that of the chamber at first, and warmer under load.
+    chamber = 25.0 + made.truth["own.ambient_temperature.shift_k"]
+    assert np.mean(record.temperature_degc[:60]) == pytest.approx(chamber, abs=0.1)
+    assert record.temperature_degc[-60:].mean() > chamber + 0.1
     # The first rest: 121 samples, the deviation of whose deviation is 6 %.
     assert np.std(record.voltage_v[:120]) == pytest.approx(1e-3, rel=0.25)
     assert np.std(record.current_a[:120]) == pytest.approx(4e-3, rel=0.25)
@@ -115,6 +171,26 @@ def test_the_same_specification_gives_the_same_case(short_duty, cells):
     assert first.measurements[0].digest == again.measurements[0].digest
 
 
+def test_several_records_and_an_untold_state_of_charge(short_duty, cells):
+    spec = CaseSpec("c", "nmc", records=("slow", "pulses"), soc0=0.6, soc0_given=False, dt_s=0.1, seed=5)
+    made = generate(spec, cells_in(cells))
+    assert made.soc0 is None
+    slow, pulses = made.measurements
+    assert np.all(np.diff(slow.time_s) == 10.0)
+    assert np.diff(pulses.time_s) == pytest.approx(0.1)
+    # C/5 of 30 Ah down to a tenth.
+    assert np.max(slow.current_a) == pytest.approx(6.0, abs=0.03)
+    assert np.trapezoid(slow.current_a, slow.time_s) / 3600 == pytest.approx(15.0, rel=0.01)
+
+
+def test_an_effect_that_a_cell_cannot_show_is_made_on_one_that_can(short_duty, cells):
+    # Particles of 50 nm: their diffusion is over in a second.
+    spec = CaseSpec("c", "lfp", ("positive_diffusivity",), 4.0, soc0=0.8, seed=1)
+    made = generate(spec, cells_in(cells))
+    assert made.spec.cell != "lfp"
+    assert made.truth["rms_mv"] > 2.0
+
+
 def test_faults_of_the_instrument_by_hand():
     time = np.arange(5.0)
     written = Written(time, 2.0 * np.ones(5), 3.0 + 0.1 * time)
@@ -135,7 +211,7 @@ def test_strangers_are_structured_and_start_at_nothing_they_could_not_know(name,
     time = np.arange(1200.0)
     current = np.where((time // 60) % 3 == 1, 30.0, np.where((time // 60) % 3 == 2, -10.0, 0.0))
     voltage = 3.7 - 2e-3 * current - 1e-4 * time
-    trace = Trace(time, current, voltage, np.full(1200, 25.0), np.full(1200, 0.5))
+    trace = TrueRun(time, current, voltage, np.full(1200, 25.0), np.full(1200, 0.5))
     shift = STRANGERS[name].shift(trace, 30.0, rng)
     assert shift.shape == time.shape
     assert 0.5e-3 < np.sqrt(np.mean(shift**2)) < 0.1
@@ -145,7 +221,7 @@ def test_strangers_are_structured_and_start_at_nothing_they_could_not_know(name,
 
 def test_unknown_names_are_refused(cells):
     with pytest.raises(DataError, match="no cell"):
-        generate(CaseSpec("c", "lfp"), cells_in(cells))
+        generate(CaseSpec("c", "lco"), cells_in(cells))
     with pytest.raises(DataError, match="self_heating"):
         generate(CaseSpec("c", "nmc", ("self_heatin",)), cells_in(cells))
 
@@ -159,10 +235,3 @@ def test_the_generator_does_not_load_the_finder():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
-
-
-def test_an_effect_that_does_not_show_at_its_most_is_driven_harder(short_duty, cells):
-    weak = CaseSpec("c", "nmc", ("negative_diffusivity",), target_mv=4.0, rate=0.5, soc0=0.6, seed=1)
-    strong = CaseSpec("c", "nmc", ("series_resistance",), target_mv=4.0, rate=0.5, soc0=0.6, seed=1)
-    assert generate(weak, cells_in(cells)).spec.rate == 1.25 * weak.rate
-    assert generate(strong, cells_in(cells)).spec.rate == strong.rate

@@ -8,7 +8,7 @@ import pytest
 
 from aesi.data.laboratory.changes import CHANGES, find_change
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Setup, Trace, edges, run
+from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, edges, run
 from aesi.data.profile import Bench, Profile
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
@@ -159,7 +159,7 @@ def test_unknown_changes_and_values_are_refused(nmc, tmp_path):
 
 def test_the_instrument_writes_noise_and_steps(rng):
     n = 20_000
-    trace = Trace(np.arange(n) * 1.0, np.zeros(n), np.full(n, 3.7), np.full(n, 25.0), np.full(n, 0.5))
+    trace = TrueRun(np.arange(n) * 1.0, np.zeros(n), np.full(n, 3.7), np.full(n, 25.0), np.full(n, 0.5))
     record = Instrument(voltage_step_v=1e-3).write(trace, "x", rng, temperature=True)
     # The standard error of a deviation from 20,000 samples is 0.5 %; the steps add (1 mV)^2 / 12.
     assert np.std(record.voltage_v) == pytest.approx(1e-3 * np.sqrt(1 + 1 / 12), rel=0.03)

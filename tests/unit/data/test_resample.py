@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aesi.data.resample import Intervals, decimate, to_even
+from aesi.data.resample import BetweenStamps, decimate, to_even
 from aesi.errors import DataError
 from aesi.records import Measurement
 
@@ -21,7 +21,7 @@ def held_charge(m):
 
 def test_hand_worked_averages():
     # Rows at 0, 1, 3 s hold 0, 2, 5 A over the time before them: 2 C to 1 s, 10 C more to 3 s.
-    intervals = Intervals(np.array([0.0, 1.0, 3.0]), np.array([0.0, 1.5, 3.0]))
+    intervals = BetweenStamps(np.array([0.0, 1.0, 3.0]), np.array([0.0, 1.5, 3.0]))
     np.testing.assert_allclose(intervals.held(np.array([0.0, 2.0, 5.0])), [0.0, 4.5 / 1.5, 7.5 / 1.5])
     # Straight lines 0 -> 2 -> 5 have areas 1 + 0.5 (2 + 2.75) / 2 = 2.1875 and 5.8125.
     np.testing.assert_allclose(intervals.linear(np.array([0.0, 2.0, 5.0])), [0.0, 2.1875 / 1.5, 5.8125 / 1.5])

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aesi.numerics.boosting import Growth, bin_edges, binned, fit_boosted
+from aesi.numerics.trees.boosting import Growth, bin_edges, binned, fit_boosted
 
 
 def boost(x: np.ndarray, y: np.ndarray, tau: float, growth: Growth | None = None):

@@ -7,11 +7,11 @@ from aesi.errors import CellError
 from aesi.physics.cell.relations import (
     Constant,
     Expression,
+    LookupTable,
     PowerSeries,
     Product,
     Scaled,
     Sum,
-    Table,
     relation,
     scaled,
     tabulated,
@@ -19,7 +19,7 @@ from aesi.physics.cell.relations import (
 )
 
 X = np.linspace(0.0, 1.0, 7)
-TABLE = Table((0.0, 0.5, 1.0), (1.0, 3.0, 2.0))
+TABLE = LookupTable((0.0, 0.5, 1.0), (1.0, 3.0, 2.0))
 
 
 def test_a_table_is_straight_between_its_points_and_constant_beyond():

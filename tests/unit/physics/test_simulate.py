@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
-from aesi.physics.constants import SECONDS_PER_HOUR
 from aesi.physics.effects import CATALOGUE
 
 LG_M50 = Cell.from_bpx(

@@ -7,9 +7,9 @@ from aesi.pipeline.report import (
     DiscoveryTrace,
     DiscoveryView,
     EffectView,
-    Prediction,
+    ModelVoltage,
+    RecordTrace,
     RunView,
-    Trace,
 )
 
 
@@ -31,10 +31,12 @@ def trace(name, role, n, rng):
     for model, share in (("ESPM + AESI I", 0.75), ("ESPM + AESI II", 0.6)):
         free = physics + share * error
         one = measured + 4e-4 * rng.standard_normal(n)
-        predictions[model] = Prediction(
+        predictions[model] = ModelVoltage(
             free, free - 0.012, free + 0.012, one, one - 1e-3, one + 1e-3, diverged_at=None
         )
-    return Trace(name, role, time_s, current_a, soc, measured, physics, predictions, np.zeros(n, dtype=bool))
+    return RecordTrace(
+        name, role, time_s, current_a, soc, measured, physics, predictions, np.zeros(n, dtype=bool)
+    )
 
 
 def model_row(name, terms, rmse_mv, mser):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aesi.pipeline.report import write_discovery_report, write_figures, write_run_report
-from aesi.pipeline.report.embed import STORED, Store, embed
+from aesi.pipeline.report.embed import STORED, ArrayStore, embed
 from aesi.pipeline.report.plots import records
 
 
@@ -117,7 +117,7 @@ def test_the_thinned_figure_says_so_and_keeps_every_sample(views, tmp_path):
 
 def test_very_long_records_are_thinned_before_they_are_stored(views):
     trace = views.trace("long", "test", STORED + 50_000, np.random.default_rng(0))
-    store = Store()
+    store = ArrayStore()
     embedded = embed(records.profile_figure([trace], "voltage"), store)
     assert embedded.samples == STORED + 50_000
     assert embedded.kept <= STORED
@@ -125,7 +125,7 @@ def test_very_long_records_are_thinned_before_they_are_stored(views):
 
 
 def test_the_same_array_is_stored_once():
-    store = Store()
+    store = ArrayStore()
     assert store.add(np.arange(5.0)) == store.add(np.arange(5.0))
     assert len(store.arrays) == 1
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from aesi.records import ErrorSeries
-from aesi.sparse.inputs import low_pass
+from aesi.sparse.terms.inputs import low_pass
 
 
 def make_record(

@@ -8,10 +8,10 @@ from aesi.errors import DataError
 from aesi.numerics.metrics import mser
 from aesi.records import Failed, Split
 from aesi.sparse import Candidate, FitnessWeights, Genome, Options, Problem, evaluate, fitness
-from aesi.sparse.fold_models import fold_models
-from aesi.sparse.library import Library, Term
 from aesi.sparse.ranking import svd_ranking, svd_scores
+from aesi.sparse.search.fold_models import fold_models
 from aesi.sparse.stridge import STRidge
+from aesi.sparse.terms.library import Library, Term
 
 
 def whole(problem, lambda1=1e-3, lambda2=1e-3, **others):
@@ -53,8 +53,8 @@ def test_a_model_without_feedback_learns_a_memory(feedback_problem):
 
 def test_free_runs_of_the_search_equal_those_of_the_model(feedback_problem):
     # The fold's fit, run by the vectorised loop over a piece, against the model's own loop.
-    from aesi.sparse.evaluate import sparse_model
-    from aesi.sparse.judge import fold_runs
+    from aesi.sparse.search.evaluate import sparse_model
+    from aesi.sparse.search.judge import fold_runs
 
     problem = feedback_problem
     genome = whole(problem, 1e-3, 1e-3)

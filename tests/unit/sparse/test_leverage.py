@@ -7,8 +7,8 @@ import pytest
 
 from aesi.errors import DataError
 from aesi.sparse import Genome, SparseModel, evaluate
-from aesi.sparse.fold_models import fold_models, with_leverage
 from aesi.sparse.leverage import Leverage
+from aesi.sparse.search.fold_models import fold_models, with_leverage
 
 
 def test_against_a_line_through_points():

@@ -7,8 +7,8 @@ from numpy.polynomial import chebyshev
 from aesi.errors import InputError
 from aesi.records import INPUT_NAMES
 from aesi.sparse import Genome, Library
-from aesi.sparse.basis import FUNCTIONS, MAX_ORDER, clipped_values, slopes, values
-from aesi.sparse.library import evaluate_terms
+from aesi.sparse.terms.basis import FUNCTIONS, MAX_ORDER, clipped_values, slopes, values
+from aesi.sparse.terms.library import evaluate_terms
 
 
 def test_the_whole_library_has_the_terms_it_says():

@@ -7,8 +7,8 @@ from sparse_records import make_record
 from aesi.errors import DataError
 from aesi.records import ErrorSeries
 from aesi.sparse import Library, SparseModel, with_inputs
-from aesi.sparse.library import Term
-from aesi.sparse.scaling import Scaling
+from aesi.sparse.terms.library import Term
+from aesi.sparse.terms.scaling import Scaling
 
 
 def linear(feedback: float, gain: float, memory: float = 0.0, outside: str = "clip") -> SparseModel:

@@ -1,7 +1,7 @@
 import numpy as np
 
 from aesi.sparse import Genome, STRidge
-from aesi.sparse.out_of_bag import comparable, out_of_bag
+from aesi.sparse.search.out_of_bag import comparable, out_of_bag
 
 
 def test_who_is_judged_on_an_easy_piece_alone_does_not_win():

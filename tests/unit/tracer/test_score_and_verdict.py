@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.bench.blind import is_right
+from aesi.bench.scoring import is_right
 from aesi.tracer.explain import explain
 from aesi.tracer.fit import fit_hypothesis
 from aesi.tracer.outcome import rmse_difference

@@ -19,7 +19,7 @@ from aesi.pipeline.report.plots.timeline import (
     stack,
     time_title,
 )
-from aesi.pipeline.report.views import DiscoveryTrace, Trace
+from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
 
 
-def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
+def profile_figure(traces: Sequence[RecordTrace], quantity: str) -> Figure:
     """Current or voltage of every record by role; `quantity` is `current` or `voltage`."""
     fig = stack(1)
     label = {"current": "current, A (discharge > 0)", "voltage": "voltage, V"}[quantity]
@@ -36,7 +36,7 @@ def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
     seen: set[str] = set()
     for item in placed:
         trace = item.trace
-        assert isinstance(trace, Trace)
+        assert isinstance(trace, RecordTrace)
         y = trace.current_a if quantity == "current" else trace.measured_v
         role = ROLE_NAMES[trace.role]
         line(fig, item.x, y, role, colours[trace.role], first=role not in seen)
@@ -48,13 +48,13 @@ def profile_figure(traces: Sequence[Trace], quantity: str) -> Figure:
     return style.framed(fig, f"{quantity.capitalize()} profile", caption, 320, hovermode="x unified")
 
 
-def voltage_figure(traces: Sequence[Trace], chosen: str, physics: str) -> Figure:
+def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> Figure:
     """Measured, physics and hybrid voltage in free run, and the error of both beneath, with its band."""
     fig = stack(2)
     placed, unit = end_to_end(traces)
     for i, item in enumerate(placed):
         trace = item.trace
-        assert isinstance(trace, Trace)
+        assert isinstance(trace, RecordTrace)
         first = i == 0
         line(fig, item.x, trace.physics_v, physics, style.PHYSICS, first=first)
         line(fig, item.x, _error(trace, trace.physics_v), physics, style.PHYSICS, 2, first=False)
@@ -109,7 +109,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
     )
 
 
-def interval_figure(traces: Sequence[Trace], model: str, zoom_s: float | None = None) -> Figure | None:
+def interval_figure(traces: Sequence[RecordTrace], model: str, zoom_s: float | None = None) -> Figure | None:
     """Error, its one-step prediction and interval; with `zoom_s`, the liveliest stretch of that length."""
     usable = [t for t in traces if _has_intervals(t, model)]
     if not usable:
@@ -138,7 +138,7 @@ def interval_figure(traces: Sequence[Trace], model: str, zoom_s: float | None = 
 
 def _add_interval(fig: Figure, item: Placed, model: str, first: bool) -> None:
     trace = item.trace
-    assert isinstance(trace, Trace)
+    assert isinstance(trace, RecordTrace)
     prediction = trace.predictions[model]
     edges = (prediction.one_step_lower_v, prediction.one_step_upper_v)
     low, high, centre = (_estimate(trace, v) for v in (*edges, prediction.one_step_v))
@@ -150,17 +150,17 @@ def _add_interval(fig: Figure, item: Placed, model: str, first: bool) -> None:
     band(fig, item.x, low - centre, high - centre, "interval", style.BLUE, 2, False, edge=1.2)
 
 
-def _error(trace: Trace, model_v: Array) -> Array:
+def _error(trace: RecordTrace, model_v: Array) -> Array:
     return (trace.measured_v - model_v) * style.MILLIVOLT
 
 
-def _estimate(trace: Trace, hybrid_v: Array | None) -> Array:
+def _estimate(trace: RecordTrace, hybrid_v: Array | None) -> Array:
     """The error that a hybrid voltage stands for, mV."""
     assert hybrid_v is not None
     return (hybrid_v - trace.physics_v) * style.MILLIVOLT
 
 
-def _has_intervals(trace: Trace, model: str) -> bool:
+def _has_intervals(trace: RecordTrace, model: str) -> bool:
     prediction = trace.predictions.get(model)
     return prediction is not None and not (
         prediction.one_step_v is None
@@ -169,9 +169,9 @@ def _has_intervals(trace: Trace, model: str) -> bool:
     )
 
 
-def _liveliest(traces: Sequence[Trace], window_s: float) -> Trace:
+def _liveliest(traces: Sequence[RecordTrace], window_s: float) -> RecordTrace:
     """The stretch of `window_s` in which the current travels furthest."""
-    best: tuple[float, Trace, slice] | None = None
+    best: tuple[float, RecordTrace, slice] | None = None
     for trace in traces:
         for window in _windows(trace, window_s):
             travelled = float(np.abs(np.diff(trace.current_a[window])).sum())
@@ -181,7 +181,7 @@ def _liveliest(traces: Sequence[Trace], window_s: float) -> Trace:
     return cut(best[1], best[2])
 
 
-def _windows(trace: Trace, window_s: float) -> Iterator[slice]:
+def _windows(trace: RecordTrace, window_s: float) -> Iterator[slice]:
     """Half-overlapping windows over a record; the whole record where it is shorter."""
     start, last = float(trace.time_s[0]), float(trace.time_s[-1])
     while True:
@@ -192,7 +192,7 @@ def _windows(trace: Trace, window_s: float) -> Iterator[slice]:
             return
 
 
-def cut(trace: Trace, rows: slice) -> Trace:
+def cut(trace: RecordTrace, rows: slice) -> RecordTrace:
     """A piece of a record, predictions included."""
     from dataclasses import fields, replace
 

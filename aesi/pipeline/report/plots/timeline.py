@@ -10,7 +10,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
-from aesi.pipeline.report.views import DiscoveryTrace, Trace
+from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -24,11 +24,11 @@ SHARE_A_LETTER = 0.008
 class Placed:
     """A record and where it starts on the common time axis, in the axis's unit."""
 
-    trace: Trace | DiscoveryTrace
+    trace: RecordTrace | DiscoveryTrace
     x: Array
 
 
-def end_to_end(traces: Sequence[Trace | DiscoveryTrace]) -> tuple[list[Placed], str]:
+def end_to_end(traces: Sequence[RecordTrace | DiscoveryTrace]) -> tuple[list[Placed], str]:
     """Records one after the other on one axis, and that axis's unit."""
     spans = [float(t.time_s[-1] - t.time_s[0]) for t in traces]
     unit, divisor = style.time_unit(sum(spans))

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics import Cell, EspmModel, Record, Trace, simulate
-from aesi.physics.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.effects.particle_size_distribution import lognormal_bins
 from aesi.physics.simulation import model_with

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from aesi.sparse.genome import Genome, pack
-from aesi.sparse.library import Library
+from aesi.sparse.search.genome import Genome, pack
+from aesi.sparse.terms.library import Library
 
 Range = tuple[float, float]
 

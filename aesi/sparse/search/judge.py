@@ -12,7 +12,7 @@ from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries
 from aesi.sparse import free_run
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem, balanced_weights, spans_of
+from aesi.sparse.search.problem import Problem, balanced_weights, spans_of
 
 _MOST_MEMORY = 0.9999
 

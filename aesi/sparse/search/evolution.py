@@ -9,11 +9,11 @@ import numpy as np
 
 from aesi.errors import FitError
 from aesi.records import Failed
-from aesi.sparse.genome import Genome
-from aesi.sparse.genome_space import GenomeSpace
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.genome_space import GenomeSpace
 
 
-class Scored(Protocol):
+class HasFitness(Protocol):
     """What an evaluation gives: its genome, and how fit it is."""
 
     @property
@@ -27,7 +27,7 @@ class Scored(Protocol):
         ...
 
 
-T = TypeVar("T", bound=Scored)
+T = TypeVar("T", bound=HasFitness)
 
 
 def fittest(
@@ -58,7 +58,7 @@ def fittest(
 
 
 def _proposal(
-    space: GenomeSpace, alive: Sequence[Scored], population: int, rng: np.random.Generator
+    space: GenomeSpace, alive: Sequence[HasFitness], population: int, rng: np.random.Generator
 ) -> Genome:
     parents = alive[: population // 2]
     if len(parents) < 2:

@@ -10,11 +10,11 @@ from aesi.numerics.metrics import pearson
 from aesi.numerics.typing import Array, IntArray
 from aesi.records import Failed
 from aesi.sparse.ensemble import Ensemble, best_members, combine
-from aesi.sparse.genome import Genome
-from aesi.sparse.judge import FoldRuns, fold_runs, on_validation
 from aesi.sparse.model import SparseModel
-from aesi.sparse.out_of_bag import out_of_bag
-from aesi.sparse.problem import Problem
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.judge import FoldRuns, fold_runs, on_validation
+from aesi.sparse.search.out_of_bag import out_of_bag
+from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
 
 

@@ -35,10 +35,10 @@ from aesi.numerics.blocks import (
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries, Split
-from aesi.sparse.basis import FUNCTIONS, values
-from aesi.sparse.inputs import with_inputs
-from aesi.sparse.library import Library, evaluate_terms
-from aesi.sparse.scaling import Outside, Scaling
+from aesi.sparse.terms.basis import FUNCTIONS, values
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.library import Library, evaluate_terms
+from aesi.sparse.terms.scaling import Outside, Scaling
 
 Regime = Literal["free_run", "one_step"]
 

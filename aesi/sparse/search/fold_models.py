@@ -15,10 +15,10 @@ from aesi.numerics.blocks import leave_out_weights, pieces
 from aesi.numerics.typing import IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries
-from aesi.sparse.evaluate import Candidate, sparse_model
 from aesi.sparse.leverage import Leverage
 from aesi.sparse.model import SparseModel
-from aesi.sparse.problem import Problem
+from aesi.sparse.search.evaluate import Candidate, sparse_model
+from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
 
 N_PIECES = 12

@@ -24,7 +24,7 @@ import numpy as np
 
 from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.sparse.basis import FUNCTIONS, MAX_ORDER, SPECIAL, slopes, values
+from aesi.sparse.terms.basis import FUNCTIONS, MAX_ORDER, SPECIAL, slopes, values
 
 ERROR = "e"
 """The name of the first variable, the voltage error fed back."""

@@ -17,8 +17,8 @@ import numpy as np
 from numba import njit
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.sparse.judge import drive_of, free_predictions, one_step_predictions
-from aesi.sparse.problem import Problem
+from aesi.sparse.search.judge import drive_of, free_predictions, one_step_predictions
+from aesi.sparse.search.problem import Problem
 
 _ROWS_AT_ONCE = 1024
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from aesi.errors import InputError
 from aesi.numerics.typing import BoolArray
-from aesi.sparse.library import Library
+from aesi.sparse.terms.library import Library
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,1 @@
+"""Ensembles of trees: gradient boosting of quantiles, and forests flattened to arrays."""

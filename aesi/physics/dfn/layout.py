@@ -1,0 +1,161 @@
+"""What the compiled steps know and what they change, by name; numba takes named tuples of arrays as they are.
+
+Units are particles: of one size, at one place. Places are Gauss points, those of the negative electrode first, each
+counted from its collector. Currents of units and places are per area of the cell, positive for delithiation.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from aesi.numerics.typing import Array, IntArray
+
+
+class Particles(NamedTuple):
+    """Constants of the units.
+
+    place, kind : (units,) where, and which row of `rates`.  side : (kinds,) electrode.  scale : (units,)
+    stoichiometry/(A/m2 s) per unit gain.  share, volume : (units,) of its electrode's reaction and material.
+    exchange : (units,) A/m2 at unit salt and occupancy.  rates : (kinds, modes) 1/s.  gains : (modes,).
+    psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
+    """
+
+    place: IntArray
+    kind: IntArray
+    side: IntArray
+    scale: Array
+    share: Array
+    volume: Array
+    exchange: Array
+    rates: Array
+    gains: Array
+    psi: Array
+    strength: Array
+    at: Array
+    project: Array
+
+
+class Stack(NamedTuple):
+    """Constants of the electrolyte.
+
+    rates : (modes,) 1/s.  at : (places, modes) salt at the places, and how the reaction there feeds the modes.
+    to_nodes, project : (nodes, modes) both ways.  psi, strength, top : the variable part of diffusion.  c0 : mol/m3.
+    supply : mol/C, (1 - t+) / F.  kappa : table of conductivity on [0, top].
+    gap_at, gap_path : points in the separator (points, modes), and thickness over transport efficiency (points,) m.
+    path : (2,) the same of the electrodes.
+    """
+
+    rates: Array
+    at: Array
+    to_nodes: Array
+    project: Array
+    psi: Array
+    strength: float
+    top: float
+    c0: float
+    supply: float
+    kappa: Array
+    gap_at: Array
+    gap_path: Array
+    path: Array
+
+
+class Electrodes(NamedTuple):
+    """Constants of both electrodes and of the cell.
+
+    before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.  ocp, entropic : (2, table).
+    alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.  node_share : (places,) weights.
+    plating : rate A/m2 of cell at c0, transfer coefficient, c0.
+    plating_to_c : mol/m3 per C/m2.  energies : (6,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
+    transference : cation transference number.
+    """
+
+    before: Array
+    after: Array
+    solid: Array
+    ocp: Array
+    entropic: Array
+    alpha: Array
+    capacity: Array
+    exchange: Array
+    node_share: Array
+    plating: Array
+    plating_to_c: float
+    energies: Array
+    heat: Array
+    area: float
+    contact: float
+    transference: float
+    reference_k: float
+
+
+class State(NamedTuple):
+    """What a step changes.
+
+    z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y leaves its share of
+    the current.  theta : (units,) surfaces.  force : (units, modes + 1).  q, forcing : (salt modes,).  c : (nodes,)
+    mol/m3.  given : (places,) A/m2.  psi : (places,) V.  salt : (places,) over rest.  layer : (places,) A/m2 into
+    double layers.  plated : (places,) mol/m3.  plating : (places,) A/m2.
+    """
+
+    z: Array
+    mean: Array
+    y: Array
+    trend: Array
+    theta: Array
+    force: Array
+    q: Array
+    forcing: Array
+    c: Array
+    given: Array
+    psi: Array
+    salt: Array
+    layer: Array
+    plated: Array
+    plating: Array
+
+
+class Trial(NamedTuple):
+    """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` is its start.
+
+    reach, give : (units,) surface = reach - give y.  exchange : (units,) A/m2.  force, forcing, q, c, c_predicted,
+    salt, kappa : at the end.  ohm : (places, points of an electrode) ohm m2.  layer_c A/(V m2), layer_old A/m2 :
+    (places,) double layers.  no_give, no_spread : zeros, for an instant.
+    """
+
+    calm_z: Array
+    calm_mean: Array
+    calm_q: Array
+    calm_salt: Array
+    reach: Array
+    give: Array
+    no_give: Array
+    exchange: Array
+    y_start: Array
+    given_start: Array
+    force: Array
+    force_end: Array
+    forcing: Array
+    q: Array
+    c: Array
+    c_predicted: Array
+    salt: Array
+    nodes: Array
+    kappa: Array
+    ohm: Array
+    layer_c: Array
+    layer_old: Array
+    no_spread: Array
+    work: Array
+    rhs: Array
+    z_end: Array
+
+
+class Weights(NamedTuple):
+    """Weights of step lengths in use, by slot: see `transport_kernels.renew`."""
+
+    keys: IntArray
+    particle: Array
+    taken: Array
+    salt: Array
+    spread: Array

@@ -1,0 +1,77 @@
+"""A record through the porous electrode."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.errors import InputError
+from aesi.numerics.typing import Array
+from aesi.physics.dfn.arguments import porous_arguments
+from aesi.physics.dfn.layout import Electrodes, Particles, Stack, State, Trial, Weights
+from aesi.physics.espm.kernels import CACHE_SLOTS
+from aesi.physics.model import EspmModel
+from aesi.records import Hold
+
+VOLTAGE_ROWS = 7
+
+
+def run_porous_electrode(
+    model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
+) -> tuple[Array, dict[str, Array], int, int]:
+    """As `extended.run_extended`: rows (7, n), further states by name, the first fault and what it was.
+
+    Raises InputError for an electrode cut into regions.
+    """
+    from aesi.physics.dfn.kernels import run_porous
+
+    if model.regions != 1:
+        raise InputError(
+            "reaction_nonuniformity is what the porous-electrode model has of itself; leave it out, or use model "
+            "'espm'."
+        )
+    particles, stack, electrodes = porous_arguments(model)
+    out = np.empty((9, len(time)))
+    given = temperature_k is not None
+    kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
+    state, trial, weights = _memory(particles, stack, electrodes)
+    fault_at, fault = run_porous(
+        time, current, kelvin, given, hold == "backward", model.substep_s, model.most_substeps,
+        np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, weights,
+        out, np.zeros((0, 4, stack.at.shape[0])),
+    )  # fmt: skip
+    extra = {"temperature_k": out[7]}
+    if model.negative.plating is not None:
+        extra["plated_mol_m3"] = out[8]
+    return out[:VOLTAGE_ROWS], extra, fault_at, fault
+
+
+def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[State, Trial, Weights]:
+    """State and scratch at rest."""
+    units, modes, kinds = len(p.place), len(p.gains), len(p.side)
+    places, salt_modes = s.at.shape
+    nodes, half = len(s.to_nodes), places // 2
+
+    def of(*shape: int) -> Array:
+        return np.zeros(shape)
+
+    state = State(
+        z=of(units, modes), mean=of(units), y=of(units), trend=of(units), theta=of(units), force=of(units, modes + 1),
+        q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), given=of(places), psi=of(places), salt=of(places),
+        layer=of(places), plated=of(places), plating=of(places),
+    )  # fmt: skip
+    trial = Trial(
+        calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
+        reach=of(units), give=of(units), no_give=of(units), exchange=of(units), y_start=of(units),
+        given_start=of(places), force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes),
+        q=of(salt_modes), c=of(nodes), c_predicted=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
+        kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),
+        no_spread=of(places, places), work=of(places, places), rhs=of(places, 3), z_end=of(modes),
+    )  # fmt: skip
+    weights = Weights(
+        keys=np.full(CACHE_SLOTS, -1, dtype=np.int64),
+        particle=of(CACHE_SLOTS, kinds, 3, modes),
+        taken=of(CACHE_SLOTS, kinds),
+        salt=of(CACHE_SLOTS, 3, salt_modes),
+        spread=of(CACHE_SLOTS, places, places),
+    )
+    return state, trial, weights

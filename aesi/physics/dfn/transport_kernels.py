@@ -1,0 +1,129 @@
+"""Compiled transport: what particles and salt come to at a step's end, as linear functions of the reaction there.
+
+A reaction that runs straight from y0 at the start of a step to y1 at its end moves each mode exactly:
+
+    z1 = E z0 - gain (a y0 + b y1) - rate (a f0 + b f1)
+
+with E, a, b of `kernels.step_weights` and f the part of diffusion that the constant diffusivity leaves out. `calm` is
+this without y1.
+"""
+
+from numba import njit
+
+from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def renew(p, s, faster, dt, w, taken, w_salt, spread):  # type: ignore[no-untyped-def]
+    """Weights of one step length and of factors `faster` (3,) of diffusion (negative, positive, salt).
+
+    Out: w (kinds, 3, modes), w_salt (3, modes).  taken (kinds,) s, what a unit of y1 takes off a surface, over `scale`.
+    spread (places, places) m2/A, what a unit of reaction at v adds to the salt over rest at r.
+    """
+    for k in range(p.rates.shape[0]):
+        taken[k] = 1.5 * dt  # of the mean: three times half a step
+        for j in range(p.rates.shape[1]):
+            w[k, 0, j], w[k, 1, j], w[k, 2, j] = step_weights(p.rates[k, j] * faster[p.side[k]], dt)
+            taken[k] += p.gains[j] * w[k, 2, j]
+    for j in range(s.rates.shape[0]):
+        w_salt[0, j], w_salt[1, j], w_salt[2, j] = step_weights(s.rates[j] * faster[2], dt)
+    for r in range(s.at.shape[0]):
+        for v in range(r + 1):
+            total = 0.0
+            for j in range(s.at.shape[1]):
+                total += s.at[r, j] * w_salt[2, j] * s.at[v, j]
+            spread[r, v] = spread[v, r] = s.supply * total / s.c0
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def calm_particles(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
+    """Modes, means and surfaces of all particles without what the reaction at the end of the step does."""
+    for u in range(p.place.shape[0]):
+        k = p.kind[u]
+        side = p.side[k]
+        strength = p.strength[side] * faster[side]
+        t.calm_mean[u] = state.mean[u] - 1.5 * p.scale[u] * dt * t.y_start[u]
+        surface = t.calm_mean[u]
+        for j in range(p.gains.shape[0]):
+            value = w[k, 0, j] * state.z[u, j] - p.scale[u] * p.gains[j] * w[k, 1, j] * t.y_start[u]
+            if strength > 0.0:
+                value -= strength * p.rates[k, j] * (
+                    w[k, 1, j] * state.force[u, j + 1] + w[k, 2, j] * t.force[u, j + 1]
+                )  # fmt: skip
+            t.calm_z[u, j] = value
+            surface += value
+        t.reach[u] = surface
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def end_particle(p, t, u, y, dt, w, z):  # type: ignore[no-untyped-def]
+    """Modes z (modes,) of one particle with a reaction y at the end of the step; returns its mean."""
+    k = p.kind[u]
+    for j in range(p.gains.shape[0]):
+        z[j] = t.calm_z[u, j] - p.scale[u] * p.gains[j] * w[k, 2, j] * y
+    return t.calm_mean[u] - 1.5 * p.scale[u] * dt * y
+
+
+@njit(cache=True, nogil=True, fastmath=FASTMATH)
+def calm_salt(s, state, t, faster, w):  # type: ignore[no-untyped-def]
+    """Modes, and salt over rest at the places, without what the reaction at the end of the step does."""
+    strength = s.strength * faster
+    for j in range(s.rates.shape[0]):
+        source = 0.0
+        for v in range(s.at.shape[0]):
+            source += s.at[v, j] * t.given_start[v]
+        value = w[0, j] * state.q[j] + w[1, j] * s.supply * source
+        if strength > 0.0:
+            value -= strength * s.rates[j] * (w[1, j] * state.forcing[j] + w[2, j] * t.forcing[j])
+        t.calm_q[j] = value
+    salt_at_places(s, t.calm_q, t.calm_salt)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def end_salt(s, t, given, w, q, c):  # type: ignore[no-untyped-def]
+    """Modes q and concentrations c (mol/m3, at the nodes) with a reaction `given` at the end of the step."""
+    for j in range(q.shape[0]):
+        source = 0.0
+        for v in range(s.at.shape[0]):
+            source += s.at[v, j] * given[v]
+        q[j] = t.calm_q[j] + w[2, j] * s.supply * source
+    for i in range(c.shape[0]):
+        c[i] = s.c0
+        for j in range(q.shape[0]):
+            c[i] += s.to_nodes[i, j] * q[j]
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def salt_at_places(s, q, salt):  # type: ignore[no-untyped-def]
+    """salt (places,) over rest."""
+    for r in range(s.at.shape[0]):
+        value = 0.0
+        for j in range(q.shape[0]):
+            value += s.at[r, j] * q[j]
+        salt[r] = 1.0 + value / s.c0
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def salt_forcing(s, c, forcing):  # type: ignore[no-untyped-def]
+    """forcing[j] : mode j of the integral psi of the diffusivity's variable part, at concentrations c of the nodes."""
+    forcing[:] = 0.0
+    for i in range(c.shape[0]):
+        value = lookup(s.psi, c[i] / s.top)
+        for j in range(forcing.shape[0]):
+            forcing[j] += s.project[i, j] * value
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def drops(kappa, path, before, after, solid, ohm):  # type: ignore[no-untyped-def]
+    """ohm[r, v] (ohm m2) of one electrode: drop from collector to place r and on to the separator, per current at v.
+
+    kappa : (n,) S/m at the places.  path : thickness over transport efficiency, m.  solid : ohm m2.
+    """
+    n = kappa.shape[0]
+    for r in range(n):
+        for v in range(n):
+            ohm[r, v] = solid[r, v]
+        for m in range(n):
+            part = path * after[r, m] / kappa[m]
+            for v in range(n):
+                ohm[r, v] += part * before[m, v]

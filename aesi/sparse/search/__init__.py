@@ -1,0 +1,1 @@
+"""Candidates of the search: what one is made of, what all share, how one is fitted and judged."""

@@ -1,0 +1,1 @@
+"""The library of candidate terms: functions of scaled inputs, and their products."""

@@ -1,0 +1,107 @@
+"""Benchmarks that judge case by case: spread over processes or Dask workers, each case a nested run."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from hashlib import sha256
+from typing import Any
+
+from aesi.pipeline.experiment.sections import TrackingConfig
+
+CaseRow = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Cases:
+    """What is judged and how.
+
+    name : of the experiment in the tracking store.  judge : a specification -> its row, a function that a process
+    elsewhere can import (or a partial of one).  summary : rows -> the last line.
+    shown : keys of a row that are parameters of its run; other numbers are metrics.
+    """
+
+    name: str
+    seed: int
+    specs: Sequence[Any]
+    judge: Callable[[Any], CaseRow]
+    summary: Callable[[list[CaseRow]], CaseRow]
+    shown: tuple[str, ...]
+
+
+def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Iterator[CaseRow]:
+    """One row a case as it is judged, and a last one with `summary`: true.
+
+    workers : processes on this machine.  address : of a Dask scheduler, whose workers see the same files.
+    """
+    from flows.base import environment
+    from flows.base.console import Console
+    from flows.tracking.store import Store
+    from flows.tracking.tracker import Subject, Tracker
+
+    environment.prepare()
+    digest = sha256(repr(cases.specs).encode()).hexdigest()[:16]
+    quiet = TrackingConfig(system_metrics=False, log_model=False)
+    tracker = Tracker(Store(), Subject(cases.name, cases.seed, digest, quiet), Console().say)
+    tracker.parameters({"seed": cases.seed, "cases": len(cases.specs)})
+    rows = []
+    try:
+        for row in _judged(cases, workers, address):
+            rows.append(row)
+            _track(tracker, row, cases.shown)
+            yield row
+        rows.sort(key=lambda row: str(row["case"]))
+        last = {"seed": cases.seed, **cases.summary(rows)}
+        tracker.metrics({k: v for k, v in last.items() if isinstance(v, float)})
+        tracker.json("confusion.json", last["confusion"])
+        tracker.json("summary.json", last)
+    except BaseException:
+        tracker.end("FAILED", wait_s=5)
+        raise
+    tracker.end("FINISHED")
+    yield last
+
+
+def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
+    if address is not None:
+        yield from _on_dask(cases, address)
+    elif workers == 1:
+        yield from map(cases.judge, cases.specs)
+    else:
+        yield from _in_processes(cases, workers)
+
+
+def _in_processes(cases: Cases, workers: int) -> Iterator[CaseRow]:
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        futures = [pool.submit(cases.judge, spec) for spec in cases.specs]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _on_dask(cases: Cases, address: str) -> Iterator[CaseRow]:
+    from distributed import as_completed
+
+    from flows.evaluation.dask_pool import connect
+
+    client, cluster = connect(address, 1)
+    try:
+        futures = client.map(cases.judge, list(cases.specs), pure=False)
+        for future in as_completed(futures, loop=client.loop):
+            yield future.result()
+    finally:
+        client.close(timeout=5)
+        if cluster is not None:
+            cluster.close(timeout=10)
+
+
+def _track(tracker: Any, row: CaseRow, shown: tuple[str, ...]) -> None:
+    parameters = {k: v if isinstance(v, str) else json.dumps(v) for k, v in row.items() if k in shown}
+    metrics = {k: float(v) for k, v in row.items() if isinstance(v, bool | float) and k not in shown}
+    tracker.nested(f"case:{row['case']}", row["case"], "case", parameters, metrics, seconds=row["ours_s"])

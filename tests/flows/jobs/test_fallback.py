@@ -1,0 +1,79 @@
+"""A run whose data cannot be had runs on the virtual cell, and says so everywhere."""
+
+import json
+
+import pytest
+import yaml
+
+from aesi.errors import DataAway
+from aesi.pipeline.product.hybrid import HybridModel
+from flows.results.tables import tables_of
+from flows.tracking.store import KIND, Store
+
+SMALL = {
+    "library": {"p_c": [0, 1], "d": [1, 2]},
+    "search": {"candidates": 4, "population": 2, "resamples": 5, "pearson_train": 0.0, "pearson_valid": 0.0},
+    "conformal": {"window": 50, "compare": []},
+    "models": ["ESPM", "AESI I"],
+    "tracking": {"log_model": False, "system_metrics": False},
+}
+
+
+@pytest.fixture
+def experiment(tracked, monkeypatch, cell):
+    """An experiment on a measured cell that is not here, held backward, with a virtual cell to fall back to."""
+
+    def away(name, file):
+        raise DataAway(
+            f"{file} cannot be fetched from https://example.org (ConnectionError): connect, or set it."
+        )
+
+    monkeypatch.setattr("aesi.data.catalogue.locate", away)
+    virtual = {"kind": "virtual", "dt_s": 2.0, "hold": "linear", "virtual": {"model": "SPMe"}}
+    measured = {
+        "kind": "catalogue",
+        "set": "about_energy_nmc",
+        "record": "drive_cycle",
+        "repeats": {"period_s": 1800, "train": [1, 3, 5], "test": [2, 4]},
+    }
+    content = {"name": "small", "data": measured, "fallback": {"data": virtual, "cell": {"bpx": str(cell)}}}
+    path = tracked / "small.yaml"
+    path.write_text(yaml.safe_dump(content | SMALL))
+    return path
+
+
+def test_a_run_that_fell_back_was_tracked_as_the_measured_one(experiment, capsys):
+    from flows.jobs.start import start
+
+    folder = start(experiment, use_prefect=False)
+    said = capsys.readouterr().err
+    summary = json.loads((folder / "summary.json").read_text())
+    (note,) = [note for note in summary["notes"] if "cannot be had" in note]
+    assert "about_energy_nmc cannot be had (no copy on this machine and no network)" in note
+    assert "a virtual cell (SPMe of nmc_30ah.bpx.json with ocv_hysteresis, series_resistance)" in note
+    assert said.count("cannot be had") == 1
+    assert "ConnectionError" not in said
+    assert summary["data"] == "virtual"
+    assert '<p class="banner"' in (folder / "report.html").read_text()
+    assert HybridModel.load(folder / "model").hold == "linear"
+    store = Store()
+    (run,) = store.runs(store.find_experiment("small"), f"tags.`{KIND}` = 'run'")
+    assert run.data.params["data.kind"] == "virtual"
+    assert run.data.tags["aesi.fallback"] == note
+    assert "cannot be had" in tables_of("small")
+
+
+def test_the_setting_of_a_fallback_and_of_another_measurement_are_others(experiment, tmp_path):
+    from dataclasses import replace
+
+    from aesi.pipeline.experiment.config import read_experiment
+    from aesi.pipeline.experiment.load import load
+
+    config = read_experiment(experiment)
+    loaded = load(config)
+    assert loaded.config.data.kind == "virtual"
+    names = list(loaded.digests)
+    other = replace(loaded, digests={**loaded.digests, names[0]: "0123"})
+    assert len({loaded.setting, other.setting, config.setting}) == 3
+    again = load(read_experiment(experiment, ["seed=7"]))
+    assert again.setting == loaded.setting

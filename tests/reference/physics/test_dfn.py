@@ -1,0 +1,108 @@
+"""The porous electrode against PyBaMM's DFN on fine meshes, and its own convergence.
+
+Tolerances: PyBaMM itself, from 40 to 80 points across and from 40 to 60 in a particle, moves by 0.03 to 0.15 mV RMS on
+these loads; ours moves by less than 0.01 mV from 5 to 10 points.
+"""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.errors import InputError
+from aesi.physics import Cell, EspmModel, simulate
+from aesi.physics.dfn.run import run_porous_electrode
+
+from .conftest import Peer, read
+
+WANTED_MV, WANTED_LARGEST_MV = 0.5, 5.0  # what the project promises
+REACHED_MV = (
+    0.25  # anything above this is a step back: 0.03 to 0.2 mV were measured, most of it PyBaMM's mesh
+)
+DOUBLING_MV = 0.2
+LITHIUM = 1e-9
+THROUGH, RADIAL = 40, 60
+
+
+def rmse_mv(a, b):
+    return float(np.sqrt(np.mean((a - b) ** 2))) * 1e3
+
+
+def pulses(capacity_ah, rate, seconds=500):
+    """Rest, discharge and charge pulses with 0.1 s edges, 60 s each."""
+    time = np.unique(np.concatenate([np.arange(0.0, seconds), np.arange(60.0, seconds, 60.0) + 0.1]))
+    level = np.array([0.0, 1.0, 0.0, -0.6, 0.3, 1.0, 0.0, 0.5, 0.0])[((time - 0.05) // 60.0).astype(int)]
+    return time, rate * capacity_ah * level
+
+
+def loads(content, temperature_degc, rate):
+    """A drive of the peer's cell to `rate` and pulses, at a temperature that both models are given."""
+    cell = Cell.from_bpx(content)
+    kelvin = temperature_degc + 273.15
+    cell = replace(cell, initial_temperature_k=kelvin, ambient_temperature_k=kelvin)
+    return cell, *pulses(cell.nominal_capacity_ah, rate)
+
+
+@pytest.fixture(scope="module")
+def nmc_pouch(shared_data):
+    return json.loads((shared_data / "measured" / "about_energy_nmc" / "cell.bpx.json").read_text())
+
+
+def agree(peer, effects=(), **options):
+    ours = simulate(
+        peer.cell, peer.time, peer.current, soc0=peer.soc0, effects=effects, model="dfn"
+    ).voltage_v
+    theirs = peer.voltage(model="DFN", through=THROUGH, radial=RADIAL, graded=True, **options)
+    error = rmse_mv(ours, theirs)
+    assert error < WANTED_MV
+    assert np.abs(ours - theirs).max() * 1e3 < WANTED_LARGEST_MV
+    return error
+
+
+def test_a_drive_to_3c(peer):
+    assert agree(peer) < REACHED_MV
+
+
+@pytest.mark.parametrize("temperature_degc", [25.0, 0.0])
+def test_pulses_of_the_published_pouch_cell(nmc_pouch, temperature_degc):
+    cell, time, current = loads(nmc_pouch, temperature_degc, 3.0)
+    assert agree(Peer(cell.to_bpx(), cell, time, current)) < REACHED_MV
+
+
+def test_pulses_of_the_lg_m50_to_2c():
+    cell, time, current = loads(read("lg_m50_chen2020"), 25.0, 2.0)
+    assert agree(Peer(cell.to_bpx(), cell, time, current)) < WANTED_MV
+
+
+def test_it_says_something_else_than_the_single_particle(peer):
+    voltages = [
+        simulate(peer.cell, peer.time, peer.current, peer.soc0, model=m).voltage_v for m in ("espm", "dfn")
+    ]
+    assert rmse_mv(*voltages) > WANTED_MV / 2
+
+
+def test_twice_the_points_and_modes_change_nothing_that_matters(peer):
+    model = EspmModel(peer.cell)
+    finer = replace(
+        model,
+        solid_order=2 * model.solid_order,
+        electrode_points=2 * model.electrode_points,
+        substep_s=0.5 * model.substep_s,
+    )
+    rows, twice = (
+        run_porous_electrode(m, peer.time, peer.current, None, peer.soc0, "linear")[0] for m in (model, finer)
+    )
+    assert np.abs(rows[0] - twice[0]).max() * 1e3 < DOUBLING_MV
+
+
+def test_lithium_is_kept(peer):
+    run = simulate(peer.cell, peer.time, peer.current, peer.soc0, model="dfn")
+    passed = np.trapezoid(peer.current, peer.time) / 3600.0
+    lost = (run.series["soc"][0] - run.series["soc"][-1]) * peer.cell.capacity_ah
+    assert lost == pytest.approx(passed, rel=LITHIUM)
+
+
+def test_no_other_model_is_there(peer):
+    with pytest.raises(InputError, match="'espm'"):
+        simulate(peer.cell, peer.time, peer.current, peer.soc0, model="p2d")

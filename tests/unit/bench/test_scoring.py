@@ -1,0 +1,103 @@
+"""Judging an answer by hand-worked cases, rates with their intervals, and the limit on processor time."""
+
+import time
+
+import pytest
+
+from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.bench.scoring import calibration, judge, proportion, rate
+
+
+def answer(verdict, *effects, groups=()):
+    return {"verdict": verdict, "effects": list(effects), "indistinguishable": [list(g) for g in groups]}
+
+
+def test_the_exact_name():
+    given = judge("self_heating", (), (), answer("found", "self_heating"))
+    assert given.exact
+    assert given.grouped
+    assert given.lenient
+    assert (given.named, given.false_names) == (1.0, ())
+
+
+def test_a_member_of_a_small_group_is_grouped_and_not_exact():
+    said = answer(
+        "found", "electrolyte_transport", groups=[("electrolyte_transport", "series_resistance", "a")]
+    )
+    given = judge("series_resistance", (), (), said)
+    assert (given.exact, given.grouped, given.false_names) == (False, True, ())
+    large = answer(
+        "found", "electrolyte_transport", groups=[("electrolyte_transport", "series_resistance", "a", "b")]
+    )
+    given = judge("series_resistance", (), (), large)
+    assert (given.grouped, given.false_names) == (False, ("electrolyte_transport",))
+
+
+def test_listed_alternatives_count_for_the_lenient_judge_alone():
+    given = judge(
+        "series_resistance", ("electrolyte_transport",), (), answer("found", "electrolyte_transport")
+    )
+    assert (given.exact, given.grouped, given.lenient) == (False, False, True)
+    assert given.false_names == ("electrolyte_transport",)
+
+
+def test_twins_are_exact_where_the_group_says_so():
+    pair = [("leakage_current", "current_sensor_offset")]
+    assert judge("leakage_current", (), (), answer("found", "current_sensor_offset", groups=pair)).exact
+    assert not judge("leakage_current", (), (), answer("found", "current_sensor_offset")).exact
+
+
+@pytest.mark.parametrize("label", ["none", "unknown"])
+def test_a_name_beside_unknown_is_a_false_name(label):
+    given = judge(label, (), (), answer("unknown", "ocp_shape"))
+    assert given.false_names == ("ocp_shape",)
+    assert not given.exact
+    silent = judge(label, (), (), answer("unknown"))
+    assert silent.false_names == ()
+    assert silent.exact == (label == "unknown")
+
+
+def test_the_reduction_is_neutral_where_the_truth_is_a_porous_electrode():
+    said = answer("found", "reaction_nonuniformity")
+    assert judge("none", (), ("reaction_nonuniformity",), said).exact
+    assert judge("none", (), (), said).false_names == ("reaction_nonuniformity",)
+    both = answer("found", "ocv_hysteresis", "reaction_nonuniformity")
+    assert judge("ocv_hysteresis", (), ("reaction_nonuniformity",), both).exact
+
+
+def test_half_a_pair_is_half_named():
+    given = judge("ocv_hysteresis+series_resistance", (), (), answer("found", "series_resistance"))
+    assert (given.exact, given.grouped, given.named) == (False, False, 0.5)
+
+
+def test_intervals_are_those_of_clopper_and_pearson():
+    # Their closed form at 0 of n: 1 - (0.025)**(1/n).
+    found = proportion(0, 100)
+    assert found.interval_pct == (0.0, pytest.approx(100 * (1 - 0.025 ** (1 / 100)), abs=0.05))
+    assert rate([], "exact").pct is None
+    assert rate([{"exact": True}, {"exact": False}], "exact").named("exact")["exact_pct"] == 50.0
+
+
+def test_calibration_by_tenths():
+    rows = [{"confidence": 0.95, "grouped": k < 9} for k in range(10)] + [
+        {"confidence": 0.0, "grouped": False}
+    ]
+    low, high = calibration(rows)
+    assert (low["shown_pct"], low["right_pct"], low["right_cases"]) == (0.0, 0.0, 1)
+    assert (high["shown_pct"], high["right_pct"], high["right_cases"]) == (95.0, 90.0, 10)
+
+
+def test_work_without_end_is_stopped():
+    def stubborn():
+        while True:
+            try:
+                sum(range(1000))
+            except Exception:
+                continue
+
+    with pytest.raises(OutOfTime), processor_limit(0.2):
+        stubborn()
+    with processor_limit(0.2):
+        time.sleep(0.5)  # waiting costs no processor time
+    with processor_limit(None):
+        pass

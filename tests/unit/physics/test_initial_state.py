@@ -1,0 +1,139 @@
+"""One rule for the state of charge at the first row: given, full charge, rest, load."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aesi.errors import DataError
+from aesi.physics import Cell, initial_state, simulate
+from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+LG_M50 = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+
+
+def record(time_s, current_a, voltage_v, temperature_degc=None) -> Measurement:
+    return Measurement(
+        np.asarray(time_s, float),
+        np.asarray(current_a, float),
+        np.asarray(voltage_v, float),
+        temperature_degc,
+    )
+
+
+def resting(voltage_v: float, rows: int = 20, temperature_degc=None) -> Measurement:
+    temperature = None if temperature_degc is None else np.full(rows, temperature_degc)
+    return record(np.arange(rows), np.zeros(rows), np.full(rows, voltage_v), temperature)
+
+
+def cut_from_a_drive(at: int) -> tuple[Measurement, float]:
+    """A record that begins in the middle of a drive, and its true state of charge there."""
+    time = np.arange(3000.0)
+    current = np.repeat(np.random.default_rng(5).normal(2.5, 4.0, 100), 30)
+    run = simulate(LG_M50, time, current, soc0=0.9, hold="backward")
+    return record(time[at:] - time[at], current[at:], run.voltage_v[at:]), float(run.series["soc"][at])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(0.02, 0.95))
+def test_a_rest_gives_its_state_of_charge_within_the_uncertainty_it_claims(soc):
+    found = initial_state(LG_M50, resting(float(LG_M50.rest_voltage_v(soc)[0])))
+    assert found.basis == "rest"
+    assert abs(found.soc - soc) < found.sd
+
+
+@pytest.mark.parametrize("below_mv", [0.0, 6.0, 20.0])
+def test_a_full_charge_that_relaxed_is_state_of_charge_one(below_mv):
+    found = initial_state(LG_M50, resting(LG_M50.upper_voltage_v - 1e-3 * below_mv))
+    assert (found.basis, found.soc) == ("full charge", 1.0)
+    by_voltage = 1.0 - float(np.interp(LG_M50.upper_voltage_v - 1e-3 * below_mv, *_ocv()))
+    assert found.sd >= 0.49 * by_voltage  # the table of potentials is coarse
+
+
+def _ocv() -> tuple[np.ndarray, np.ndarray]:
+    soc = np.linspace(0.0, 1.0, 2001)
+    return LG_M50.rest_voltage_v(soc), soc
+
+
+def test_a_flat_potential_leaves_a_wider_state_of_charge_than_a_steep_one():
+    steep, flat = (
+        initial_state(LG_M50, resting(float(LG_M50.rest_voltage_v(soc)[0]))).sd for soc in (0.03, 0.55)
+    )
+    assert flat > 2.0 * steep
+
+
+@pytest.mark.parametrize("current_a", [1.0, 5.0, -3.0])
+def test_a_load_that_begins_with_the_record_is_no_rest(current_a):
+    time = np.arange(600.0)
+    run = simulate(LG_M50, time, np.full(600, current_a), soc0=0.6)
+    found = initial_state(LG_M50, record(time, np.full(600, current_a), run.voltage_v), hold="linear")
+    as_rest = float(np.interp(run.voltage_v[0], *_ocv()))
+    assert found.basis == "load"
+    assert abs(found.soc - 0.6) < min(0.01, 0.5 * abs(as_rest - 0.6))
+    assert f"{current_a:g} A" in found.sentence
+
+
+@pytest.mark.parametrize("current_a", [2.5, 5.0])
+def test_a_load_that_has_flowed_for_long_is_seen_from_the_minutes_after(current_a):
+    time = np.arange(2400.0)
+    run = simulate(LG_M50, time, np.full(2400, current_a), soc0=0.9)
+    cut = record(time[1200:], np.full(1200, current_a), run.voltage_v[1200:])
+    found = initial_state(LG_M50, cut, hold="linear")
+    assert found.soc == pytest.approx(float(run.series["soc"][1200]), abs=0.02)
+    assert abs(found.soc - float(run.series["soc"][1200])) < 2.0 * found.sd
+
+
+def test_records_cut_from_a_drive_are_as_far_off_as_they_claim():
+    off = []
+    for at in range(100, 2800, 60):
+        cut, soc = cut_from_a_drive(at)
+        found = initial_state(LG_M50, cut)
+        off.append(abs(found.soc - soc) / found.sd)
+    assert np.mean(np.array(off) < 2.0) >= 0.9  # 95 % of a normal deviation
+
+
+def test_the_temperature_of_the_record_moves_the_reading_of_a_potential_with_entropy(nmc):
+    voltage = float(nmc.rest_voltage_v(0.5)[0])
+    at_reference = initial_state(nmc, resting(voltage, temperature_degc=25.0)).soc
+    cold = initial_state(nmc, resting(voltage, temperature_degc=-10.0)).soc
+    assert at_reference == pytest.approx(0.5, abs=5e-4)
+    assert abs(cold - at_reference) > 1e-3
+
+
+def test_a_given_state_of_charge_is_believed_for_one_record_and_checked_for_several():
+    data = resting(float(LG_M50.rest_voltage_v(0.4)[0]))
+    alone, one_of_many = initial_state(LG_M50, data, 0.9), initial_state(LG_M50, data, 0.9, shared=True)
+    assert (alone.soc, alone.basis, alone.contradicted) == (0.9, "given", True)
+    assert one_of_many.soc == pytest.approx(0.4, abs=5e-3)
+    assert "contradicts" in one_of_many.sentence
+    assert initial_state(LG_M50, data, 0.41, shared=True).basis == "given"
+
+
+def test_an_instrument_fault_is_taken_off_the_reading():
+    offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=0.02)
+    found = initial_state(LG_M50, resting(float(LG_M50.rest_voltage_v(0.5)[0]) + 0.02), effects=[offset])
+    assert found.soc == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_voltage_that_still_moves_is_doubtful_and_said():
+    data = resting(3.7, rows=60)
+    moving = replace(data, voltage_v=3.7 + 0.02 * np.exp(-np.arange(60.0) / 20.0))
+    still, drifting = initial_state(LG_M50, data), initial_state(LG_M50, moving)
+    assert drifting.sd > 2.0 * still.sd
+    assert "still moves" in drifting.sentence
+
+
+def test_a_voltage_of_another_cell_is_refused():
+    with pytest.raises(DataError, match=r"2\.5"):
+        initial_state(LG_M50, resting(1.9))
+
+
+def test_no_voltage_and_nothing_given_is_refused():
+    with pytest.raises(DataError, match="--soc0"):
+        initial_state(LG_M50, resting(np.nan))
+    assert initial_state(LG_M50, resting(np.nan), 0.7).soc == 0.7
