@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import InputError
-from aesi.numerics.metrics import mser
 from aesi.numerics.typing import Array
-from aesi.pipeline.bands import reach
-from aesi.pipeline.fit import Fitted
-from aesi.pipeline.sections import RepeatsConfig
+from aesi.pipeline.experiment.bands import reach
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.physics_models import DECLARED
+from aesi.pipeline.experiment.sections import RepeatsConfig
 from aesi.records import ErrorSeries
 
 MV = 1e3
@@ -120,10 +120,11 @@ def against(mine: Mapping[str, Any], other: Mapping[str, Any]) -> float:
 def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
     runs = [one.model.free_run(series) for series in tests]
     truth = np.concatenate([series.error_v for series in tests])
+    declared = np.concatenate([series.left_by(DECLARED) for series in tests])
     left = truth - np.concatenate([run.error_v for run in runs])
     figures: dict[str, Any] = {
         "rmse_mv": MV * float(np.sqrt(np.mean(left**2))),
-        "mser_pct": float(mser(truth, truth - left)),
+        "mser_pct": float(100.0 * (1.0 - np.mean(left**2) / np.mean(declared**2))),
         "diverged": sum(run.diverged_at is not None for run in runs),
     }
     if one.bands is None:

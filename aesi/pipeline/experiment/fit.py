@@ -13,6 +13,7 @@ from aesi.conformal import Calibrated, FreeRunBands
 from aesi.pipeline.experiment.candidate import genome_space
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
 from aesi.sparse import Candidate, Options, Problem
 from aesi.sparse.baselines import BASELINES, Tuning
@@ -53,6 +54,8 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
         horizon=search.horizon,
         fold=search.fold,
         regime=search.regime,
+        feedback=library.feedback,
+        fade=library.fade,
         seed=config.seed,
     )
     return Problem.build(loaded.split, options)
@@ -75,8 +78,8 @@ def _model(
         return chosen.bagging, len(chosen.bagging.terms)
     if name == "AESI II":
         return chosen.stability, len(chosen.stability.terms)
-    if name == "ESPM":
-        return Bare(), 0
+    if name in PHYSICS_NAMES:
+        return Bare(name), 0
     if name == "persistence":
         return Persistence(), 0
     baseline = BASELINES[name](problem, _tuning(problem, config))

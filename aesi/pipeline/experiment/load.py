@@ -7,7 +7,7 @@ the states that its history gave it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -21,10 +21,11 @@ from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError
 from aesi.physics import ActiveEffect, Cell, initial_state, simulate
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
+from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models, without
+from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
-from aesi.pipeline.product.error_series import error_series
-from aesi.records import ROLES, ErrorSeries, Measurement, Role, Split
+from aesi.records import ROLES, ErrorSeries, Hold, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
@@ -38,12 +39,15 @@ class Loaded:
     config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
+    cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : the training records once more, each under
+    physics that was fitted to the others.
     """
 
     cell: Cell
     cell_name: str
     effects: tuple[ActiveEffect, ...]
     split: Split
+    left_out: tuple[ErrorSeries, ...]
     soc0: dict[str, float]
     digests: dict[str, str]
     notes: tuple[str, ...]
@@ -125,9 +129,9 @@ def _load(config: ExperimentConfig) -> Loaded:
     given = declared_model(path)
     cell, effects = given.cell, (*given.effects, *_effects(config))
     sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
-    series: dict[str, ErrorSeries] = {}
     soc0: dict[str, float] = {}
     notes: list[str] = []
+    records: dict[str, FitRecord] = {}
     for name, (measurement, known_soc0) in sources.records.items():
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, config.data.hold, effects)
@@ -135,22 +139,99 @@ def _load(config: ExperimentConfig) -> Loaded:
         notes.append(start.sentence)
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
-        run = simulate(
-            cell, even.time_s, even.current_a, soc0[name], effects, even.temperature_degc, config.data.hold
+        records[name] = no_rows(even, start.soc)
+    drives = _training_drives(config.data, records, sources.roles)
+    for name, rows in drives:
+        records[name].rows[rows] = True
+    hold = config.data.hold
+    physics = physics_models(cell, effects, records, hold, config.cell.start)
+    series, empty = _series(physics, records, config)
+    for name in empty:
+        if name not in sources.roles["test"]:
+            _refuse(physics, records[name], hold)
+        notes.append(f"{name} runs empty in the model; its stoichiometries were held at the edge from there on.")
+    split = _split(config.data, series, sources.roles)
+    left_out = split.train
+    if config.cell.start == "recalibrated" and len(drives) > 1:
+        left_out = tuple(
+            _left_out(config, cell, effects, records, drive, piece.name)
+            for drive, piece in zip(drives, split.train, strict=True)
         )
-        whole = error_series(even, run, config.data.dt_s)
-        # Before the record is cut: a filtered current has to know what came before a piece.
-        series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
+    chosen = physics.chosen
     return Loaded(
-        cell=cell,
+        cell=chosen.cell,
         cell_name=cell.name or path.stem,
         effects=effects,
-        split=_split(config.data, series, sources.roles),
-        soc0=soc0,
+        split=split,
+        left_out=left_out,
+        soc0={name: chosen.soc0(each) for name, each in soc0.items()},
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
     )
+
+
+def _series(
+    physics: PhysicsModels, records: Mapping[str, FitRecord], config: ExperimentConfig
+) -> tuple[dict[str, ErrorSeries], list[str]]:
+    """Whole records under the physics, and the names of those that run empty there."""
+    series: dict[str, ErrorSeries] = {}
+    empty = []
+    for name, record in records.items():
+        whole, ran_empty = physics.series(
+            record.measurement, record.soc0, config.data.dt_s, config.data.hold
+        )
+        # Before the record is cut: a filtered current has to know what came before a piece.
+        series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
+        if ran_empty:
+            empty.append(name)
+    return series, empty
+
+
+def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:
+    """Raise what a simulation that may not run empty says."""
+    chosen, data = physics.chosen, record.measurement
+    simulate(
+        chosen.cell,
+        data.time_s,
+        data.current_a,
+        chosen.soc0(record.soc0),
+        chosen.effects,
+        data.temperature_degc,
+        hold,
+    )
+
+
+def _training_drives(
+    data: DataConfig, records: Mapping[str, FitRecord], roles: Mapping[Role, Sequence[str]]
+) -> list[tuple[str, slice]]:
+    """Record and rows of each training drive, in the order of `Split.train`."""
+    if data.repeats is None:
+        return [(name, slice(0, len(records[name].rows))) for name in roles["train"]]
+    (name, record), repeats = next(iter(records.items())), data.repeats
+    time = record.measurement.time_s
+    drives = []
+    for number in repeats.train:
+        begin = time[0] + (number - 1) * repeats.period_s
+        low, high = np.searchsorted(time, [begin, begin + repeats.period_s])
+        drives.append((name, slice(int(low), int(low + round((high - low) * (1 - repeats.valid_share))))))
+    return drives
+
+
+def _left_out(
+    config: ExperimentConfig,
+    cell: Cell,
+    effects: tuple[ActiveEffect, ...],
+    records: Mapping[str, FitRecord],
+    drive: tuple[str, slice],
+    called: str,
+) -> ErrorSeries:
+    """A training drive under physics that was fitted to the others alone."""
+    name, rows = drive
+    others = without(records, name, rows)
+    physics = physics_models(cell, effects, others, config.data.hold, config.cell.start)
+    series, _ = _series(physics, {name: records[name]}, config)
+    return series[name].take(rows, called)
 
 
 @dataclass(frozen=True, eq=False)

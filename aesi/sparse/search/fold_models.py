@@ -6,7 +6,7 @@ a long one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from aesi.numerics.blocks import leave_out_weights, pieces
 from aesi.numerics.typing import IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries
+from aesi.sparse.fade import Fade
 from aesi.sparse.leverage import Leverage
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import Candidate, sparse_model
@@ -25,16 +26,21 @@ N_PIECES = 12
 """Long enough to drift, short enough that the models without them are nearly the one that is judged."""
 
 
-def fold_models(problem: Problem, candidate: Candidate) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
+def fold_models(
+    problem: Problem, candidate: Candidate, judged: SparseModel, left_out: Sequence[ErrorSeries] = ()
+) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
     """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
 
-    One for every piece; folds in which no term survives are left out.
+    One for every piece: every record, where records are the folds of the search.  Folds in which no term survives are
+    left out.  judged : AESI I, or AESI II, whose terms alone are refitted then.
+    left_out : the training records under physics that has not seen them either; the default is the records themselves.
     """
     genome = candidate.genome
-    active = np.flatnonzero(genome.active(problem.library))
+    active = _terms(problem, candidate, judged)
     solver = STRidge(genome.lambda1, genome.lambda2)
     n = len(problem.target)
-    cut = pieces(problem.spans, max(1, n // N_PIECES))
+    whole = problem.folds == problem.spans
+    cut = list(problem.spans) if whole else pieces(problem.spans, max(1, n // N_PIECES))
     augmented = np.empty((n, len(active) + 1), order="F")
     augmented[:, :-1] = problem.theta(active).T
     augmented[:, -1] = problem.target
@@ -48,10 +54,22 @@ def fold_models(problem: Problem, candidate: Candidate) -> Iterator[tuple[Sparse
         kept = np.flatnonzero(coefficients)
         seen = np.r_[0:a, b:n]
         model = replace(
-            sparse_model(problem, active, coefficients, candidate.bagging.memory, "left-out piece"),
+            sparse_model(problem, active, coefficients, judged.memory, "left-out piece"),
             leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
         )
-        yield model, *_samples(problem, a, b)
+        if judged.fade is not None:
+            low, high = problem.inputs[seen].min(axis=0), problem.inputs[seen].max(axis=0)
+            model = replace(model, fade=Fade(judged.fade.amplitude, low, high))
+        yield model, *_samples(problem, a, b, left_out or problem.split.train)
+
+
+def _terms(problem: Problem, candidate: Candidate, judged: SparseModel) -> IntArray:
+    """Numbers of the terms that enter the fits of a fold."""
+    active = np.flatnonzero(candidate.genome.active(problem.library))
+    if judged.name != candidate.stability.name:
+        return active
+    stable = set(candidate.stability.library.terms)
+    return np.array([j for j in active if problem.library.terms[j] in stable])
 
 
 def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
@@ -61,9 +79,11 @@ def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> Spars
     return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))
 
 
-def _samples(problem: Problem, a: int, b: int) -> tuple[ErrorSeries, slice]:
+def _samples(
+    problem: Problem, a: int, b: int, records: Sequence[ErrorSeries]
+) -> tuple[ErrorSeries, slice]:
     """The record that training rows a to b - 1 come from, and the samples they predict: row k, sample k + 1."""
-    for record, (first, last) in zip(problem.split.train, problem.spans, strict=True):
+    for record, (first, last) in zip(records, problem.spans, strict=True):
         if first <= a < last:
             return record, slice(a - first + 1, b - first + 1)
     raise IndexError(f"row {a} belongs to no training record")
