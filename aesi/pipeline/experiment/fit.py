@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from aesi.conformal import Calibrated, FreeRunBands
-from aesi.pipeline.experiment.candidate import genome_space
+from aesi.pipeline.experiment.candidate import genome_space, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
@@ -88,4 +88,11 @@ def _model(
 
 def _tuning(problem: Problem, config: ExperimentConfig) -> Tuning:
     search = config.search
-    return Tuning(config.seed, search.candidates, search.population, genome_space(problem, config))
+    return Tuning(
+        config.seed,
+        search.candidates,
+        search.population,
+        genome_space(problem, config),
+        weights(config),
+        search.pearson_valid,
+    )

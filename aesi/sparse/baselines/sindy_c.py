@@ -3,7 +3,7 @@
 The rows are handed to PySINDy as a triangular factor R with R' R = [Theta y]' [Theta y]. That poses STLSQ the
 identical problem, |R_y - R_Theta xi|**2 = |y - Theta xi|**2 + const., in as many rows as there are terms.
 
-Tuning: the genome, its ranges, starts, operators, losses and fitness of the AESI search, with generations of 20 of
+Tuning: the genome, its ranges, starts, operators, losses, weights and constraint of the AESI search, with generations of 20 of
 which the better half are parents. Without resamples the loss on left-out pieces stands in for out-of-bag.
 
 da Silva et al., arXiv:2411.12935.
@@ -20,6 +20,7 @@ from aesi.numerics.typing import Array
 from aesi.records import Failed
 from aesi.sparse.baselines.single import Single, evaluate_single
 from aesi.sparse.model import SparseModel
+from aesi.sparse.search.evaluate import FitnessWeights
 from aesi.sparse.search.evolution import fittest
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.genome_space import GenomeSpace
@@ -34,16 +35,31 @@ def tuned_sindy_c(
     candidates: int = 200,
     population: int = 20,
     space: GenomeSpace | None = None,
+    weights: FitnessWeights | None = None,
+    least_pearson: float = -1.0,
 ) -> SparseModel:
-    """The fittest of `candidates` models. Raises FitError where none survives."""
+    """The fittest of `candidates` models; weights and the constraint on the correlation are those of the search.
+
+    Raises FitError where none survives.
+    """
     space = space or GenomeSpace.of(problem.library)
     rng = np.random.default_rng([seed, 1])
-    return fittest(space, partial(evaluate_sindy_c, problem), candidates, population, rng).model
+    judge = partial(evaluate_sindy_c, problem, weights=weights, least_pearson=least_pearson)
+    return fittest(space, judge, candidates, population, rng).model
 
 
-def evaluate_sindy_c(problem: Problem, genome: Genome) -> Single | Failed:
+def evaluate_sindy_c(
+    problem: Problem,
+    genome: Genome,
+    weights: FitnessWeights | None = None,
+    least_pearson: float = -1.0,
+) -> Single | Failed:
     """One candidate of the baseline."""
-    return evaluate_single(problem, genome, partial(_stlsq, genome.lambda1, genome.lambda2), NAME)
+    solve = partial(_stlsq, genome.lambda1, genome.lambda2)
+    single = evaluate_single(problem, genome, solve, NAME, weights)
+    if isinstance(single, Single) and single.valid.pearson < least_pearson:
+        return Failed("a correlation below its constraint")
+    return single
 
 
 def _stlsq(lambda1: float, lambda2: float, factor: Array) -> Array:

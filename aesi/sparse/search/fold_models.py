@@ -27,15 +27,18 @@ N_PIECES = 12
 
 
 def fold_models(
-    problem: Problem, candidate: Candidate, judged: SparseModel, left_out: Sequence[ErrorSeries] = ()
+    problem: Problem,
+    candidate: Candidate,
+    judged: SparseModel | None = None,
+    left_out: Sequence[ErrorSeries] = (),
 ) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
     """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
 
     One for every piece: every record, where records are the folds of the search.  Folds in which no term survives are
-    left out.  judged : AESI I, or AESI II, whose terms alone are refitted then.
+    left out.  judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
     left_out : the training records under physics that has not seen them either; the default is the records themselves.
     """
-    genome = candidate.genome
+    genome, judged = candidate.genome, judged or candidate.bagging
     active = _terms(problem, candidate, judged)
     solver = STRidge(genome.lambda1, genome.lambda2)
     n = len(problem.target)

@@ -76,7 +76,7 @@ class Options:
     outside: Outside = "clip"
     balance: bool = True
     feedback: bool = True
-    fade: bool = True
+    fade: bool = False
     seed: int = 0
 
 
