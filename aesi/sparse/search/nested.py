@@ -34,19 +34,10 @@ def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: i
     shares = np.empty(folds)
     for d in range(folds):
         others = np.delete(sums, d, axis=1)
-        amplitudes = np.array([_amplitude(problem, each) for each in others])
+        amplitudes = np.array([shrunken(each) if problem.options.fade else 1.0 for each in others])
         pick = int(np.argmin([_left(each, a).sum() for each, a in zip(others, amplitudes, strict=True)]))
         shares[d] = _left(sums[pick, d], amplitudes[pick]) / sums[pick, d, 0]
     return shares
-
-
-def _amplitude(problem: Problem, sums: Array) -> float:
-    """Of one candidate by some folds, (n, 3); one fold alone has no scatter to be wary of."""
-    if not problem.options.fade:
-        return 1.0
-    if len(sums) > 1:
-        return shrunken(sums[:, 1], sums[:, 2])
-    return float(np.clip(sums[0, 1] / sums[0, 2], 0.0, 1.0)) if sums[0, 2] > 0 else 0.0
 
 
 def _left(sums: Array, amplitude: float) -> Array:
