@@ -20,8 +20,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from aesi.data import read_measurement
     from aesi.physics import Cell, simulate
+    from aesi.pipeline.api import calibrate, discover
     from aesi.pipeline.cross_check import cross_check
     from aesi.pipeline.product.hybrid import HybridModel
+    from aesi.records import Measurement
 
 __version__ = "0.1.0"
 
@@ -29,14 +31,30 @@ _HOME = {
     "Cell": "aesi.physics",
     "simulate": "aesi.physics",
     "read_measurement": "aesi.data",
+    "Measurement": "aesi.records",
     "HybridModel": "aesi.pipeline.product.hybrid",
+    "calibrate": "aesi.pipeline.api",
+    "discover": "aesi.pipeline.api",
     "cross_check": "aesi.pipeline.cross_check",
 }
 
-__all__ = ["Cell", "HybridModel", "cross_check", "read_measurement", "simulate"]
+__all__ = [
+    "Cell",
+    "HybridModel",
+    "Measurement",
+    "calibrate",
+    "cross_check",
+    "discover",
+    "read_measurement",
+    "simulate",
+]
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(_HOME[name]), name)
     raise AttributeError(f"module 'aesi' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -14,12 +14,35 @@ import numpy as np
 
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import over_time, time_unit
 
 if TYPE_CHECKING:
     import pandas as pd
+    from plotly.graph_objects import Figure
 
 Hold = Literal["linear", "backward"]
 """How the current runs between samples: straight lines, or constant since the row before (as loggers do)."""
+
+
+SLOW_SAMPLING_S = 5.0
+"""Rows further apart than this are a logger's, which writes at the end of an interval; closer ones hardly differ."""
+
+
+def assumed_hold(time_s: Array) -> Hold:
+    """How the current runs between rows where nobody says: constant since the row before where rows are far apart."""
+    return "backward" if float(np.diff(time_s).max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
+
+
+def hold_sentence(name: str, hold: Hold, declared: bool) -> str:
+    """What was taken, for a reader."""
+    words = {
+        "linear": "in straight lines between rows",
+        "backward": "constant since the row before, as loggers write",
+    }
+    other = {"linear": "backward", "backward": "linear"}[hold]
+    return f"{name}: the current is taken {words[hold]}" + (
+        " as declared." if declared else f"; --hold {other} takes it otherwise."
+    )
 
 
 def digest(*arrays: Array | None) -> str:
@@ -30,6 +53,14 @@ def digest(*arrays: Array | None) -> str:
     return sha.hexdigest()[:16]
 
 
+def _extent(time_s: Array) -> str:
+    """Rows and duration, for a short text."""
+    if not len(time_s):
+        return "no rows"
+    unit, divisor = time_unit(float(time_s[-1] - time_s[0]))
+    return f"{len(time_s):,} rows over {(time_s[-1] - time_s[0]) / divisor:,.4g} {unit}"
+
+
 @dataclass(frozen=True, eq=False)
 class Measurement:
     """One continuous test of one cell.
@@ -37,6 +68,7 @@ class Measurement:
     time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V.
     temperature_degc : (n,) degC, or None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
+    hold : how the current runs between rows, where it was declared; else `assumed_hold` tells.
     """
 
     time_s: Array
@@ -46,6 +78,7 @@ class Measurement:
     name: str = "measurement"
     source: str = ""
     notes: tuple[str, ...] = ()
+    hold: Hold | None = None
 
     def __post_init__(self) -> None:
         n = len(self.time_s)
@@ -57,10 +90,34 @@ class Measurement:
     def __len__(self) -> int:
         return len(self.time_s)
 
+    def __repr__(self) -> str:
+        warm = "" if self.temperature_degc is None else ", with temperature"
+        return f"Measurement({self.name!r}, {_extent(self.time_s)}{warm})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The columns as a table, one row a sample; the temperature where it was measured."""
+        import pandas as pd
+
+        columns = {
+            name: getattr(self, name) for name in ("time_s", "current_a", "voltage_v", "temperature_degc")
+        }
+        return pd.DataFrame({name: values for name, values in columns.items() if values is not None})
+
+    def plot(self) -> Figure:
+        """Voltage, current and temperature over time: a plotly figure."""
+        panels = {"voltage, V": {"measured": self.voltage_v}, "current, A": {"current": self.current_a}}
+        if self.temperature_degc is not None:
+            panels["temperature, degC"] = {"temperature": self.temperature_degc}
+        return over_time(self.time_s, panels)
+
     @property
     def digest(self) -> str:
         """Content hash of the four columns."""
         return digest(self.time_s, self.current_a, self.voltage_v, self.temperature_degc)
+
+    def held(self, hold: Hold | None) -> Measurement:
+        """The record with how its current was declared to run between rows."""
+        return replace(self, hold=hold)
 
     def take(self, rows: slice | Array) -> Measurement:
         """The given rows, as a measurement of the same name."""
@@ -91,6 +148,27 @@ class Run:
     current_a: Array
     voltage_v: Array
     series: dict[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def __repr__(self) -> str:
+        low, high = float(self.voltage_v.min()), float(self.voltage_v.max())
+        return f"Run({_extent(self.time_s)}, {low:.3f} to {high:.3f} V, states {', '.join(self.series)})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Time, current, voltage and states as a table, one row a sample."""
+        import pandas as pd
+
+        columns = {"time_s": self.time_s, "current_a": self.current_a, "voltage_v": self.voltage_v}
+        return pd.DataFrame(columns | self.series)
+
+    def plot(self) -> Figure:
+        """Voltage, current and state of charge over time: a plotly figure."""
+        panels = {"voltage, V": {"simulated": self.voltage_v}, "current, A": {"current": self.current_a}}
+        if "soc" in self.series:
+            panels["state of charge"] = {"state of charge": self.series["soc"]}
+        return over_time(self.time_s, panels)
 
     @property
     def states(self) -> pd.DataFrame:
@@ -127,6 +205,9 @@ class ErrorSeries:
     def __len__(self) -> int:
         return len(self.error_v)
 
+    def __repr__(self) -> str:
+        return f"ErrorSeries({self.name!r}, {_extent(self.time_s)}, inputs {', '.join(self.input_names)})"
+
     @property
     def current_a(self) -> Array:
         """(n,) A, discharge positive."""
@@ -158,6 +239,17 @@ class ErrorSeries:
 
 Role = Literal["train", "valid", "test"]
 ROLES: tuple[Role, ...] = ("train", "valid", "test")
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """A training record under physics that was fitted without some of its samples.
+
+    rows : these samples.
+    """
+
+    series: ErrorSeries
+    rows: slice
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,8 @@ import typer
 
 from aesi.errors import AesiError
 from flows.base import environment
+from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt
 from flows.commands import bench, cell, data, effects, experiment
-
-INTERRUPTED = 130  # what shells return for a process that Ctrl-C ended
 
 app = typer.Typer(
     name="aesi",
@@ -35,6 +34,8 @@ app.command("tables", short_help="The paper's tables, from tracked runs alone.")
 app.command("effects", short_help="The catalogue of effects.")(effects.effects)
 app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")
 app.command("worker", short_help="One more process on a shared study.")(experiment.worker)
+app.command("compare", short_help="Tracked runs side by side on one page.")(experiment.compare)
+app.command("candidate", short_help="A tracked candidate made again, with its model.")(experiment.candidate)
 app.command("ui")(experiment.ui)
 app.command("bench", short_help="Time the project against its peers.")(bench.bench)
 
@@ -52,7 +53,8 @@ def main() -> NoReturn:
     """Entry point of the `aesi` script."""
     environment.prepare()
     try:
-        app(args=repeated(sys.argv[1:]))
+        with ending_soon_on_interrupt():
+            app(args=repeated(sys.argv[1:]))
     except AesiError as error:
         _fail(str(error), error.exit_code)
     except MemoryError:

@@ -94,7 +94,9 @@ def chosen_splits(
     """
     unknown = [name for name in cells if name not in EXPERIMENTS]
     if unknown:
-        raise InputError(f"there is no cell {unknown[0]!r} in this benchmark; there are: {', '.join(EXPERIMENTS)}.")
+        raise InputError(
+            f"there is no cell {unknown[0]!r} in this benchmark; there are: {', '.join(EXPERIMENTS)}."
+        )
     kept: list[SplitCase] = []
     for cell in cells:
         mine = [s for s in all_splits() if s.cell == cell and (only is None or only in s.name)]

@@ -127,6 +127,9 @@ class FreeRunBands:
     alpha: float
     horizons: tuple[HorizonBand, ...]
 
+    def __repr__(self) -> str:
+        return f"FreeRunBands({100 * (1 - self.alpha):.0f} %, {len(self.horizons)} horizons)"
+
     @classmethod
     def fit(
         cls,

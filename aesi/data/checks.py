@@ -1,8 +1,8 @@
 """What a measurement must be before anyone computes with it. Nothing is repaired here:
 each check passes, or raises a DataError that names file, column and first row.
 
-The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC, an ohmic
-resistance above 30 microohm (cells of 1,000 Ah have some 150) and less than 1,500 Ah moved in one direction.
+The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC. What only the
+columns together tell (a unit, a sign that was left out) is in `aesi.data.implausible`.
 """
 
 from __future__ import annotations
@@ -20,8 +20,6 @@ HIGHEST_VOLTAGE_V = 6.0
 HIGHEST_PLAIN_VOLT = 1000.0
 TEMPERATURE_RANGE_DEGC = (-60.0, 150.0)
 HIGHEST_CURRENT_A = 20_000.0
-HIGHEST_CHARGE_AH = 1_500.0
-LOWEST_RESISTANCE_OHM = 30e-6
 GAP_FLOOR_S = 5.0
 GAP_RATIO = 10.0
 NEIGHBOURS = 10
@@ -61,7 +59,7 @@ def check_finite(columns: Columns, context: Context) -> None:
     quantity = min(faults, key=lambda q: faults[q])
     row = faults[quantity]
     what = "is empty or NaN" if np.isnan(columns[quantity][row]) else "is infinite"
-    also = " or leave the column out" if quantity == "temperature_degc" else ""
+    also = " or leave the column out (--column temperature_degc=)" if quantity == "temperature_degc" else ""
     count = int(np.sum(~np.isfinite(columns[quantity])))
     raise DataError(
         f"{context.at(quantity, row)} {what} ({count} such cells): remove or correct these rows{also}."
@@ -79,7 +77,7 @@ def check_time(time_s: Array, context: Context) -> None:
         count = int(np.sum(step == 0))
         raise DataError(
             f"{context.at('time_s', row)}: the stamp {here:.10g} s is there twice ({count} such rows): "
-            "keep one row of each, or read with duplicates='last'."
+            "keep one row of each, or choose: --duplicates first, or last."
         )
     raise DataError(
         f"{context.at('time_s', row)}: time runs back from {before:.10g} s to {here:.10g} s; "
@@ -95,7 +93,7 @@ def check_ranges(columns: Columns, context: Context) -> None:
         row = int(np.argmax(voltage > HIGHEST_PLAIN_VOLT))
         raise DataError(
             f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is plainly in mV; "
-            "divide the column by 1000."
+            "declare it: --unit voltage_v=mV."
         )
     bad: BoolArray = (voltage <= 0) | (voltage > HIGHEST_VOLTAGE_V)
     if np.any(bad):
@@ -109,7 +107,7 @@ def check_ranges(columns: Columns, context: Context) -> None:
         row = int(np.argmax(large))
         raise DataError(
             f"{context.at('current_a', row)}: {current[row]:.6g} A is beyond any cell; "
-            "check the unit (mA?) or the row."
+            "check the row, or declare the unit: --unit current_a=mA."
         )
     temperature = columns.get("temperature_degc")
     if temperature is not None:
@@ -117,30 +115,11 @@ def check_ranges(columns: Columns, context: Context) -> None:
         absurd = (temperature < low) | (temperature > high)
         if np.any(absurd):
             row = int(np.argmax(absurd))
-            kelvin = " (in kelvin?)" if temperature[row] > high else ""
+            kelvin = " (in kelvin? --unit temperature_degc=K)" if temperature[row] > high else ""
             raise DataError(
                 f"{context.at('temperature_degc', row)}: {temperature[row]:.6g} degC is outside "
-                f"{low:g} to {high:g} degC{kelvin}; correct the column or leave it out."
+                f"{low:g} to {high:g} degC{kelvin}; correct the column or leave it out: --column temperature_degc=."
             )
-
-
-def check_milliampere(columns: Columns, context: Context) -> None:
-    """The current is not plainly in mA: by the charge it would move, and by the resistance its steps show."""
-    time, current = columns["time_s"], columns["current_a"]
-    charge = np.concatenate([[0.0], np.cumsum(current[1:] * np.diff(time))]) / SECONDS_PER_HOUR
-    moved = float(np.ptp(charge))
-    row = int(np.argmax(np.abs(current)))
-    unit = f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA"
-    if moved > HIGHEST_CHARGE_AH:
-        raise DataError(f"{unit} ({moved:.4g} Ah would have moved); divide the column by 1000.")
-    steps = _steps(columns)
-    if steps is None:
-        return
-    resistance, correlation = steps
-    if correlation < -CLEAR_CORRELATION and -resistance < LOWEST_RESISTANCE_OHM:
-        raise DataError(
-            f"{unit} (its steps would show {-resistance * 1e6:.3g} microohm); divide the column by 1000."
-        )
 
 
 def check_sign(columns: Columns, context: Context, advice: str) -> None:
@@ -148,9 +127,9 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
 
     advice : what the user can do about it, from '; ' on.
     """
-    steps = _steps(columns)
-    if steps is not None and abs(steps[1]) > CLEAR_CORRELATION:
-        contradicts, evidence = steps[1] > 0, "at its steps"
+    found = steps(columns)
+    if found is not None and abs(found[1]) > CLEAR_CORRELATION:
+        contradicts, evidence = found[1] > 0, "at its steps"
     else:
         trend = _trend(columns)
         contradicts, evidence = trend > CLEAR_CORRELATION, "along the test"
@@ -202,11 +181,11 @@ def gap_error(columns: Columns, k: int, context: Context) -> DataError:
     return DataError(
         f"{context.at('time_s', k + 1)}: a gap of {first - last:.6g} s after {last:.10g} s, "
         f"where rows come every {np.median(np.diff(time)):.3g} s; what the cell did there is unknown. "
-        f"Split the file there, or read one side of it: stop_s={last:.10g} or start_s={first:.10g}."
+        f"Split the file there, or read one side of it: --to-s {last:.10g} or --from-s {first:.10g}."
     )
 
 
-def _steps(columns: Columns) -> tuple[float, float] | None:
+def steps(columns: Columns) -> tuple[float, float] | None:
     """Slope dV/dI in ohm and its correlation over the clear steps of the current; None without enough."""
     rise = np.diff(columns["current_a"])
     answer = np.diff(columns["voltage_v"])

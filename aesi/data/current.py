@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from aesi.data.checks import Columns, Context, check_finite, check_time
+from aesi.data.checks import check_finite, check_time
 from aesi.data.columns import map_columns
-from aesi.data.read import Sign, orient, read_measurement
+from aesi.data.load_columns import load_columns
+from aesi.data.read import read
 from aesi.data.readers import open_table
-from aesi.errors import DataError
+from aesi.data.reading import Reading
 from aesi.numerics.typing import Array
 
 
@@ -28,19 +28,17 @@ class CurrentProfile:
     notes: tuple[str, ...] = ()
 
 
-def read_current(
-    path: str | Path, columns: Mapping[str, str | None] | None = None, sign: Sign = "discharge-positive"
-) -> CurrentProfile:
+def read_current(path: str | Path, reading: Reading | None = None) -> CurrentProfile:
     """Read time and current, and what else of a measurement is there.
 
-    columns, sign : as in `read_measurement`. A file with a voltage is checked as a measurement.
+    reading : what is said of the file. A file with a voltage is checked as a measurement.
     Raises DataError naming file, column and first row.
     """
-    table = open_table(path)
-    file = table.path.name
-    mapped = map_columns(table.header, columns, file, required=("time_s", "current_a"))
-    if "voltage_v" in mapped.position:
-        measured = read_measurement(path, columns, sign, max_rows=None)
+    told = reading or Reading()
+    table = open_table(path, [given for given in told.columns.values() if given])
+    needed = ("time_s", "current_a")
+    if "voltage_v" in map_columns(table, told.columns, told.units, needed, told.selectors).position:
+        measured = read(path, told, max_rows=None)
         return CurrentProfile(
             measured.time_s,
             measured.current_a,
@@ -48,22 +46,13 @@ def read_current(
             measured.temperature_degc,
             measured.notes,
         )
-    quantities = tuple(mapped.position)
-    arrays = table.read(tuple(mapped.position[q] for q in quantities))
-    data: Columns = dict(zip(quantities, arrays, strict=True))
-    if len(data["time_s"]) < 2:
-        raise DataError(
-            f"{file} has {len(data['time_s'])} rows below its header; a profile needs at least two."
-        )
-    context = Context(file, mapped.header, table.where)
+    data, context, _, notes = load_columns(table, told, needed)
     check_finite(data, context)
     check_time(data["time_s"], context)
-    notes = [*table.notes, *mapped.notes]
-    orient(data, mapped, sign, notes)
     return CurrentProfile(
         data["time_s"],
         data["current_a"],
         None,
         data.get("temperature_degc"),
-        tuple(f"{file}: {note}" for note in notes),
+        tuple(f"{context.file}: {note}" for note in notes),
     )

@@ -14,7 +14,7 @@ import numpy as np
 
 from aesi.data.laboratory.changes import find_change
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Model, Setup, run
+from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, run
 from aesi.data.profile import OTHER_LOAD, PULSE_C, Profile, paper_profiles
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -57,7 +57,7 @@ class Laboratory:
     """
 
     bpx: Path
-    model: Model = "DFN"
+    model: LaboratoryModel = "DFN"
     effects: tuple[str, ...] = DEFAULT_MIX
     magnitude: float = 1.0
     instrument: Instrument = INSTRUMENT
@@ -69,7 +69,7 @@ class Laboratory:
         return nominal_capacity_ah(self.bpx)
 
     def setup(self) -> Setup:
-        """Model and changes. Raises DataError for an unknown change."""
+        """LaboratoryModel and changes. Raises DataError for an unknown change."""
         return Setup(self.bpx, self.model, tuple(self._apply(name) for name in self.effects))
 
     def measure(self, profile: Profile) -> Measurement:

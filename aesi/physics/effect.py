@@ -79,6 +79,9 @@ class Effect:
     file: str | None = None
     infers: Measurable | None = None
 
+    def __repr__(self) -> str:
+        return f"Effect({self.id!r}, {self.kind}, parameters {', '.join(self.parameters) or 'none'})"
+
     def activate(self, **values: float) -> ActiveEffect:
         """This effect with the given parameters, defaults elsewhere.
 
@@ -120,6 +123,9 @@ class ActiveEffect:
 
     effect: Effect
     values: tuple[tuple[str, float], ...]
+
+    def __repr__(self) -> str:
+        return f"{self.id}({', '.join(f'{name}={value:.4g}' for name, value in self.values)})"
 
     @property
     def id(self) -> str:

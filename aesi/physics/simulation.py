@@ -18,6 +18,7 @@ import numpy as np
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array
+from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Record, Trace
@@ -62,10 +63,16 @@ def simulate(
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
     Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated; InputError for
-    another model, or for an effect that the model already holds.
+    another model, hold or on_depletion, for what is no Cell, no effect or no state of charge, and for an effect that
+    the model already holds.
     """
+    check_cell(cell)
+    check_choice("hold", hold, Hold)
+    check_choice("on_depletion", on_depletion, OnDepletion)
+    if on_depletion == "raise":  # a search may pass by states that no cell has
+        check_soc(soc0)
     time, current = _checked_record(time_s, current_a)
-    active = _instruments_first(effects)
+    active = _instruments_first(checked_effects(effects))
     solve = _solver(model)
     changed = model_with(cell, active)
     record = Record(time, current, _kelvin(temperature_degc, time))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement
@@ -23,7 +24,9 @@ def calibrate_files(
 
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
-    found = calibrate(declared_model(cell).cell, measurements, soc0=soc0, seed=seed)
+    declared = declared_model(cell).cell
+    check_belongs(declared, measurements)
+    found = calibrate(declared, measurements, soc0=soc0, seed=seed)
     content = to_json(found, [note for m in measurements for note in m.notes])
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")

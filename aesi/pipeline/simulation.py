@@ -10,18 +10,21 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.data.current import CurrentProfile, read_current
-from aesi.data.read import Sign
+from aesi.data.reading import Reading
 from aesi.errors import DataError, InputError
-from aesi.physics import ModelName, initial_state, simulate
+from aesi.numerics.typing import Array
+from aesi.physics import Cell, InitialState, ModelName, initial_state, simulate
+from aesi.physics.effects import activated
+from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Hold, Measurement, Run
+from aesi.pipeline.product.prediction import Prediction
+from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from aesi.physics import ActiveEffect
-
+MV = 1e3
 SayNotes = Callable[[Iterable[str]], None]
 
 
@@ -32,9 +35,8 @@ def simulate_file(
     soc0: float | None = None,
     effects: Sequence[tuple[str, Mapping[str, float]]] = (),
     effect_files: Sequence[Path] = (),
-    hold: Hold = "linear",
-    columns: Mapping[str, str | None] | None = None,
-    sign: Sign = "discharge-positive",
+    hold: Hold | None = None,
+    reading: Reading | None = None,
     say_notes: SayNotes | None = None,
     model: ModelName = "espm",
 ) -> Run:
@@ -42,25 +44,34 @@ def simulate_file(
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     soc0 : None takes it from the file's voltage, where it has one (see `initial_state`), else from the saved model.
-    say_notes : is given what the reader dropped or mapped, one sentence each.
+    hold : None takes straight lines for a profile alone, and what `assumed_hold` says for a measurement.
+    say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
     model : "espm" or "dfn".
+    Raises DataError where a measurement cannot be of this cell.
     """
-    profile = _read(current, columns, sign, say_notes)
+    say = say_notes or _silent
+    profile = read_current(current, reading)
+    say(profile.notes)
     declared = declared_model(cell)
-    active = (*declared.effects, *_activated(effects, effect_files))
-    start = _start(replace(declared, effects=active, hold=hold), profile, current, soc0, say_notes)
+    active = (*declared.effects, *activated(effects, effect_files))
+    record = _record(profile, current, hold)
+    taken = hold or ("linear" if profile.voltage_v is None else assumed_hold(profile.time_s))
+    check_belongs(declared.cell, [record])
+    start = _start(replace(declared, effects=active, hold=taken), record, soc0)
+    say([start.sentence, hold_sentence(record.name, taken, hold is not None)])
     run = simulate(
         declared.cell,
         profile.time_s,
         profile.current_a,
-        start,
+        start.soc,
         active,
         profile.temperature_degc,
-        hold,
+        taken,
         model=model,
     )
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out)
+    say(reached(declared.cell, record, run.voltage_v, run.series["soc"]))
     return run
 
 
@@ -70,29 +81,79 @@ def predict_file(
     out: Path,
     measured: bool = False,
     soc0: float | None = None,
-    columns: Mapping[str, str | None] | None = None,
-    sign: Sign = "discharge-positive",
+    hold: Hold | None = None,
+    reading: Reading | None = None,
     say_notes: SayNotes | None = None,
 ) -> int:
     """Predict the voltage of the profile in `current`, write it with its band to `out`; the number of rows.
 
-    measured : one step ahead from the file's voltage; otherwise a free run.  say_notes : as in `simulate_file`.
+    measured : one step ahead from the file's voltage; otherwise a free run.  hold : None takes the saved model's.
+    say_notes : as in `simulate_file`.  Raises DataError where a measurement cannot be of this cell.
     """
-    profile = _read(current, columns, sign, say_notes)
+    say = say_notes or _silent
+    profile = read_current(current, reading)
+    say(profile.notes)
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
-    hybrid = HybridModel.load(model)
+    saved = HybridModel.load(model)
+    hybrid = replace(saved, hold=hold or saved.hold)
+    record = _record(profile, current, hold)
+    check_belongs(hybrid.cell, [record])
+    start = _start(hybrid, record, soc0)
+    say([start.sentence, hold_sentence(record.name, hybrid.hold, hold is not None)])
     prediction = hybrid.predict(
         profile.time_s,
         profile.current_a,
-        soc0=_start(hybrid, profile, current, soc0, say_notes),
+        soc0=start.soc,
         voltage_v=profile.voltage_v if measured else None,
         temperature_degc=profile.temperature_degc,
     )
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
+    say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc))
+    say(_of_band(record, prediction, hybrid.correction is not None))
     return len(frame)
+
+
+def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> list[str]:
+    """Sentences on a simulated record: where it ended, its error, and how much lies outside what the file declares.
+
+    voltage_v, soc : (n,) simulated.  A record without a voltage has no error.
+    """
+    said = [f"{record.name}: state of charge {soc[0]:.3f} at the start, {soc[-1]:.3f} at the end."]
+    if np.all(np.isfinite(record.voltage_v)):
+        error = MV * (record.voltage_v - voltage_v)
+        said.append(
+            f"{record.name}: against the measured voltage {np.sqrt(np.mean(error**2)):.2f} mV RMSE, "
+            f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
+        )
+    beyond = (soc < 0.0) | (soc > 1.0)
+    window = (voltage_v < cell.lower_voltage_v) | (voltage_v > cell.upper_voltage_v)
+    for rows, words in (
+        (beyond, "a state of charge outside 0 to 1"),
+        (window, f"a voltage outside the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"),
+    ):
+        if np.any(rows):
+            said.append(f"{record.name}: {100 * np.mean(rows):.2g} % of the rows have {words}.")
+    return said
+
+
+def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> list[str]:
+    said = []
+    if corrected:
+        share = 100 * float(np.mean(prediction.outside))
+        said.append(
+            f"{record.name}: {share:.2g} % of the rows lie outside the range the correction was trained on."
+        )
+    if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
+        inside = (record.voltage_v >= prediction.lower_v) & (record.voltage_v <= prediction.upper_v)
+        width = MV * float(np.nanmean(prediction.upper_v - prediction.lower_v))
+        said.append(
+            f"{record.name}: the {100 * prediction.nominal:.0f} % band holds {100 * np.mean(inside):.1f} % of the "
+            f"measured voltage; it is {width:.1f} mV wide in the mean."
+        )
+    return said
 
 
 def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
@@ -102,31 +163,28 @@ def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     _write(path, pd.DataFrame(columns))
 
 
-def _read(
-    current: Path, columns: Mapping[str, str | None] | None, sign: Sign, say_notes: SayNotes | None
-) -> CurrentProfile:
-    profile = read_current(current, columns, sign)
-    if say_notes is not None:
-        say_notes(profile.notes)
-    return profile
-
-
-def _start(
-    model: HybridModel, profile: CurrentProfile, file: Path, soc0: float | None, say_notes: SayNotes | None
-) -> float:
-    """State of charge at the first row: as given, from the voltage, or the saved model's; it is said."""
-    voltage = profile.voltage_v
-    if voltage is None and soc0 is None:
-        soc0 = model.soc0
-    if voltage is None:
-        voltage = np.full_like(profile.time_s, np.nan)
-    record = Measurement(
-        profile.time_s, profile.current_a, voltage, profile.temperature_degc, file.name.split(".")[0]
+def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measurement:
+    """The profile as a measurement; NaN for a voltage that is not there."""
+    voltage = np.full_like(profile.time_s, np.nan) if profile.voltage_v is None else profile.voltage_v
+    return Measurement(
+        profile.time_s,
+        profile.current_a,
+        voltage,
+        profile.temperature_degc,
+        file.name.split(".")[0],
+        hold=hold,
     )
-    start = initial_state(model.cell, record, soc0, model.hold, model.effects)
-    if say_notes is not None:
-        say_notes([start.sentence])
-    return start.soc
+
+
+def _start(model: HybridModel, record: Measurement, soc0: float | None) -> InitialState:
+    """The state of charge at the first row: as given, from the voltage, or the saved model's."""
+    if soc0 is None and not np.isfinite(record.voltage_v[0]):
+        soc0 = model.soc0
+    return initial_state(model.cell, record, soc0, model.hold, model.effects)
+
+
+def _silent(notes: Iterable[str]) -> None:
+    pass
 
 
 def _write(path: Path, frame: pd.DataFrame) -> None:
@@ -135,24 +193,3 @@ def _write(path: Path, frame: pd.DataFrame) -> None:
         frame.to_csv(path, index=False, float_format="%.9g")
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
-
-
-def _activated(
-    effects: Sequence[tuple[str, Mapping[str, float]]], files: Sequence[Path]
-) -> tuple[ActiveEffect, ...]:
-    from difflib import get_close_matches
-
-    from aesi.physics.effects import CATALOGUE
-
-    known = dict(CATALOGUE)
-    for path in files:
-        from aesi.physics.effects import load_effect
-
-        effect = load_effect(path)
-        known[effect.id] = effect
-    for name, _ in effects:
-        if name not in known:
-            near = get_close_matches(name, list(known), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else "."
-            raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
-    return tuple(known[name].activate(**values) for name, values in effects)

@@ -5,10 +5,10 @@
 
 e is what the terms say, h the leverage of x in their fit (leverage.py), d_j how far the scaled input j lies outside its
 trained range, -1 to 1. The amplitude a is the slope of the error on the correction over drives d that the terms had not
-seen, less a share of its standard error s_b by the jackknife over these drives: a correction that left-out drives do
-not bear out is no correction, and neither is one of which they see next to nothing (DOUBT), because each drive lies outside
-of what the others visit. As the terms' coefficients are shrunk by a ridge for the noise they were fitted to, (2)
-shrinks their sum for what differs from drive to drive. Efron & Morris, J. Am. Stat. Assoc. 68 (1973) 117.
+seen, less a share of its standard error s_b by the jackknife over these drives. A correction that left-out drives do
+not bear out is no correction, and neither is one of which they see next to nothing (DOUBT), because each drive lies
+outside of what the others visit. As the terms' coefficients are shrunk by a ridge for the noise they were fitted to,
+(2) shrinks their sum for what differs from drive to drive. Efron & Morris, J. Am. Stat. Assoc. 68 (1973) 117.
 
 It is for models whose terms are free of the error: in one that feeds back, an amplitude would change its dynamics.
 

@@ -60,6 +60,9 @@ class SparseModel:
     leverage: Leverage | None = None
     fade: Fade | None = None
 
+    def __repr__(self) -> str:
+        return f"SparseModel({self.name!r}, {len(self.terms)} terms, step {self.dt_s:g} s)"
+
     @property
     def terms(self) -> tuple[str, ...]:
         """Names of the active terms."""

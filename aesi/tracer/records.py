@@ -15,7 +15,7 @@ import numpy as np
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell, initial_soc
-from aesi.records import Hold, Measurement
+from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
 
 THIN_STEP_S = 1.0
 """Fits see at most one sample a second: nothing in the catalogue is faster than a sample and slower than
@@ -29,7 +29,6 @@ UNEVEN_SHARE = 0.01
 FIRST_STEP_S = 0.5
 STEP_GROWTH = 0.25
 """Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
-SLOW_SAMPLING_S = 5.0
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 OTHER_STATE = 0.05
@@ -120,7 +119,7 @@ def prepare(
     Raises DataError where the record is too short or its initial state cannot be known.
     """
     gaps = np.diff(data.time_s)
-    hold: Hold = "backward" if float(gaps.max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
+    hold: Hold = data.hold or assumed_hold(data.time_s)
     duration = float(data.time_s[-1] - data.time_s[0])
     steps = _current_steps(cell, data)
     typical = float(np.median(gaps))
@@ -133,7 +132,7 @@ def prepare(
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
     start, sd, notes = _initial_state(cell, data, soc0)
-    notes = (*notes, *_temperature_noted(data))
+    notes = (*notes, hold_sentence(data.name, hold, data.hold is not None), *_temperature_noted(data))
     noise_full = noise_floor_v(data.voltage_v, data.current_a)
     if rows is None:
         noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])

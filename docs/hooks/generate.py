@@ -85,6 +85,8 @@ def benchmarks() -> str:
         return "No benchmark has been recorded in this checkout; `aesi bench` runs them."
     by_name: dict[str, list[tuple[Any, dict[str, Any]]]] = {}
     for entry, line in latest(entries).values():
+        if line["bench"] in IN_COLUMNS:
+            continue
         by_name.setdefault(line["bench"], []).append((entry, line))
     parts: list[str] = []
     for name, found in by_name.items():
@@ -94,6 +96,36 @@ def benchmarks() -> str:
         ]
         parts.append(_table([line for _, line in found]))
     return "\n".join([*parts, _over_time(entries)])
+
+
+def columns_of(bench: str) -> str:
+    """A figure a row and a recorded run a column, oldest first: what a change of method brought stays to be seen."""
+    from flows.benchmarks.history import read_history
+
+    runs = [
+        (entry, line)
+        for entry in read_history(ROOT / "docs" / "benchmarks.json")
+        for line in entry.lines
+        if line["bench"] == bench and line.get("strict")
+    ]
+    if not runs:
+        return f"No run has been recorded in this checkout; `aesi bench {bench}` makes one."
+    heads = [f"{line['label']}, seed {line['seed']}, commit `{entry.commit[:7]}`" for entry, line in runs]
+    rows = [
+        f"| {title} | " + " | ".join(_figure(line, key) for _, line in runs) + " |"
+        for key, title in IN_COLUMNS[bench]
+    ]
+    return "\n".join(["| | " + " | ".join(heads) + " |", "|---|" + "---:|" * len(runs), *rows, ""])
+
+
+def _figure(line: dict[str, Any], key: str) -> str:
+    """A rate with its interval and its cases, or a plain figure."""
+    if f"{key}_pct" not in line:
+        return _cell(line.get(key))
+    if line[f"{key}_pct"] is None or not line.get(f"{key}_95_pct"):
+        return "–"
+    low, high = line[f"{key}_95_pct"]
+    return f"{line[f'{key}_pct']:.0f} % [{low:.0f}, {high:.0f}] of {line[f'{key}_cases']}"
 
 
 def _origin(entry: Any) -> str:
@@ -188,9 +220,48 @@ def _from_root(name: str) -> str:
     return text.replace("](docs/", "](").replace("](CHANGELOG.md)", "](changelog.md)")
 
 
+IN_COLUMNS = {
+    "blind": (
+        ("cases", "cases"),
+        ("no_answer", "without an answer (out of time, or refused)"),
+        ("effect_exact", "effects named exactly"),
+        ("effect_grouped", "effects named within a group of three"),
+        ("effect_lenient", "the same, listed alternatives counted as right"),
+        ("pair_both_named", "pairs, both named"),
+        ("stranger_unknown", "strangers called `unknown`"),
+        ("stranger_false_name", "names given to strangers"),
+        ("none_false_name", "names given where nothing is missing"),
+        ("effect_false_name", "names beside the right ones, or instead of them"),
+        ("false_name_beside_unknown", "wrong names beside `unknown`"),
+        ("fitted_called_found", "right and fitted to the noise, called `found`"),
+        ("after_over_noise_median", "error on unseen data over the noise, median"),
+        ("parameter_error_median", "largest relative error of a parameter, median"),
+        ("parameters_covered", "parameters inside their 90 % interval"),
+        ("processor_s_median", "processor seconds a case, median"),
+    ),
+    "real": (
+        ("ran", "cases"),
+        ("no_answer", "without an answer (out of time, or refused)"),
+        ("withheld_named", "temperatures named"),
+        ("withheld_within_2k", "temperatures within 2 K"),
+        ("withheld_error_halved", "error on unseen data at least halved, of those named"),
+        ("fault_named", "faults named"),
+        ("physics_named", "contacts and capacity named"),
+        ("size_error_median", "relative error of the size, median"),
+        ("size_covered", "sizes inside their 90 % interval"),
+        ("control_silent", "controls without a name"),
+        ("ageing_named", "ageing named, or rightly not"),
+        ("after_worse", "worse on unseen data than the better of declared and recalibrated"),
+        ("processor_s_median", "processor seconds a case, median"),
+    ),
+}
+"""Benchmarks whose runs stand side by side: key of a figure and what it is."""
+
 GENERATORS: dict[str, Callable[[], str]] = {
     "catalogue": catalogue,
     "benchmarks": benchmarks,
+    "blind": lambda: columns_of("blind"),
+    "real": lambda: columns_of("real"),
     "command line": command_line,
     "contributing": contributing,
     "changelog": changelog,

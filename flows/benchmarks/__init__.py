@@ -3,8 +3,9 @@
 Each module has `run(**options)`, which yields one JSON-ready dict a line.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any
 
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
@@ -12,10 +13,20 @@ from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 BENCHMARKS = OF_THE_PACKAGE | {
     "blind": "flows.benchmarks.blind",
     "splits": "flows.benchmarks.splits",
+    "real": "flows.benchmarks.real",
     "tracking": "flows.benchmarks.tracking",
     "scale": "flows.benchmarks.scale",
 }
 """Name -> module."""
+
+PEERS = {"spci": {"mapie": "mapie>=1.5"}, "scale": {"distributed": "dask[distributed]"}}
+"""Name -> packages beyond those of the project that its peers come from, and what installs each."""
+
+
+def missing(names: Iterable[str]) -> dict[str, str]:
+    """Package -> what installs it, of the packages that these benchmarks need and that are not here."""
+    needed = {package: source for name in names for package, source in PEERS.get(name, {}).items()}
+    return {package: source for package, source in needed.items() if find_spec(package) is None}
 
 
 def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
+from aesi.bench import CaseRow
 from aesi.pipeline.experiment.sections import TrackingConfig
-
-CaseRow = dict[str, Any]
 
 
 @dataclass(frozen=True)

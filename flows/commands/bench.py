@@ -26,17 +26,25 @@ def bench(
     ] = None,
 ) -> None:
     """Time and check the project against its peers, in one run on this machine."""
-    from flows.benchmarks import BENCHMARKS, run
+    from flows.benchmarks import BENCHMARKS, missing, run
     from flows.benchmarks.history import read_history, regressions
 
     if name is not None and name not in BENCHMARKS:
         raise InputError(f"there is no benchmark {name!r}; there are: {', '.join(BENCHMARKS)}.")
+    chosen = [name] if name else list(BENCHMARKS)
+    lacking = missing(chosen)
+    if lacking:
+        command = " ".join(f"'{source}'" for source in lacking.values())
+        raise InputError(
+            f"`aesi bench {name or ''}`".replace(" `", "`")
+            + f" compares with {', '.join(lacking)}, not installed here: pip install {command}."
+        )
     keywords = dict(_pair(option) for option in options or [])
     history = read_history(compare) if compare else []
     if compare and not history:
         raise InputError(f"{compare} holds no recorded benchmarks to compare with.")
     lines = []
-    for each in [name] if name else list(BENCHMARKS):
+    for each in chosen:
         for line in run(each, **keywords):
             lines.append({"bench": each, **line})
             typer.echo(json.dumps(lines[-1]) if as_json else _plain(each, line))

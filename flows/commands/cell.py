@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -11,17 +11,18 @@ from aesi.errors import InputError
 from flows.commands import options
 
 
+@options.reads_files
 def simulate(
-    cell: options.Cell,
+    *,
+    reading: Any,
+    cell: options.CellOption,
     current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, temperature_degc].")],
     out: Annotated[Path, typer.Option(help="CSV to write: time, current, voltage and states.")],
     soc0: options.Soc0 = None,
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
-    hold: options.Hold = "linear",
-    column: options.Columns = None,
-    sign: options.Sign = "discharge-positive",
-    model: options.Model = "espm",
+    hold: options.HoldOption = None,
+    model: options.ModelOption = "espm",
 ) -> None:
     """The physics model alone, under a current profile."""
     from aesi.pipeline.simulation import simulate_file
@@ -34,8 +35,7 @@ def simulate(
         effects=[options.effect_values(text) for text in effect or []],
         effect_files=effect_file or [],
         hold=hold,
-        columns=options.columns(column),
-        sign=sign,
+        reading=reading,
         say_notes=options.say_notes,
         model=model,
     )
@@ -43,7 +43,10 @@ def simulate(
     typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)
 
 
+@options.reads_files
 def predict(
+    *,
+    reading: Any,
     model: Annotated[Path, typer.Option(help="Folder of a saved model (runs/.../model).")],
     current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, voltage_v, temperature_degc].")],
     out: Annotated[Path, typer.Option(help="CSV to write: voltage_v, lower_v, upper_v.")],
@@ -51,8 +54,7 @@ def predict(
         bool, typer.Option("--measured", help="Use the measured voltage: one step ahead, not free run.")
     ] = False,
     soc0: options.Soc0 = None,
-    column: options.Columns = None,
-    sign: options.Sign = "discharge-positive",
+    hold: options.HoldOption = None,
 ) -> None:
     """A saved hybrid model with its intervals."""
     from aesi.pipeline.simulation import predict_file
@@ -63,30 +65,36 @@ def predict(
         out,
         measured=measured,
         soc0=soc0,
-        columns=options.columns(column),
-        sign=sign,
+        hold=hold,
+        reading=reading,
         say_notes=options.say_notes,
     )
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
 
 
+@options.reads_files
 def calibrate(
-    cell: options.Cell,
+    *,
+    reading: Any,
+    cell: options.CellOption,
     data: Annotated[list[Path], typer.Option("--data", help="Measurement to fit; may be given again.")],
     out: Annotated[Path, typer.Option(help="BPX file to write; a report is written beside it.")],
     soc0: options.Soc0 = None,
     seed: Annotated[int, typer.Option(min=0)] = 0,
-    column: options.Columns = None,
-    sign: options.Sign = "discharge-positive",
+    hold: options.HoldOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements."""
+    options.say_reading(data)
     from flows.jobs.calibration import calibrate as flow
 
-    flow(cell, options.measurements(data, column, sign), out, soc0=soc0, seed=seed)
+    flow(cell, options.measurements(data, reading, hold), out, soc0=soc0, seed=seed)
 
 
+@options.reads_files
 def discover(
+    *,
+    reading: Any,
     experiment: Annotated[
         Path | None, typer.Argument(help="An experiment file instead of --cell and --data.")
     ] = None,
@@ -109,34 +117,35 @@ def discover(
     max_effects: Annotated[int, typer.Option(min=0, max=10)] = 3,
     seed: Annotated[int, typer.Option(min=0)] = 0,
     effect_file: options.EffectFiles = None,
-    column: options.Columns = None,
-    sign: options.Sign = "discharge-positive",
+    hold: options.HoldOption = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="key=value laid over the experiment file.")
     ] = None,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
-    from flows.jobs.discovery import discover as flow
-    from flows.jobs.discovery import discover_experiment
-
     if experiment is not None:
+        options.say_reading([experiment])
+        from flows.jobs.discovery import discover_experiment
+
         discover_experiment(str(experiment), list(overrides or []), out)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
+    options.say_reading([*data, *(test or [])])
     from aesi.pipeline.discovery.cases import case_of_files
+    from flows.jobs.discovery import discover as flow
 
     case = case_of_files(
         cell,
         data,
         test or [],
-        options.columns(column),
-        sign,
+        reading,
         soc0,
         holdout,
         max_effects,
         seed,
         effect_file or [],
+        hold,
     )
     options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
     flow(case, out)

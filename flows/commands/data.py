@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
 import typer
 
-from flows.commands import complete
+from flows.commands import complete, options
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -35,3 +35,27 @@ def get(
     from aesi.data import catalogue
 
     typer.echo(str(catalogue.get(name, out)))
+
+
+@app.command("convert")
+@options.reads_files
+def convert(
+    file: Annotated[Path, typer.Argument(help="A cycler's export or own file, CSV, Excel, Parquet or BDF.")],
+    *,
+    reading: Any,
+    out: Annotated[Path, typer.Option(help="CSV to write.")],
+    to: Annotated[
+        Literal["aesi", "bdf"],
+        typer.Option(
+            help="This project's columns (current positive on discharge), or BDF (positive on charge)."
+        ),
+    ] = "aesi",
+) -> None:
+    """Write a measurement as CSV in SI units, and say what was done to it."""
+    from aesi.data.convert import convert_file, summary
+
+    record = convert_file(file, out, reading, to)
+    options.say_notes(record.notes)
+    for line in summary(record):
+        typer.echo(line, err=True)
+    typer.echo(str(out))

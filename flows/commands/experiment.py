@@ -75,6 +75,37 @@ def tables(
     typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
 
 
+def compare(
+    runs: Annotated[
+        list[str],
+        typer.Argument(help="Tracked runs (the beginning of their ids), or experiments for all of theirs."),
+    ],
+    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("compare.html"),
+    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+) -> None:
+    """Tracked runs side by side on one offline page: what differed, what came of it, where the error is."""
+    from flows.results.compare import compare as write
+
+    shown = write(runs, out, uri)
+    typer.echo(f"{out}: {len(shown)} runs", err=True)
+
+
+def candidate(
+    run_id: Annotated[str, typer.Argument(help="A tracked candidate, or a run for the one that it chose.")],
+    out: Annotated[Path, typer.Option(help="Folder for model/ and candidate.json.")],
+    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+) -> None:
+    """A candidate of a search made again from the tracking store alone, with its model."""
+    from flows.base.console import Console
+    from flows.results.candidate import Differs, rebuild, said, save
+
+    rebuilt = rebuild(run_id, uri)
+    save(rebuilt, out)
+    Console().say(said(rebuilt, out))
+    if rebuilt.differing:
+        raise Differs(rebuilt)
+
+
 def ui(
     port: Annotated[int, typer.Option(min=1, max=65535)] = 5000,
     host: Annotated[str, typer.Option(help="Loopback unless you say otherwise.")] = "127.0.0.1",

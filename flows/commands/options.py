@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import inspect
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from aesi.errors import InputError
 
 if TYPE_CHECKING:
-    from aesi.records import Measurement
+    from aesi.data.reading import Reading
+    from aesi.records import Hold, Measurement
 
-Cell = Annotated[Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")]
-Columns = Annotated[
-    list[str] | None,
-    typer.Option("--column", help='quantity=name, for other headers: current_a="I[A]".'),
-]
-Sign = Annotated[
-    Literal["discharge-positive", "charge-positive"],
-    typer.Option("--sign", help="Which direction of the current is positive."),
+CellOption = Annotated[
+    Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
 ]
 Soc0 = Annotated[
     float | None, typer.Option("--soc0", min=0.0, max=1.0, help="State of charge at the first row.")
@@ -31,36 +27,127 @@ Effects = Annotated[
 EffectFiles = Annotated[
     list[Path] | None, typer.Option("--effect-file", help="A Python file of yours with an EFFECT in it.")
 ]
-Hold = Annotated[
-    Literal["linear", "backward"], typer.Option("--hold", help="How the current runs between rows.")
+HoldOption = Annotated[
+    Literal["linear", "backward"] | None,
+    typer.Option(
+        "--hold",
+        help="How the current runs between rows: straight, or as loggers write, constant since the row before. "
+        "Without it: backward where rows come more than 5 s apart; what was taken is said.",
+    ),
 ]
 
-Model = Annotated[
+ModelOption = Annotated[
     Literal["espm", "dfn"],
     typer.Option(
         "--model", help="Single particle with electrolyte, or porous electrode (Doyle-Fuller-Newman)."
     ),
 ]
 
+_LIST = list[str] | None
+READING: dict[str, Any] = {
+    "column": Annotated[
+        _LIST,
+        typer.Option(
+            "--column",
+            help='quantity=name, for other headers: current_a="I[A]"; also cycle=, step=; '
+            "temperature_degc= leaves it out.",
+        ),
+    ],
+    "unit": Annotated[
+        _LIST,
+        typer.Option(
+            "--unit",
+            help="quantity=unit where a column is not in s, A, V, degC: current_a=mA, time_s=h:m:s or =date.",
+        ),
+    ],
+    "sign": Annotated[
+        Literal["discharge-positive", "charge-positive"] | None,
+        typer.Option(
+            "--sign",
+            help="Which direction of the current is positive; without it as the export has it, or discharge.",
+        ),
+    ],
+    "state": Annotated[
+        str | None,
+        typer.Option("--state", help="Column that says which way a current without a sign flows."),
+    ],
+    "state_word": Annotated[
+        _LIST,
+        typer.Option("--state-word", help="WORD=charge, discharge or rest, for a word of that column."),
+    ],
+    "cycle": Annotated[str | None, typer.Option("--cycle", help="Rows of this cycle alone: 3, or 3:5.")],
+    "step": Annotated[str | None, typer.Option("--step", help="Rows of this step alone: 7, or 7:9.")],
+    "from_s": Annotated[float | None, typer.Option("--from-s", help="Rows from this time on.")],
+    "to_s": Annotated[float | None, typer.Option("--to-s", help="Rows up to this time.")],
+    "duplicates": Annotated[
+        Literal["refuse", "first", "last"] | None,
+        typer.Option("--duplicates", help="Which row of several with one stamp to keep."),
+    ],
+}
+"""What can be said of files, in every command that reads them."""
 
-def columns(pairs: list[str] | None) -> dict[str, str | None]:
-    """`quantity=name` pairs as a mapping; an empty name leaves the quantity out."""
-    mapping: dict[str, str | None] = {}
+
+def reads_files(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options that say how its files are read, handed to it as `reading`."""
+    signature = inspect.signature(command, eval_str=True)
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    own = [p.replace(kind=keyword) for p in signature.parameters.values() if p.name != "reading"]
+    added = [
+        inspect.Parameter(name, keyword, default=None, annotation=option) for name, option in READING.items()
+    ]
+
+    def reading_command(**given: Any) -> None:
+        said = {name: given.pop(name) for name in READING}
+        command(**given, reading=_reading(**said))
+
+    reading_command.__name__, reading_command.__doc__ = command.__name__, command.__doc__
+    parameters = [*own, *added]
+    reading_command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    reading_command.__annotations__ = {p.name: p.annotation for p in parameters}
+    return reading_command
+
+
+def _reading(
+    column: list[str] | None,
+    unit: list[str] | None,
+    sign: Any,
+    state: str | None,
+    state_word: list[str] | None,
+    cycle: str | None,
+    step: str | None,
+    from_s: float | None,
+    to_s: float | None,
+    duplicates: Any,
+) -> Reading:
+    from aesi.data.reading import Reading
+
+    columns: dict[str, str | None] = {key: value or None for key, value in _pairs("--column", column).items()}
+    if state is not None:
+        columns["state"] = state
+    words: dict[str, Any] = _pairs("--state-word", state_word)
+    return Reading(columns, _pairs("--unit", unit), sign, words, cycle, step, from_s, to_s, duplicates)
+
+
+def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
+    mapping: dict[str, str] = {}
     for pair in pairs or []:
-        quantity, equals, name = pair.partition("=")
+        name, equals, value = pair.partition("=")
         if not equals:
-            raise InputError(f"--column {pair}: has to read quantity=name.")
-        mapping[quantity.strip()] = name or None
+            raise InputError(f"{option} {pair}: has to read name=value.")
+        mapping[name.strip()] = value
     return mapping
 
 
-def measurements(
-    paths: list[Path], pairs: list[str] | None, sign: Literal["discharge-positive", "charge-positive"]
-) -> tuple[Measurement, ...]:
-    """The files as measurements."""
-    from aesi.data import read_measurement
+def measurements(paths: list[Path], reading: Reading, hold: Hold | None = None) -> tuple[Measurement, ...]:
+    """The files as measurements, with how the current was declared to run between their rows."""
+    from aesi.data.read import read
 
-    return tuple(read_measurement(path, columns=columns(pairs), sign=sign) for path in paths)
+    return tuple(read(path, reading).held(hold) for path in paths)
+
+
+def say_reading(paths: Iterable[Path]) -> None:
+    """The first line of a long command, before the libraries load."""
+    typer.echo(f"Reading {', '.join(path.name for path in paths)} ...", err=True)
 
 
 def say_notes(notes: Iterable[str]) -> None:

@@ -11,7 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, catalogue, run_case, write_discovery
+from aesi.physics.effects import known_effects
+from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, run_case, write_discovery
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
 from flows.base import environment
@@ -36,7 +37,7 @@ def discover(
     """
     environment.prepare()
     declared_model(case.cell)
-    catalogue(case.effect_files)
+    known_effects(case.effect_files)
     if use_prefect or (use_prefect is None and os.environ.get("PREFECT_API_URL")):
         return _as_flow(case, out, experiment)
     from flows.jobs.stages import plainly
@@ -84,11 +85,13 @@ def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) ->
     if (out / ARCHIVE).exists():
         console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
     tracker = _tracker(case, experiment, console)
-    follow = Follow(tracker, console, len(catalogue(case.effect_files)))
+    follow = Follow(tracker, console)
     try:
         found = run("hypotheses", lambda: run_case(case, out, follow))
         content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
     except BaseException as error:
+        if isinstance(error, KeyboardInterrupt):
+            console.say(f"Stopped. What was fitted is kept in {out}; the same command goes on from there.")
         if tracker is not None:
             tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise
@@ -100,15 +103,15 @@ def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) ->
 class Follow:
     """Shows and tracks each hypothesis as it is judged."""
 
-    def __init__(self, tracker: Tracker | None, console: Console, total: int) -> None:
-        self._tracker, self._console, self._total = tracker, console, total
+    def __init__(self, tracker: Tracker | None, console: Console) -> None:
+        self._tracker, self._console = tracker, console
         self._started, self._done = time.monotonic(), 0
 
     def __call__(self, name: str, scored: Scored, admission: Admission | None) -> None:
         """One hypothesis: its evidence, its error and its parameters."""
         self._done += 1
-        total = max(self._total, self._done + 1)
-        self._console.progress("hypotheses", self._done, total, self._started, name)
+        # How many there will be is not known: each is judged by what the ones before it left.
+        self._console.count("hypotheses", self._done, self._started, name)
         if self._tracker is None:
             return
         values = scored.fit.values

@@ -19,11 +19,11 @@ from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import working_on
 
 if TYPE_CHECKING:
-    from flows.jobs.stages import Run
+    from flows.jobs.stages import RunStage
     from flows.tracking.tracker import Tracker
 
 
-def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
+def run_experiment(request: RunRequest, run: RunStage, console: Console) -> Path:
     """The flow itself; `run` runs a stage."""
     from flows.tracking.store import Store
 
@@ -42,10 +42,11 @@ def run_experiment(request: RunRequest, run: Run, console: Console) -> Path:
 def _stages(
     request: RunRequest,
     tracker: Tracker,
-    run: Run,
+    run: RunStage,
     console: Console,
     started: float,
 ) -> Path:
+    from aesi.pipeline.experiment.comparison import comparison
     from aesi.pipeline.experiment.conformalise import conformalise
     from aesi.pipeline.experiment.evaluate import evaluate
     from aesi.pipeline.experiment.fit import build_problem, final_models
@@ -61,7 +62,8 @@ def _stages(
     config = loaded.config  # that of the fallback where it fell back to one
     for note in together(loaded.notes):
         console.say(f"  {note}")
-    track_start(tracker, config, loaded)
+    folder = environment.workspace() / "runs" / config.name / tracker.run_id
+    track_start(tracker, config, loaded, folder)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
     follow = CandidateTracker(tracker, config, loaded, problem)
     found = run("search", lambda: run_study(problem, config, console, request.use_cache, follow))
@@ -74,7 +76,6 @@ def _stages(
     fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config, loaded.left_out))
     validation = validation_mser(loaded, problem, found.candidates())
     evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split, validation))
-    folder = environment.workspace() / "runs" / config.name / tracker.run_id
     seconds = time.monotonic() - started
     rows = found.rows()
     result = Result(
@@ -90,7 +91,8 @@ def _stages(
         failed=len(found.result.trials) - len(rows),
     )
     summary = run("report", lambda: write_outputs(folder, result))
-    track_result(tracker, folder, summary, found.number)
+    tracker.json("comparison.json", comparison(result))
+    track_result(tracker, folder, summary, found.number, fitted)
     return folder
 
 

@@ -26,13 +26,13 @@ class ServerAway(AesiError):
     """The Prefect server that is configured does not answer."""
 
 
-class Run(Protocol):
+class RunStage(Protocol):
     """Runs one stage: its name, a function of nothing, and how often it may be tried again."""
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T: ...
 
 
-def plainly(say: Say, timeout_s: float | None = None) -> Run:
+def plainly(say: Say, timeout_s: float | None = None) -> RunStage:
     """Stages as function calls. Raises StageOverdue where one takes longer than `timeout_s`."""
 
     def run(name: str, work: Callable[[], T], retries: int = 0) -> T:
@@ -45,7 +45,7 @@ def plainly(say: Say, timeout_s: float | None = None) -> Run:
     return run
 
 
-def as_tasks(say: Say, timeout_s: float | None = None) -> Run:
+def as_tasks(say: Say, timeout_s: float | None = None) -> RunStage:
     """Stages as Prefect tasks, seen in its UI where a server is configured.
 
     They close over what they need instead of taking it as parameters, because Prefect would walk through

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
@@ -26,16 +27,19 @@ def start(
 ) -> Path:
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
     environment.prepare()
+    console = Console()
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache)
     config = request.config()  # bad input is refused before anything is started
+    console.say(f"{config.name}: loading the libraries ...")  # at once: on a busy machine they take long
     if use_prefect:
+        if not os.environ.get("PREFECT_API_URL"):
+            console.say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
         try:
             return _under_prefect(request)
         except RuntimeError as error:
             if NO_SERVER not in str(error):
                 raise
-            Console().say("Prefect's temporary server did not start in time; the stages run without it.")
-    console = Console()
+            console.say("Prefect's temporary server did not start in time; the stages run without it.")
     return run_experiment(request, plainly(console.say, config.runner.stage_timeout_s), console)
 
 

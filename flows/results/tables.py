@@ -125,14 +125,7 @@ def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:
 
 
 def _summary(store: Store, run_id: str) -> dict[str, Any]:
-    from mlflow.exceptions import MlflowException
-
-    try:
-        path = store.client.download_artifacts(run_id, "summary.json")
-        content = Path(path).read_text(encoding="utf-8")
-        return dict(json.loads(content))
-    except (OSError, ValueError, MlflowException) as error:
-        raise InputError(f"run {run_id} carries no readable summary.json ({error}).") from None
+    return dict(json.loads(store.read(run_id, "summary.json").read_text(encoding="utf-8")))
 
 
 def _copy_figures(store: Store, run_id: str, folder: Path) -> None:

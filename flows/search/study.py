@@ -40,9 +40,7 @@ class Found:
 
     def candidates(self) -> tuple[Candidate, ...]:
         """All that came to something."""
-        return tuple(
-            one.candidate for one in self.scored.values() if not isinstance(one, Failed)
-        )
+        return tuple(one.candidate for one in self.scored.values() if not isinstance(one, Failed))
 
     def rows(self) -> list[dict[str, Any]]:
         """The candidates that were evaluated, as the report draws them."""

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import log10
 from pathlib import Path
 from typing import Any
 
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ROLES, Failed
-from aesi.sparse import Genome, Problem, SparseModel
+from aesi.sparse import Candidate, Genome, Problem, SparseModel
+from flows.base import codec
+from flows.base.files import write_atomically
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
 
 MILLIVOLT_PER_VOLT = 1e3
+INPUTS, RECORDS, DECLARED = "inputs", "records.bin", "declared"
+"""What a candidate is made from: the error series by role, and the declared cell with its effects."""
 HEADLINES = ("free_run", "one_step", "intervals")
 """What MLflow's charts show first: it draws a section a prefix, in the order of the alphabet."""
 WITH_UNIT = {
@@ -27,7 +33,7 @@ WITH_UNIT = {
 """Names for sections whose entries are horizons."""
 
 
-def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded) -> None:
+def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
     """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
     content = loaded.config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
     tags = {"mlflow.note.content": config.note, "aesi.setting": loaded.setting}
@@ -35,6 +41,11 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded) -> N
         tags["aesi.fallback"] = loaded.fallback
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
     tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
+    write_atomically(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
+    HybridModel(loaded.cell, loaded.effects, soc0=next(iter(loaded.soc0.values()), None)).save(
+        folder / INPUTS / DECLARED
+    )
+    tracker.files(folder / INPUTS, INPUTS)
     tracker.datasets(
         [
             {
@@ -75,6 +86,7 @@ class CandidateTracker:
             "p_c": genome.p_c,
             "d": genome.d,
             "feedback": genome.feedback,
+            "terms": genome.terms,  # with the genes above, all that `flows.results.candidate` needs
             "library_terms": int(genome.active(self._problem.library).sum()),
             "library_hash": genome.digest(self._problem.library),
             **self._shared,
@@ -85,13 +97,18 @@ class CandidateTracker:
             kind="candidate",
             params=params,
             metrics={} if isinstance(outcome, Failed) else _metrics(outcome),
-            files={} if isinstance(outcome, Failed) else {"coefficients.json": coefficients(outcome)},
+            files={}
+            if isinstance(outcome, Failed)
+            else {"coefficients.json": coefficients(outcome.candidate)},
             failed=outcome.reason if isinstance(outcome, Failed) else None,
+            tags={} if isinstance(outcome, Failed) or not outcome.note else {"aesi.intervals": outcome.note},
             seconds=0.0 if isinstance(outcome, Failed) else outcome.seconds,
         )
 
 
-def track_result(tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int) -> None:
+def track_result(
+    tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int, fitted: Sequence[Fitted]
+) -> None:
     """The models, the tables, the report and the chosen model; `number` is the candidate's they come from."""
     chosen = summary["chosen"]
     for row in summary["models"]:
@@ -102,14 +119,17 @@ def track_result(tracker: Tracker, folder: Path, summary: Mapping[str, Any], num
     tracker.parameters({"chosen_candidate": number, "chosen_model": chosen})
     for name in ("summary.json", "report.html", "tables.md", "tables.tex"):
         tracker.files(folder / name)
+    for one in fitted:
+        if one.trials:
+            tracker.json(f"search of {one.model.name}.json", [dict(row) for row in one.trials])
     if (folder / "figures").is_dir():
         tracker.files(folder / "figures", "figures")
     tracker.model(folder / "model")
 
 
-def coefficients(scored: ScoredCandidate) -> dict[str, dict[str, float]]:
+def coefficients(candidate: Candidate) -> dict[str, dict[str, float]]:
     """term -> coefficient for both ensembles, and term -> inclusion probability."""
-    bagging, stability = scored.candidate.bagging, scored.candidate.stability
+    bagging, stability = candidate.bagging, candidate.stability
     return {
         "bagging": bagging.coefficient_table(),
         "stability": stability.coefficient_table(),
@@ -117,19 +137,28 @@ def coefficients(scored: ScoredCandidate) -> dict[str, dict[str, float]]:
     }
 
 
-def _metrics(scored: ScoredCandidate) -> dict[str, Any]:
-    candidate = scored.candidate
+def candidate_metrics(candidate: Candidate) -> dict[str, float]:
+    """What a candidate is judged by, without its intervals."""
     return {
         "loss/oob": candidate.loss_oob,
         "loss/valid": candidate.loss_valid,
+        "loss/valid_aesi_i": candidate.valid_losses[0],
+        "loss/valid_aesi_ii": candidate.valid_losses[1],
         "loss/sparse": candidate.loss_sparse,
         "fitness": candidate.fitness,
         "pearson/train": candidate.pearson_train,
         "pearson/valid": candidate.pearson_valid,
         "free_run/valid_mser_pct": candidate.free_run_valid_mser_pct,
         "one_step/valid_rmse_mv": MILLIVOLT_PER_VOLT * candidate.one_step_valid_rmse_v,
+    }
+
+
+def _metrics(scored: ScoredCandidate) -> dict[str, Any]:
+    return candidate_metrics(scored.candidate) | {
         "intervals/valid_coverage_pct": scored.coverage_pct,
         "intervals/valid_width_v": scored.width_v,
+        "intervals/valid_coverage_pct_aesi_ii": scored.stable_coverage_pct,
+        "intervals/valid_width_v_aesi_ii": scored.stable_width_v,
     }
 
 

@@ -13,7 +13,9 @@ from flows.tracking.store import Store
 
 
 def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = FLUSH_S) -> None:
-    """Deliver what ended runs could not, where no living run does."""
+    """Deliver what ended runs could not, where no living run does; say what was found when the store was opened."""
+    for note in store.notes:
+        say(note)
     for folder in sorted((environment.state() / "outbox").glob("*")):
         if not any(folder.glob("[0-9]*.json")) or not _belongs(store, folder.name):
             continue

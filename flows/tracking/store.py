@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import sqlite3
 import time
 import urllib.error
 import urllib.request
@@ -19,8 +20,9 @@ from typing import Any
 
 from filelock import FileLock
 
-from aesi.errors import AesiError
+from aesi.errors import AesiError, InputError
 from flows.base import environment
+from flows.tracking.relocation import artifact_folder, follow
 
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
@@ -40,7 +42,7 @@ def default_uri() -> str:
 
 
 class Store:
-    """One tracking store.
+    """One tracking store. `notes` : what was found when it was opened, one sentence each.
 
     Raises StoreAway where it does not answer, with what to do.
     """
@@ -50,11 +52,12 @@ class Store:
         logging.getLogger("mlflow.store.db.utils").setLevel(logging.CRITICAL)
         self.uri = uri or default_uri()
         self._local = self.uri.startswith("sqlite:///")
+        self.notes: tuple[str, ...] = ()
         if self.uri.startswith(("http://", "https://")):
             _reach(self.uri)
         with _alone(self._local):
             if self._local:
-                _write_ahead(Path(self.uri.removeprefix("sqlite:///")))
+                self.notes = _opened(self._database, self.uri)
             try:
                 from mlflow import MlflowClient
 
@@ -71,8 +74,48 @@ class Store:
                 if found.lifecycle_stage == "deleted":
                     self.client.restore_experiment(found.experiment_id)
                 return str(found.experiment_id)
-            folder = environment.workspace() / "mlartifacts" / name
-            return str(self.client.create_experiment(name, folder.as_uri() if self._local else None))
+            place = artifact_folder(self._database, name).as_uri() if self._local else None
+            return str(self.client.create_experiment(name, place))
+
+    @property
+    def _database(self) -> Path:
+        return Path(self.uri.removeprefix("sqlite:///")).expanduser().resolve()
+
+    def run(self, run_id: str) -> Any:
+        """A run by its whole id. Raises InputError where there is none."""
+        from mlflow.exceptions import MlflowException
+
+        try:
+            return self.client.get_run(run_id)
+        except MlflowException:
+            raise InputError(
+                f"no run {run_id!r} is tracked in {_without_password(self.uri)}; give a whole run id."
+            ) from None
+
+    def artifact(self, run: Any, name: str) -> Path | None:
+        """A file among the artifacts of a run, or None where there is none; of a local store without asking it."""
+        from mlflow.utils.file_utils import local_file_uri_to_path
+
+        if not str(run.info.artifact_uri).startswith("file:"):
+            try:
+                return self.read(run.info.run_id, name)
+            except InputError:
+                return None
+        path = Path(local_file_uri_to_path(run.info.artifact_uri)) / name
+        return path if path.is_file() else None
+
+    def read(self, run_id: str, name: str) -> Path:
+        """An artifact of a run, a file or a folder, as it lies on disk or is fetched from a server.
+
+        Raises InputError where the run carries none of that name.
+        """
+        from mlflow.exceptions import MlflowException
+
+        try:
+            return Path(self.client.download_artifacts(run_id, name))
+        except (OSError, ValueError, MlflowException) as error:
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+            raise InputError(f"run {run_id} carries no readable {name} ({reason}).") from None
 
     def find_experiment(self, name: str) -> str | None:
         """Id of the experiment of that name, or None."""
@@ -131,10 +174,17 @@ def _alone(local: bool) -> Iterator[None]:
         yield
 
 
+def _opened(database: Path, uri: str) -> tuple[str, ...]:
+    """Ready a database for several readers, and let the artifacts that were moved with it be found."""
+    try:
+        _write_ahead(database)
+        return follow(database)
+    except sqlite3.Error as error:
+        raise _unusable(uri, error) from None
+
+
 def _write_ahead(database: Path) -> None:
     """With a write-ahead log readers (the UI, another run) never block the writer; the mode stays."""
-    import sqlite3
-
     database.parent.mkdir(parents=True, exist_ok=True)
     connection = sqlite3.connect(database, timeout=30)
     try:

@@ -111,13 +111,14 @@ class Tracker:
         files: Mapping[str, Any] | None = None,
         failed: str | None = None,
         seconds: float = 0.0,
+        tags: Mapping[str, str] | None = None,
     ) -> None:
         """A nested run with JSON files; one that is tracked already (in a resumed run) is not tracked again."""
         if label in self._tracked:
             return
         self._tracked.add(label)
         end = now_ms()
-        tags = {KIND: kind} | ({"aesi.failed": failed[:5000]} if failed else {})
+        noted = {KIND: kind, **(tags or {})} | ({"aesi.failed": failed[:5000]} if failed else {})
         self._outbox.put(
             {
                 "kind": "run",
@@ -125,7 +126,7 @@ class Tracker:
                 "parent": self.run_id,
                 "label": label,
                 "name": name,
-                "tags": tags,
+                "tags": noted,
                 "params": _texts(params),
                 "metrics": _numbers(metrics),
                 "files": {name: json.dumps(content) for name, content in (files or {}).items()},

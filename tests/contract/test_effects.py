@@ -66,7 +66,7 @@ def test_it_says_what_it_is(effect):
     assert "Holds" in effect.validity
     assert "Leaves out" in effect.validity
     assert len(effect.source) > 10
-    page = describe(effect.id)
+    page = describe(effect)
     assert effect.equation in page
     assert all(name in page for name in effect.parameters)
 

@@ -76,6 +76,24 @@ def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
     assert "| scale | dask, 9, 3, 2 | ratio_by_processor | 1.9 (2026-01-01) → 1.8 (2026-02-01) |" in page
 
 
+def test_runs_of_one_benchmark_stand_side_by_side_with_their_intervals(tmp_path, monkeypatch):
+    generate = hook("generate")
+    (tmp_path / "docs").mkdir()
+    monkeypatch.setattr(generate, "ROOT", tmp_path)
+    assert "No run has been recorded" in generate.columns_of("blind")
+    line = {"bench": "blind", "strict": True, "summary": True, "cases": 15, "seed": 3}
+    rate = {"effect_exact_pct": 50.0, "effect_exact_95_pct": [18.7, 81.3], "effect_exact_cases": 10}
+    entry = {"machine": "a machine", "date": "2026-01-01", "load": 0.5}
+    entries = [
+        {**entry, "commit": "0123456789", "lines": [{**line, **rate, "label": "before"}]},
+        {**entry, "commit": "abcdef0123", "lines": [{**line, "label": "after"}]},
+    ]
+    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": entries}))
+    page = generate.columns_of("blind")
+    assert "| | before, seed 3, commit `0123456` | after, seed 3, commit `abcdef0` |" in page
+    assert "| effects named exactly | 50 % [19, 81] of 10 | – |" in page
+
+
 def test_formulas_become_mathml_and_code_is_left_alone():
     change = hook("formulas").on_page_markdown
     assert "<math" in change("an $x_1$ here")

@@ -40,6 +40,9 @@ class Calibrated:
     marginal_v: tuple[float, float]
     floor_v: float
 
+    def __repr__(self) -> str:
+        return f"Calibrated({self.method}, {100 * (1 - self.alpha):.0f} %, window {self.window})"
+
     @property
     def needs_current(self) -> bool:
         """Whether it was calibrated with the current, and so must be used with it."""

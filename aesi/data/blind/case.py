@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
-from aesi.data.laboratory.simulator import Model
+from aesi.data.laboratory.simulator import LaboratoryModel
 from aesi.records import Measurement
 
 RecordKind = Literal["slow", "pulses", "drive", "fast_charge"]
@@ -32,7 +32,7 @@ class CaseSpec:
     cell: str
     recipes: tuple[str, ...] = ()
     target_mv: float = 5.0
-    model: Model = "SPMe"
+    model: LaboratoryModel = "SPMe"
     records: tuple[RecordKind, ...] = ("drive",)
     rate: float = 1.0
     spread: bool = False

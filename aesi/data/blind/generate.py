@@ -16,7 +16,7 @@ from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Model, Setup, TrueRun, run
+from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, run
 from aesi.data.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError
@@ -53,7 +53,7 @@ class _Bench:
     def run(
         self,
         applied: tuple[Applied, ...] = (),
-        model: Model | None = None,
+        model: LaboratoryModel | None = None,
         radial_points: int | None = None,
         profiles: Sequence[Profile] | None = None,
     ) -> list[TrueRun]:
@@ -62,7 +62,10 @@ class _Bench:
         return [run(setup, profile) for profile in profiles or self.profiles]
 
     def unexplained(
-        self, written: Sequence[Written], model: Model | None = None, radial_points: int | None = None
+        self,
+        written: Sequence[Written],
+        model: LaboratoryModel | None = None,
+        radial_points: int | None = None,
     ) -> Array:
         """(rows of all records,) V: what was written less what the cell without effects does under that current."""
         believed = [

@@ -17,7 +17,7 @@ from aesi.data.blind.case import CaseSpec, RecordKind, Warmth
 from aesi.data.blind.cells import CELLS
 from aesi.data.blind.recipes import RECIPES
 from aesi.data.blind.strangers import STRANGERS
-from aesi.data.laboratory.simulator import Model
+from aesi.data.laboratory.simulator import LaboratoryModel
 
 FULL = 360
 """Cases of the full set: 120 lack nothing, 144 have one effect, 48 two, 12 three, 36 are strangers."""
@@ -25,7 +25,7 @@ BLOCK = ("none",) * 5 + ("single",) * 6 + ("pair",) * 2 + ("stranger",)
 LAST_OF_BLOCK = ("triple", "stranger")
 TARGETS_MV = (1.5, 3.0, 6.0, 12.0)
 """RMS, from just above the noise of 1 mV up."""
-MODELS: tuple[Model, ...] = ("DFN", "SPMe")
+MODELS: tuple[LaboratoryModel, ...] = ("DFN", "SPMe")
 RECORDS: tuple[tuple[RecordKind, ...], ...] = (
     ("drive",),
     ("slow", "drive"),

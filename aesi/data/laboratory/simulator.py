@@ -24,7 +24,7 @@ from aesi.data.profile import Profile
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 
-Model = Literal["SPMe", "DFN"]
+LaboratoryModel = Literal["SPMe", "DFN"]
 VERSION = 4
 """Raised with every change to this room that changes a voltage, so that old cache entries are not met."""
 
@@ -35,7 +35,7 @@ MOST_STEPS = 40_000
 CHARGE_TOLERANCE = 6e-4
 """Of the nominal capacity. The solver's own error has been seen at 3.8e-4 over 8,820 s at 10 Hz; a pulse of 2 s at
 2C that is stepped over makes 1.1e-3."""
-MESH: dict[Model, dict[str, int]] = {
+MESH: dict[LaboratoryModel, dict[str, int]] = {
     "SPMe": {"x_n": 20, "x_s": 20, "x_p": 20, "r_n": 60, "r_p": 60, "R_n": 12, "R_p": 12},
     "DFN": {"x_n": 20, "x_s": 12, "x_p": 20, "r_n": 40, "r_p": 40, "R_n": 12, "R_p": 12},
 }
@@ -47,7 +47,7 @@ RMS under US06 at 10 Hz, in 58 instead of 134 s of processor time."""
 STRETCH = 2.3
 """Of the radial mesh towards the surface. Against 240 even points on the LG M50 under US06, 60 even ones err by
 0.35 mV RMS, 60 of these by 0.006 mV."""
-TOLERANCE: dict[Model, float] = {"SPMe": 1e-6, "DFN": 1e-5}
+TOLERANCE: dict[LaboratoryModel, float] = {"SPMe": 1e-6, "DFN": 1e-5}
 COARSE_TOLERANCE = 1e-5
 """With radial points of one's own choice, for runs whose differences count."""
 
@@ -76,7 +76,7 @@ class Setup:
     """A cell file, a model, and what is changed in both."""
 
     bpx: Path
-    model: Model = "DFN"
+    model: LaboratoryModel = "DFN"
     applied: tuple[Applied, ...] = ()
     radial_points: int | None = None
 

@@ -1,7 +1,11 @@
-"""One reader a format; the only modules of the data room that open measurement files."""
+"""One reader a kind of file; the only modules of the data room that open measurement files.
+
+A cycler's text export needs no reader of its own: its names, units and sign are one file of `formats`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 
 from aesi.data.readers.table import TableFile
@@ -9,35 +13,43 @@ from aesi.errors import DataError
 
 GZIP_MAGIC = b"\x1f\x8b"
 PARQUET_MAGIC = b"PAR1"
-OFFICE_MAGIC = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # .xlsx and .xls
-CYCLER_SUFFIXES = (".mpt", ".nda", ".ndax")
+XLSX_MAGIC = b"PK\x03\x04"
+XLS_MAGIC = b"\xd0\xcf\x11\xe0"
 MATLAB_MAGIC = (b"MATLAB", b"\x89HDF")
 
 
-def open_table(path: str | Path) -> TableFile:
+def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
     """The reader for a file: cyclers' own by their suffix, all others by their first bytes.
 
-    Raises DataError where there is no such file, it is empty, or it is no text table and no Parquet file.
+    wanted : names of columns that the user gave; they tell where a table begins below other lines.
+    Raises DataError where there is no such file, it is empty, or no reader takes it.
     """
     file = Path(path)
     magic = _first_bytes(file)
-    if file.suffix.lower() in CYCLER_SUFFIXES:
-        from aesi.data.readers.cycler import CyclerTable
+    suffix = file.suffix.lower()
+    if suffix == ".mpr":
+        from aesi.data.readers.biologic_mpr import open_mpr
 
-        return CyclerTable(file)
+        return open_mpr(file)
+    if suffix in (".nda", ".ndax"):
+        from aesi.data.readers.neware_nda import open_nda
+
+        return open_nda(file)
     if magic.startswith(PARQUET_MAGIC):
         from aesi.data.readers.parquet import ParquetTable
 
         return ParquetTable(file)
-    if magic.startswith(OFFICE_MAGIC):
-        raise DataError(
-            f"{file.name} is a spreadsheet or an archive; save the sheet as CSV and give that file."
-        )
+    if magic.startswith(XLSX_MAGIC):
+        from aesi.data.readers.spreadsheet import open_sheet
+
+        return open_sheet(file, wanted)
+    if magic.startswith(XLS_MAGIC):
+        raise DataError(f"{file.name} is an old Excel workbook (.xls); save it as .xlsx or CSV.")
     if magic.startswith(MATLAB_MAGIC):
         raise DataError(f"{file.name} is a MATLAB or HDF5 file; export time, current and voltage as CSV.")
     from aesi.data.readers.text import TextTable
 
-    return TextTable(file, compressed=magic.startswith(GZIP_MAGIC))
+    return TextTable(file, compressed=magic.startswith(GZIP_MAGIC), wanted=wanted)
 
 
 def _first_bytes(file: Path) -> bytes:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.data.readers.formats import recognise
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
@@ -20,9 +21,11 @@ class ParquetTable:
 
         self.path = path
         self.notes: tuple[str, ...] = ()
+        self.units: tuple[str, ...] = ()
         try:
             self._file = pq.ParquetFile(path)
             self.header = tuple(self._file.schema_arrow.names)
+            self.format = recognise(self.header)
         except (pa.ArrowException, OSError, ValueError) as error:
             raise DataError(f"{path.name} is damaged or no Parquet file: {_brief(error)}") from None
 
@@ -43,6 +46,12 @@ class ParquetTable:
             return [_floats(table.column(name)) for name in names]
         except (pa.ArrowException, OSError, ValueError) as error:
             raise DataError(f"{self.path.name} is damaged: {_brief(error)}") from None
+
+    def read_text(self, positions: tuple[int, ...]) -> list[list[str]]:
+        """The columns at the given positions as words; null becomes ''."""
+        names = [self.header[position] for position in positions]
+        table = self._file.read(columns=names)
+        return [["" if v is None else str(v) for v in table.column(name).to_pylist()] for name in names]
 
     def where(self, row: int) -> str:
         """Parquet has rows, no lines."""

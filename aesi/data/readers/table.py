@@ -5,15 +5,22 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
+from aesi.data.readers.formats.format import Format
 from aesi.numerics.typing import Array
 
 
 class TableFile(Protocol):
-    """One table on disk, whatever its format."""
+    """One table on disk, whatever its format.
+
+    format : the maker's, where the names of the columns are those of one.
+    units : of a line of units below the names, one a column; empty where there is no such line.
+    """
 
     path: Path
     header: tuple[str, ...]
     notes: tuple[str, ...]
+    format: Format | None
+    units: tuple[str, ...]
 
     def read(self, positions: tuple[int, ...]) -> list[Array]:
         """The columns at the given positions, each (n_rows,) float; an empty cell is NaN.
@@ -21,6 +28,10 @@ class TableFile(Protocol):
         Raises DataError at the first cell that is not a number, at a row of the wrong length, and where the
         file is damaged.
         """
+        ...
+
+    def read_text(self, positions: tuple[int, ...]) -> list[list[str]]:
+        """The columns at the given positions as they are written, for clock times, dates and words."""
         ...
 
     def where(self, row: int) -> str:

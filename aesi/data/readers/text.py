@@ -1,6 +1,7 @@
 """Text tables: comma, semicolon, tab or bar between the cells, plain or gzip, in any encoding loggers write.
 
-The header is the first line that is neither blank nor a comment (#). Numbers are converted by pyarrow in a
+The header is the first line that names known columns, or else the first that is neither blank nor a comment (#).
+Numbers are converted by pyarrow in a
 stream, so that ten million rows cost the memory of their numbers; only when that fails does a slow pass in
 Python look for the first cell at fault.
 """
@@ -13,18 +14,19 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Generator
+from collections.abc import Collection, Generator, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, cast
 
 import numpy as np
 
+from aesi.data.readers.formats.format import Format
+from aesi.data.readers.heading import LINES_LOOKED_AT, SEPARATORS, find_heading, split
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
-SEPARATORS = ",;\t|"
 HEAD_BYTES = 1 << 18
 BLOCK_BYTES = 1 << 22
 COMMENT = "#"
@@ -51,17 +53,21 @@ class Layout:
     header: tuple[str, ...]
     lines_before_data: int
     notes: tuple[str, ...]
+    format: Format | None = None
+    units: tuple[str, ...] = field(default=())
 
 
 class TextTable:
     """A delimited text file; see `aesi.data.readers.table.TableFile`."""
 
-    def __init__(self, path: Path, compressed: bool = False) -> None:
+    def __init__(self, path: Path, compressed: bool = False, wanted: Collection[str] = ()) -> None:
         self.path = path
         self._compressed = compressed
-        self._layout = self._look()
+        self._layout = self._look(wanted)
         self.header = self._layout.header
         self.notes = self._layout.notes
+        self.format = self._layout.format
+        self.units = self._layout.units
 
     def read(self, positions: tuple[int, ...]) -> list[Array]:
         """The columns at the given positions; an empty cell is NaN."""
@@ -76,6 +82,20 @@ class TextTable:
                 return [np.empty(0) for _ in positions]
             text = (str(error).splitlines() or [type(error).__name__])[0]
             raise DataError(f"{self.path.name} cannot be read as a table: {text[:200]}") from None
+
+    def read_text(self, positions: tuple[int, ...]) -> list[list[str]]:
+        """The columns at the given positions as they are written; '' where a row is too short."""
+        columns: list[list[str]] = [[] for _ in positions]
+        try:
+            with closing(self._rows()) as rows:
+                for _, cells in rows:
+                    for column, position in zip(columns, positions, strict=True):
+                        column.append(cells[position].strip() if position < len(cells) else "")
+        except DAMAGED as error:
+            raise self._damaged(error) from None
+        except (csv.Error, UnicodeError, OSError) as error:
+            raise DataError(f"{self.path.name} is damaged: {error}.") from None
+        return columns
 
     def where(self, row: int) -> str:
         """The row and its line, blank lines and preamble counted."""
@@ -181,7 +201,7 @@ class TextTable:
             f"{self.path.name} is a damaged or truncated gzip file ({error}); copy or export it again."
         )
 
-    def _look(self) -> Layout:
+    def _look(self, wanted: Collection[str]) -> Layout:
         try:
             with self._bytes() as stream:
                 head = stream.read(HEAD_BYTES)
@@ -190,7 +210,7 @@ class TextTable:
         except OSError as error:
             raise DataError(f"{self.path} cannot be opened: {error}.") from None
         encoding, text = _decode(head, self.path.name)
-        return _layout(text, encoding, whole=len(head) < HEAD_BYTES, name=self.path.name)
+        return _layout(text, encoding, whole=len(head) < HEAD_BYTES, name=self.path.name, wanted=wanted)
 
 
 def _decode(head: bytes, name: str) -> tuple[str, str]:
@@ -209,10 +229,41 @@ def _decode(head: bytes, name: str) -> tuple[str, str]:
         return "latin-1", head.decode("latin-1")
 
 
-def _layout(text: str, encoding: str, *, whole: bool, name: str) -> Layout:
+def _layout(text: str, encoding: str, *, whole: bool, name: str, wanted: Collection[str]) -> Layout:
     lines = text.splitlines()
     if not whole:
         lines = lines[:-1]  # the last one may be cut by the size of the look
+    notes: list[str] = []
+    rows = [_cells(line) for line in lines[:LINES_LOOKED_AT]]
+    heading = find_heading(rows, wanted)
+    if heading is None:
+        start, header, last = *_first_line(lines, name), 0
+    else:
+        start, header, last = heading.line, heading.header, int(heading.has_units)
+    separator = max(SEPARATORS, key=lines[start].count)
+    if start:
+        notes.append(f"{start} lines before the header were passed over.")
+    if last:
+        notes.append("The line of units below the header was read as such.")
+    if encoding == "latin-1":
+        notes.append("The file is not UTF-8; it was read as Latin-1.")
+    if whole and text and not text.endswith(("\n", "\r")):
+        notes.append("The last line does not end: if the file was cut there, its last number is too short.")
+    below = lines[start + 1 + last : start + 50 + last]
+    decimal = _decimal(below, separator)
+    if decimal == ",":
+        notes.append("Numbers were read with a decimal comma.")
+    header = _as_wide_as_the_rows(header, below, separator)
+    form, units = (heading.format, heading.units) if heading else (None, ())
+    return Layout(encoding, separator, decimal, header, start + 1 + last, tuple(notes), form, units)
+
+
+def _cells(line: str) -> list[str]:
+    return [] if line.startswith(COMMENT) else split(line, max(SEPARATORS, key=line.count))
+
+
+def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
+    """Where no line names known columns: the first that is neither blank nor a comment."""
     start = next((i for i, line in enumerate(lines) if line.strip() and not line.startswith(COMMENT)), None)
     if start is None:
         raise DataError(f"{name} has no header line; the first line should name the columns.")
@@ -224,24 +275,28 @@ def _layout(text: str, encoding: str, *, whole: bool, name: str) -> Layout:
     if len(header) == 1 and len(header[0].split()) > 2:
         raise DataError(
             f"{name}, line {start + 1}: no comma, semicolon, tab or bar between the names of the columns; "
-            "separate the cells by one of these."
+            "separate the cells by one of these, or, where this is a block above the table, name its columns "
+            "(--column time_s=NAME --column current_a=NAME --column voltage_v=NAME)."
         )
     if len(header) > 1 and all(NUMBER.fullmatch(cell) for cell in header):
         raise DataError(
             f"{name}, line {start + 1}: numbers where the header should be; put a line with the names of the "
             "columns first: time_s,current_a,voltage_v."
         )
-    notes = []
-    if start:
-        notes.append(f"{start} lines before the header were passed over.")
-    if encoding == "latin-1":
-        notes.append("The file is not UTF-8; it was read as Latin-1.")
-    if whole and text and not text.endswith(("\n", "\r")):
-        notes.append("The last line does not end: if the file was cut there, its last number is too short.")
-    decimal = _decimal(lines[start + 1 : start + 50], separator)
-    if decimal == ",":
-        notes.append("Numbers were read with a decimal comma.")
-    return Layout(encoding, separator, decimal, header, start + 1, tuple(notes))
+    return start, header
+
+
+def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separator: str) -> tuple[str, ...]:
+    """Loggers end their names or their rows with a separator, not always both."""
+    first = next((line for line in below if line.strip()), None)
+    if first is None:
+        return header
+    cells = split(first, separator)
+    if len(cells) == len(header) - 1 and header[-1] == "":
+        return header[:-1]
+    if len(cells) == len(header) + 1 and not cells[-1].strip():
+        return (*header, "")
+    return header
 
 
 def _decimal(lines: list[str], separator: str) -> str:
@@ -256,7 +311,10 @@ def _decimal(lines: list[str], separator: str) -> str:
 
 def _advice(cell: str) -> str:
     if re.match(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d", cell):
-        return ": give times as seconds since the start"
+        return (
+            ": declare what it is: --unit time_s=h:m:s, --unit time_s=date (2024-05-31 12:00:00), or a pattern such as "
+            "--unit 'time_s=%m/%d/%Y %H:%M:%S.%f'"
+        )
     if "," in cell:
         return ": write a decimal point, or separate the cells by semicolons"
     return ""

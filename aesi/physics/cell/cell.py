@@ -22,6 +22,10 @@ from aesi.physics.cell.parts import CellParameters
 class Cell(CellParameters):
     """A cell as a BPX file declares it; its fields are those of `CellParameters`."""
 
+    def __repr__(self) -> str:
+        window = f"{self.lower_voltage_v:g} to {self.upper_voltage_v:g} V"
+        return f"Cell({self.name!r}, {self.nominal_capacity_ah:g} Ah, {window})"
+
     @classmethod
     def from_bpx(cls, source: str | PathLike[str] | Mapping[str, Any]) -> Self:
         """Read a BPX file (a path) or what it holds (a dict), versions 0.x and 1.x.

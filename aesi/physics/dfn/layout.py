@@ -89,7 +89,7 @@ class Electrodes(NamedTuple):
     reference_k: float
 
 
-class State(NamedTuple):
+class DfnState(NamedTuple):
     """What a step changes.
 
     z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y leaves its share of
@@ -115,7 +115,7 @@ class State(NamedTuple):
     plating: Array
 
 
-class Trial(NamedTuple):
+class DfnTrial(NamedTuple):
     """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` is its start.
 
     reach, give : (units,) surface = reach - give y.  exchange : (units,) A/m2.  force, forcing, q, c, c_predicted,

@@ -7,7 +7,7 @@ import numpy as np
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
-from aesi.physics.dfn.layout import Electrodes, Particles, Stack, State, Trial, Weights
+from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, Particles, Stack, Weights
 from aesi.physics.espm.kernels import CACHE_SLOTS
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
@@ -45,7 +45,7 @@ def run_porous_electrode(
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
 
 
-def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[State, Trial, Weights]:
+def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, Weights]:
     """State and scratch at rest."""
     units, modes, kinds = len(p.place), len(p.gains), len(p.side)
     places, salt_modes = s.at.shape
@@ -54,12 +54,12 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[State, Trial, Weight
     def of(*shape: int) -> Array:
         return np.zeros(shape)
 
-    state = State(
+    state = DfnState(
         z=of(units, modes), mean=of(units), y=of(units), trend=of(units), theta=of(units), force=of(units, modes + 1),
         q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), given=of(places), psi=of(places), salt=of(places),
         layer=of(places), plated=of(places), plating=of(places),
     )  # fmt: skip
-    trial = Trial(
+    trial = DfnTrial(
         calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
         reach=of(units), give=of(units), no_give=of(units), exchange=of(units), y_start=of(units),
         given_start=of(places), force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes),

@@ -1,7 +1,28 @@
 """The catalogue of effects: one file an effect, registered in `catalogue.py`, found by name in `by_name.py`."""
 
 from aesi.physics.effect import ActiveEffect, Effect
-from aesi.physics.effects.by_name import active_effect, describe, find_effect, load_effect
+from aesi.physics.effects.by_name import (
+    activated,
+    active_effect,
+    describe,
+    find_effect,
+    known_effects,
+    listing,
+    load_effect,
+    named_effect,
+)
 from aesi.physics.effects.catalogue import CATALOGUE
 
-__all__ = ["CATALOGUE", "ActiveEffect", "Effect", "active_effect", "describe", "find_effect", "load_effect"]
+__all__ = [
+    "CATALOGUE",
+    "ActiveEffect",
+    "Effect",
+    "activated",
+    "active_effect",
+    "describe",
+    "find_effect",
+    "known_effects",
+    "listing",
+    "load_effect",
+    "named_effect",
+]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copyreg
 import importlib.util
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from difflib import get_close_matches
 from functools import lru_cache
@@ -23,13 +23,43 @@ def find_effect(name: str, file: str | None = None) -> Effect:
 
     Raises InputError with the nearest match for an unknown id.
     """
-    if file is not None:
-        return load_effect(file)
-    if name not in CATALOGUE:
-        near = get_close_matches(name, list(CATALOGUE), n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else "."
-        raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
-    return CATALOGUE[name]
+    return load_effect(file) if file is not None else named_effect(name, CATALOGUE)
+
+
+def known_effects(files: Iterable[str | PathLike[str]] = ()) -> dict[str, Effect]:
+    """id -> Effect: the catalogue, and the user's own from their files.
+
+    Raises InputError for a file that holds no effect, and for an id that two files define.
+    """
+    known = dict(CATALOGUE)
+    for file in files:
+        effect = load_effect(file)
+        other = known.setdefault(effect.id, effect)
+        if other.file != effect.file:
+            raise InputError(
+                f"{other.file} and {effect.file} both define the effect {effect.id!r}; rename one."
+            )
+    return known
+
+
+def activated(
+    effects: Iterable[tuple[str, Mapping[str, float]]], files: Iterable[str | PathLike[str]] = ()
+) -> tuple[ActiveEffect, ...]:
+    """Effects by id with their values, in the order given; `files` hold the user's own.
+
+    Raises InputError for an unknown effect, ParameterError for its values.
+    """
+    known = known_effects(files)
+    return tuple(named_effect(name, known).activate(**values) for name, values in effects)
+
+
+def named_effect(name: str, known: Mapping[str, Effect]) -> Effect:
+    """One of `known`.  Raises InputError with the nearest match for an unknown id."""
+    if name in known:
+        return known[name]
+    near = get_close_matches(name, list(known), n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else "."
+    raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
 
 
 def load_effect(path: str | PathLike[str]) -> Effect:
@@ -62,11 +92,13 @@ def _load(path: str) -> Effect:
     return replace(effect, file=path)
 
 
-def describe(name: str | None = None) -> str:
-    """One effect as plain text: equation, validity, parameters, source; the list of all without a name."""
-    if name is None:
-        return "\n".join(f"{e.id:36s} {e.kind:11s} {e.summary}" for e in CATALOGUE.values())
-    effect = find_effect(name)
+def listing(effects: Iterable[Effect]) -> str:
+    """A line an effect: id, kind, what it is."""
+    return "\n".join(f"{e.id:36s} {e.kind:11s} {e.summary}" for e in effects)
+
+
+def describe(effect: Effect) -> str:
+    """One effect as plain text: equation, validity, source, parameters."""
     lines = [f"{effect.id} ({effect.kind})", effect.summary + ".", "", effect.equation, ""]
     lines += [effect.validity, f"Source: {effect.source}", "", "Parameters:"]
     for key, p in effect.parameters.items():

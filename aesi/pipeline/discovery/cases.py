@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from aesi.data import read_measurement
-from aesi.data.read import Sign
+from aesi.data.read import Reading, read
 from aesi.errors import ConfigError
+from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.load import cell_path, locator, virtual_experiment
 from aesi.pipeline.experiment.sections import DiscoverConfig
-from aesi.records import Measurement
+from aesi.pipeline.product.declared import declared_model
+from aesi.records import Hold, Measurement
 
 MOST_ROWS = 80_000
 """A hypothesis is simulated hundreds of times: more rows than these take hours, and tell hardly more."""
@@ -22,22 +23,26 @@ def case_of_files(
     cell: Path,
     data: Sequence[Path],
     tests: Sequence[Path] = (),
-    columns: Mapping[str, str | None] | None = None,
-    sign: Sign = "discharge-positive",
+    reading: Reading | None = None,
     soc0: float | None = None,
     holdout: float = 0.3,
     max_effects: int = 3,
     seed: int = 0,
     effect_files: Sequence[Path] = (),
+    hold: Hold | None = None,
 ) -> Case:
-    """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told."""
+    """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
+
+    Raises DataError where a file cannot be of the cell.
+    """
     paths = (*data, *tests)
     rows = MOST_ROWS // max(1, len(paths))
-    read = [read_measurement(path, columns, sign, max_rows=rows) for path in paths]
+    records = [read(path, reading or Reading(), max_rows=rows).held(hold) for path in paths]
+    check_belongs(declared_model(cell).cell, records)
     return Case(
         cell,
-        tuple(read[: len(data)]),
-        tuple(read[len(data) :]),
+        tuple(records[: len(data)]),
+        tuple(records[len(data) :]),
         soc0,
         holdout,
         max_effects,
@@ -73,10 +78,7 @@ def _read(
 ) -> tuple[Measurement, ...]:
     where = locator(config)
     data = config.data
-    return tuple(
-        read_measurement(where(name), data.columns or None, data.sign, stop_s=until_s.get(name))
-        for name in names
-    )
+    return tuple(read(where(name), data.reading.but(stop_s=until_s.get(name))) for name in names)
 
 
 def _virtual(

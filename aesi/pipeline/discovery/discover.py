@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.errors import InputError
-from aesi.physics.effects import CATALOGUE, Effect, load_effect
+from aesi.physics.effects import CATALOGUE, known_effects
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -35,10 +34,10 @@ ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
 class Case:
     """One case as it was asked for.
 
-    cell : a BPX file, or the folder of a saved model, whose cell and effects are what is declared.
+    cell : a BPX file, or a saved model or its folder, whose cell and effects are what is declared.
     """
 
-    cell: Path
+    cell: Path | HybridModel
     measurements: tuple[Measurement, ...]
     tests: tuple[Measurement, ...] = ()
     soc0: float | None = None
@@ -48,19 +47,11 @@ class Case:
     effect_files: tuple[Path, ...] = ()
 
 
-def catalogue(files: Sequence[Path]) -> dict[str, Effect]:
-    """The catalogue and the user's own effects.  Raises InputError for a file that holds none."""
-    own = [load_effect(file) for file in files]
-    names = [effect.id for effect in own]
-    if len(set(names)) < len(names):
-        raise InputError(f"two effect files define the same id: {', '.join(names)}; rename one.")
-    return dict(CATALOGUE) | {effect.id: effect for effect in own}
-
-
-def run_case(case: Case, out: Path, progress: Progress | None = None) -> Discovery:
+def run_case(case: Case, out: Path | None = None, progress: Progress | None = None) -> Discovery:
     """Trace one case; fits are kept in `out`, so that the same case goes on where it was interrupted."""
     given = declared_model(case.cell)
-    out.mkdir(parents=True, exist_ok=True)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
     return discover(
         given.cell,
         case.measurements,
@@ -69,9 +60,9 @@ def run_case(case: Case, out: Path, progress: Progress | None = None) -> Discove
         holdout=case.holdout,
         max_effects=case.max_effects,
         seed=case.seed,
-        effects=catalogue(case.effect_files),
+        effects=known_effects(case.effect_files),
         given=given.effects,
-        archive=out / ARCHIVE,
+        archive=None if out is None else out / ARCHIVE,
         progress=progress,
     )
 
@@ -84,10 +75,15 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content, indent=1, allow_nan=False)
     (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
-    HybridModel(found.cell, found.model_effects, soc0=found.soc0, hold=found.hold).save(out / "model")
+    found_model(found).save(out / "model")
     title = ", ".join(m.name for m in case.measurements)
     write_discovery_report(out / "report.html", view(found, content, title, mlflow_run_id))
     return content
+
+
+def found_model(found: Discovery) -> HybridModel:
+    """The cell with what was found."""
+    return HybridModel(found.cell, found.model_effects, soc0=found.soc0, hold=found.hold)
 
 
 def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:

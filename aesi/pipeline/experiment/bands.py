@@ -110,7 +110,8 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     if faded or isinstance(model, Bare | Persistence):
         return np.ones(len(series), dtype=bool)
     seen = [
-        record.inputs[_others(len(record), rows)] if record.name == series.name else record.inputs for record in train
+        record.inputs[_others(len(record), rows)] if record.name == series.name else record.inputs
+        for record in train
     ]
     low = np.min([rows.min(axis=0) for rows in seen if len(rows)], axis=0)
     high = np.max([rows.max(axis=0) for rows in seen if len(rows)], axis=0)

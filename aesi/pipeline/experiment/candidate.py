@@ -9,12 +9,13 @@ from functools import partial
 import numpy as np
 
 from aesi.conformal import METHODS, Method
+from aesi.conformal.scores import Scores
 from aesi.conformal.validation import validation_scores
 from aesi.errors import AesiError, ConfigError
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import ErrorSeries, Failed
-from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, evaluate
+from aesi.sparse import Candidate, FitnessWeights, Genome, Problem, SparseModel, evaluate
 from aesi.sparse.search.genome_space import GenomeSpace
 
 CALIBRATION_RESIDUALS = 26_000
@@ -24,10 +25,12 @@ the 20,000 rows from which SPCI needs one fit instead of six: 0.5 instead of 1.8
 
 @dataclass(frozen=True, eq=False)
 class ScoredCandidate:
-    """A candidate with the one-step intervals of its AESI I.
+    """A candidate with the one-step intervals of its AESI I, and of its AESI II (`stable`).
 
     coverage_pct, width_v : share of validation samples covered, and mean width in V; None where the residuals
     cannot be calibrated (`note` says why).  seconds : what it took, by the clock.
+    The candidate's honest residuals have done their work by then and are left out: at 88,200 rows they would be
+    nearly all of what is stored of it.
     """
 
     candidate: Candidate
@@ -35,6 +38,8 @@ class ScoredCandidate:
     width_v: float | None = None
     note: str = ""
     seconds: float = 0.0
+    stable_coverage_pct: float | None = None
+    stable_width_v: float | None = None
 
 
 def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> ScoredCandidate | Failed:
@@ -47,38 +52,52 @@ def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> ScoredC
 
 
 def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConfig) -> ScoredCandidate:
-    calibration, judged = _roles(problem, outcome)
-    conformal = config.conformal
+    slim = replace(outcome, residuals=())
     try:
-        scores = validation_scores(
-            method(config),
-            [residual for residual, _ in calibration],
-            [residual for residual, _ in judged],
-            conformal.alpha,
-            conformal.window,
-            np.random.default_rng(config.seed),
-            current_a=[current for _, current in calibration],
-            valid_current_a=[current for _, current in judged],
-            max_residuals=CALIBRATION_RESIDUALS,
+        one, stable = (
+            _scores(problem, config, outcome, model) for model in (outcome.bagging, outcome.stability)
         )
     except AesiError as error:
-        return ScoredCandidate(outcome, note=str(error))
-    return ScoredCandidate(outcome, coverage_pct=100.0 * scores.coverage, width_v=scores.mean_width_v)
+        return ScoredCandidate(slim, note=str(error))
+    return ScoredCandidate(
+        slim,
+        coverage_pct=100.0 * one.coverage,
+        width_v=one.mean_width_v,
+        stable_coverage_pct=100.0 * stable.coverage,
+        stable_width_v=stable.mean_width_v,
+    )
+
+
+def _scores(problem: Problem, config: ExperimentConfig, outcome: Candidate, model: SparseModel) -> Scores:
+    """How the intervals of one ensemble do on validation."""
+    calibration, judged = _roles(problem, outcome, model)
+    conformal = config.conformal
+    return validation_scores(
+        method(config),
+        [residual for residual, _ in calibration],
+        [residual for residual, _ in judged],
+        conformal.alpha,
+        conformal.window,
+        np.random.default_rng(config.seed),
+        current_a=[current for _, current in calibration],
+        valid_current_a=[current for _, current in judged],
+        max_residuals=CALIBRATION_RESIDUALS,
+    )
 
 
 _Driven = tuple[Array, Array]
 """One-step residuals of a record, V, and the current they arose under, A."""
 
 
-def _roles(problem: Problem, candidate: Candidate) -> tuple[list[_Driven], list[_Driven]]:
+def _roles(problem: Problem, candidate: Candidate, model: SparseModel) -> tuple[list[_Driven], list[_Driven]]:
     """Residuals to calibrate on and to judge on: the validation records, or where there are none the middle
     training record, by models and a calibration that have not seen it."""
     honest = [
-        (each.one_step_v, record.current_a[1:])
+        (each.stable_v if model is candidate.stability else each.one_step_v, record.current_a[1:])
         for each, record in zip(candidate.residuals, problem.split.train, strict=True)
     ]
     if problem.split.valid:
-        return honest, [_residual(candidate, record) for record in problem.split.valid]
+        return honest, [_residual(model, record) for record in problem.split.valid]
     if len(honest) == 1:
         residual, current = honest[0]
         cut = len(residual) // 2
@@ -87,8 +106,8 @@ def _roles(problem: Problem, candidate: Candidate) -> tuple[list[_Driven], list[
     return honest[:middle] + honest[middle + 1 :], [honest[middle]]
 
 
-def _residual(candidate: Candidate, record: ErrorSeries) -> _Driven:
-    return (record.error_v - candidate.bagging.one_step(record))[1:], record.current_a[1:]
+def _residual(model: SparseModel, record: ErrorSeries) -> _Driven:
+    return (record.error_v - model.one_step(record))[1:], record.current_a[1:]
 
 
 def scorer(problem: Problem, config: ExperimentConfig) -> partial[ScoredCandidate | Failed]:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 
-ModelName = Literal[
+ComparedModel = Literal[
     "ESPM",
     "ESPM, one resistor",
     "ESPM, initial state fitted",
@@ -63,7 +63,7 @@ class ExperimentConfig(Section):
     library: LibraryConfig = LibraryConfig()
     search: SearchConfig = SearchConfig()
     conformal: ConformalConfig = ConformalConfig()
-    models: tuple[ModelName, ...] = get_args(ModelName)
+    models: tuple[ComparedModel, ...] = get_args(ComparedModel)
     tracking: TrackingConfig = TrackingConfig()
     runner: RunnerConfig = RunnerConfig()
     discover: DiscoverConfig | None = None

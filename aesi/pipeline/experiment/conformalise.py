@@ -16,7 +16,7 @@ from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
-from aesi.records import ErrorSeries
+from aesi.records import LeftOut
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -29,13 +29,13 @@ def conformalise(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[ErrorSeries] = (),
+    left_out: Sequence[LeftOut] = (),
 ) -> tuple[Fitted, ...]:
     """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
     All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
     also the training records.
-    left_out : the training records under physics fitted without them; by default the training records themselves.
+    left_out : training drives under physics fitted without a part of them; by default the drives as they are.
     """
     return tuple(_conformalised(one, problem, chosen, config, left_out) for one in models)
 
@@ -45,14 +45,16 @@ def _conformalised(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[ErrorSeries],
+    left_out: Sequence[LeftOut],
 ) -> Fitted:
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
     if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
         pairs += fold_models(problem, chosen, one.model, left_out)
         one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
     elif isinstance(one.model, Bare | Persistence):
-        pairs += [(one.model, series, WHOLE) for series in left_out or problem.split.train]
+        pairs += [(one.model, each.series, each.rows) for each in left_out]
+        if not left_out:
+            pairs += [(one.model, series, WHOLE) for series in problem.split.train]
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []

@@ -7,16 +7,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from aesi.conformal import Calibrated, FreeRunBands
 from aesi.pipeline.experiment.candidate import genome_space, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.experiment.load import Loaded, cuts
 from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
 from aesi.sparse import Candidate, Options, Problem
-from aesi.sparse.baselines import BASELINES, Tuning
+from aesi.sparse.baselines import BASELINES, Judge, Tuning
 from aesi.sparse.yardsticks import Bare, Persistence
 
 
@@ -26,6 +27,7 @@ class Fitted:
 
     terms : active terms (0 where counting them makes no sense).  seconds : what its own fit took.
     intervals, bands : one step ahead, and in free run; None where they could not be calibrated (`notes`).
+    trials : the candidates of its own search, a row each.
     compared : the same intervals by other methods, by name (of the ensembles alone).
     """
 
@@ -36,6 +38,7 @@ class Fitted:
     bands: FreeRunBands | None = None
     compared: Mapping[str, Calibrated] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    trials: tuple[Mapping[str, Any], ...] = ()
 
 
 def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
@@ -53,6 +56,7 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
         best=search.top_share,
         horizon=search.horizon,
         fold=search.fold,
+        cuts=cuts(config.data),
         regime=search.regime,
         feedback=library.feedback,
         fade=library.fade,
@@ -66,14 +70,13 @@ def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) 
     fitted = []
     for name in config.models:
         started = time.monotonic()
-        model, terms = _model(name, problem, chosen, config)
-        fitted.append(Fitted(model, terms, time.monotonic() - started))
+        trials: list[Mapping[str, Any]] = []
+        model, terms = _model(name, problem, chosen, replace(_tuning(problem, config), told=trials.append))
+        fitted.append(Fitted(model, terms, time.monotonic() - started, trials=tuple(trials)))
     return tuple(fitted)
 
 
-def _model(
-    name: str, problem: Problem, chosen: Candidate, config: ExperimentConfig
-) -> tuple[ErrorModel, int]:
+def _model(name: str, problem: Problem, chosen: Candidate, tuning: Tuning) -> tuple[ErrorModel, int]:
     if name == "AESI I":
         return chosen.bagging, len(chosen.bagging.terms)
     if name == "AESI II":
@@ -82,17 +85,11 @@ def _model(
         return Bare(name), 0
     if name == "persistence":
         return Persistence(), 0
-    baseline = BASELINES[name](problem, _tuning(problem, config))
+    baseline = BASELINES[name](problem, tuning)
     return baseline, len(getattr(baseline, "terms", ()))
 
 
 def _tuning(problem: Problem, config: ExperimentConfig) -> Tuning:
     search = config.search
-    return Tuning(
-        config.seed,
-        search.candidates,
-        search.population,
-        genome_space(problem, config),
-        weights(config),
-        search.pearson_valid,
-    )
+    judge = Judge(weights(config), search.pearson_train, search.pearson_valid)
+    return Tuning(config.seed, search.candidates, search.population, genome_space(problem, config), judge)

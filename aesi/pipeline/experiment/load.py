@@ -10,22 +10,25 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.data import read_measurement
+from aesi.data.read import read
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
-from aesi.errors import ConfigError, DataAway, DataError
+from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, initial_state, simulate
+from aesi.physics.effects import activated
+from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models, without
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import ROLES, ErrorSeries, Hold, Measurement, Role, Split
+from aesi.records import ROLES, ErrorSeries, Hold, LeftOut, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
@@ -39,15 +42,15 @@ class Loaded:
     config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
-    cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : the training records once more, each under
-    physics that was fitted to the others.
+    cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : for each part of the training drives that
+    is left out in turn (`cuts`), its drive under physics that was fitted to all the others.
     """
 
     cell: Cell
     cell_name: str
     effects: tuple[ActiveEffect, ...]
     split: Split
-    left_out: tuple[ErrorSeries, ...]
+    left_out: tuple[LeftOut, ...]
     soc0: dict[str, float]
     digests: dict[str, str]
     notes: tuple[str, ...]
@@ -133,6 +136,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     notes: list[str] = []
     records: dict[str, FitRecord] = {}
     for name, (measurement, known_soc0) in sources.records.items():
+        check_belongs(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, config.data.hold, effects)
         soc0[name] = start.soc
@@ -149,14 +153,18 @@ def _load(config: ExperimentConfig) -> Loaded:
     for name in empty:
         if name not in sources.roles["test"]:
             _refuse(physics, records[name], hold)
-        notes.append(f"{name} runs empty in the model; its stoichiometries were held at the edge from there on.")
-    split = _split(config.data, series, sources.roles)
-    left_out = split.train
-    if config.cell.start == "recalibrated" and len(drives) > 1:
-        left_out = tuple(
-            _left_out(config, cell, effects, records, drive, piece.name)
-            for drive, piece in zip(drives, split.train, strict=True)
+        notes.append(
+            f"{name} runs empty in the model; its stoichiometries were held at the edge from there on."
         )
+    split = _split(config.data, series, sources.roles)
+    refitted = config.cell.start == "recalibrated" and len(drives) > 1
+    left_out = tuple(
+        LeftOut(
+            _without(config, cell, effects, records, drive, rows, piece.name) if refitted else piece, rows
+        )
+        for drive, piece in zip(drives, split.train, strict=True)
+        for rows in _parts(len(piece), cuts(config.data))
+    )
     chosen = physics.chosen
     return Loaded(
         cell=chosen.cell,
@@ -178,9 +186,7 @@ def _series(
     series: dict[str, ErrorSeries] = {}
     empty = []
     for name, record in records.items():
-        whole, ran_empty = physics.series(
-            record.measurement, record.soc0, config.data.dt_s, config.data.hold
-        )
+        whole, ran_empty = physics.series(record.measurement, record.soc0, config.data.dt_s, config.data.hold)
         # Before the record is cut: a filtered current has to know what came before a piece.
         series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
         if ran_empty:
@@ -218,17 +224,34 @@ def _training_drives(
     return drives
 
 
-def _left_out(
+def cuts(data: DataConfig) -> int:
+    """Into how many parts a training drive is cut to be left out in turn.
+
+    Repeats of one record lie side by side in the state of charge. A test repeat lies between two of training, half a
+    repeat from either at most, and so does half a repeat from its other half; without a whole one, three repeats are
+    missing in a row, which asks for more than the test.
+    """
+    return 2 if data.repeats is not None else 1
+
+
+def _parts(n: int, count: int) -> list[slice]:
+    edges = np.linspace(0, n, count + 1).round().astype(int)
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def _without(
     config: ExperimentConfig,
     cell: Cell,
     effects: tuple[ActiveEffect, ...],
     records: Mapping[str, FitRecord],
     drive: tuple[str, slice],
+    part: slice,
     called: str,
 ) -> ErrorSeries:
-    """A training drive under physics that was fitted to the others alone."""
+    """A training drive under physics that was fitted to all but a part of it."""
     name, rows = drive
-    others = without(records, name, rows)
+    unseen = slice(rows.start + part.start, rows.start + part.stop)
+    others = without(records, name, unseen)
     physics = physics_models(cell, effects, others, config.data.hold, config.cell.start)
     series, _ = _series(physics, {name: records[name]}, config)
     return series[name].take(rows, called)
@@ -248,8 +271,7 @@ def _sources(config: ExperimentConfig) -> _Sources:
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
-        name: (read_measurement(where(name), data.columns or None, data.sign), None)
-        for name in dict.fromkeys(names)
+        name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
     }
     return _Sources(records, roles)
 
@@ -281,12 +303,11 @@ def _split(data: DataConfig, series: dict[str, ErrorSeries], roles: dict[Role, t
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
-    from aesi.physics.effects import CATALOGUE
-
-    unknown = [name for name in config.cell.effects if name not in CATALOGUE]
-    if unknown:
-        raise ConfigError(f"cell.effects: there is no effect {unknown[0]!r}; `aesi effects` lists them.")
-    return tuple(CATALOGUE[name].activate(**values) for name, values in config.cell.effects.items())
+    files = [config.path(name) for name in config.cell.effect_files]
+    try:
+        return activated(config.cell.effects.items(), files)
+    except InputError as error:
+        raise ConfigError(f"{config.name}: cell: {error}") from None
 
 
 def cell_path(config: ExperimentConfig) -> Path:

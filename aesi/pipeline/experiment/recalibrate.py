@@ -60,7 +60,10 @@ KNOBS = (
     Knob(SOC0, "shift", 0.001),
     Knob(CONTACT, "resistance_ohm", 0.03),
     *(Knob(owner, f"{side}_factor", 0.3, log=True) for owner in RATES for side in ("negative", "positive")),
-    *(Knob("electrolyte_transport", f"{what}_factor", 0.3, log=True) for what in ("conductivity", "diffusivity")),
+    *(
+        Knob("electrolyte_transport", f"{what}_factor", 0.3, log=True)
+        for what in ("conductivity", "diffusivity")
+    ),
     *(Knob(owner, "loss", 0.0003) for owner in BALANCE),
 )
 ALL = tuple(range(len(KNOBS)))
@@ -87,7 +90,7 @@ class PhysicsStart:
     shift: float = 0.0
 
     def soc0(self, soc0: float) -> float:
-        """The state of charge by this cell's own windows at which a record starts that was declared to start at soc0."""
+        """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""
         return same_rest(self.declared, self.cell, soc0 + self.shift)
 
     def simulate(self, record: Measurement, soc0: float, hold: Hold) -> Run:
@@ -115,7 +118,9 @@ def recalibrate(
 
     Where no row may be looked at, or nothing can be simulated, it is the declared one.
     """
-    fit = _Fit(declared, tuple(effects), tuple(r for r in records.values() if r.rows.any()), hold, np.array(free))
+    fit = _Fit(
+        declared, tuple(effects), tuple(r for r in records.values() if r.rows.any()), hold, np.array(free)
+    )
     if not fit.records:
         return fit.physics(np.zeros(len(free)))
     low, high = fit.bounds()
@@ -160,7 +165,7 @@ class _Fit:
         left = self._left(z)
         if left is None:
             return None
-        low, high = self.bounds()
+        _, high = self.bounds()
         slopes = np.empty((len(left), len(z)))
         for j in range(len(z)):
             step = STEP if z[j] + STEP <= high[j] else -STEP

@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
+from aesi.data.reading import Reading
 from aesi.records import Hold
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -60,6 +61,8 @@ class DataConfig(Section):
 
     files: paths of measurement files; catalogue: names of records of the data set `set`; virtual: the paper's
     profiles, which have their roles already. `repeats` cuts the one file or record `record`.
+    columns, units, sign, state_words, duplicates : what files do not say themselves, see `aesi.data.reading.Reading`;
+    `columns: {state: NAME}` is the column that gives a current its sign.
     """
 
     kind: Literal["files", "catalogue", "virtual"]
@@ -72,7 +75,10 @@ class DataConfig(Section):
     dt_s: Positive = 1.0
     hold: Hold = "backward"
     columns: dict[str, str | None] = {}
-    sign: Literal["discharge-positive", "charge-positive"] = "discharge-positive"
+    units: dict[str, str] = {}
+    sign: Literal["discharge-positive", "charge-positive"] | None = None
+    state_words: dict[str, Literal["charge", "discharge", "rest"]] = {}
+    duplicates: Literal["refuse", "first", "last"] | None = None
     virtual: VirtualConfig = VirtualConfig()
 
     @model_validator(mode="after")
@@ -87,6 +93,11 @@ class DataConfig(Section):
         return self
 
     @property
+    def reading(self) -> Reading:
+        """How the files are read."""
+        return Reading(self.columns, self.units, self.sign, self.state_words, duplicates=self.duplicates)
+
+    @property
     def has_roles(self) -> bool:
         """Whether there is something to train on and something to test on."""
         return self.kind == "virtual" or self.repeats is not None or bool(self.train and self.test)
@@ -97,7 +108,8 @@ class CellConfig(Section):
     belongs to the data set.
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
-    effects : id -> parameters, effects added to the declared cell.
+    effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
+    the user's own; they are run, so name only files that you trust.
     start : the physics that the correction is learned on: the cell as declared, or recalibrated on the training
     records (`aesi.pipeline.experiment.recalibrate`). The tables show both.
     """
@@ -105,6 +117,7 @@ class CellConfig(Section):
     bpx: str = "catalogue"
     soc0: Annotated[float, Field(ge=0, le=1)] | None = None
     effects: dict[str, dict[str, float]] = {}
+    effect_files: tuple[str, ...] = ()
     start: Literal["declared", "recalibrated"] = "recalibrated"
 
     @model_validator(mode="before")
@@ -126,7 +139,7 @@ class LibraryConfig(Section):
     fade : whether a correction without such terms gives way to the physics where left-out drives do not bear it out.
 
     The defaults are for measured cells, all alike; they were chosen over the development splits of `aesi bench splits`.
-    The paper's library is `inputs: null, special: true, mixed: true, feedback: true, fade: false, p_c: [0, 5], d: [1, 5]`.
+    `experiments/virtual_30ah.yaml` has the paper's library.
     """
 
     p_c: tuple[Annotated[int, Field(ge=0, le=5)], Annotated[int, Field(ge=0, le=5)]] = (1, 2)
@@ -151,7 +164,7 @@ class SearchConfig(Section):
 
     block : rows of a bootstrap block.  horizon : rows of a free run inside the losses, None for a block.
     fold : rows of the pieces that validate in turn where no records are set aside for it; None for whole training
-    records, or an eighth of a single one.
+    records, halves of training repeats, or an eighth of a single record.
     regime : what the losses measure.  weights : gamma of the losses (out-of-bag, validation, sparsity) in the
     scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints, which the paper sets (-1: none; a
     correction that left-out drives do not bear out fades by itself).
@@ -172,7 +185,7 @@ class SearchConfig(Section):
     tau: tuple[Share, Share] = (0.3, 0.7)
     pearson_train: Annotated[float, Field(ge=-1, le=1)] = -1.0
     pearson_valid: Annotated[float, Field(ge=-1, le=1)] = -1.0
-    weights: tuple[float, float, float] = (0.45, 0.45, 0.10)
+    weights: tuple[float, float, float] = (0.05, 0.90, 0.05)
     warm_start: bool = True
     timeout_s: Positive = 300.0
     memory_mb: Positive = 6000.0

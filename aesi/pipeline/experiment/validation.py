@@ -9,26 +9,26 @@ import numpy as np
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES
 from aesi.sparse import Candidate, Problem
+from aesi.sparse.search.fold_models import fold_samples
 from aesi.sparse.search.nested import nested_shares
 
 
-def validation_mser(
-    loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]
-) -> dict[str, float]:
-    """Model -> reduction of the squared error against the declared physics, per cent, over left-out training drives.
+def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
+    """Model -> reduction of the squared error against the declared physics, per cent, over left-out parts of drives.
 
-    Physics is refitted without each drive, and AESI I and II are chosen without it (`nested_shares`); what they leave
-    of the error of physics that saw the drive is taken for what they leave of the error of physics that did not.
-    Empty where the search had one training drive, or pieces of drives, to leave out.
+    Physics is refitted without each part, and AESI I and II are chosen without it (`nested_shares`); what they leave
+    of the error of physics that saw it is taken for what they leave of the error of physics that did not.
+    Empty where the search left out other pieces than drives or their parts.
     """
-    drives = loaded.left_out
-    if len(drives) < 2 or problem.folds != problem.spans:
+    if len(problem.folds) < 2 or not problem.folds_are_drives:
         return {}
-    declared = np.array([np.sum(drive.left_by(DECLARED) ** 2) for drive in drives])
-    base = np.array([np.sum(drive.error_v**2) for drive in drives])
-    left = {
-        name: np.array([np.sum(drive.left_by(name) ** 2) for drive in drives]) for name in PHYSICS_NAMES
-    }
+    parts = [
+        each.series.take(fold_samples(problem, a, b)[1])
+        for each, (a, b) in zip(loaded.left_out, problem.folds, strict=True)
+    ]
+    left = {name: np.array([np.sum(part.left_by(name) ** 2) for part in parts]) for name in PHYSICS_NAMES}
+    base = np.array([np.sum(part.error_v**2) for part in parts])
     for number, name in enumerate(("AESI I", "AESI II")):
         left[name] = base * nested_shares(problem, candidates, number)
-    return {name: float(100.0 * (1.0 - each.sum() / declared.sum())) for name, each in left.items()}
+    declared = left[DECLARED].sum()
+    return {name: float(100.0 * (1.0 - each.sum() / declared)) for name, each in left.items()}

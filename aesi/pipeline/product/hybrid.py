@@ -41,6 +41,11 @@ class HybridModel:
     hold: Hold = "linear"
     soc0: float | None = None
 
+    def __repr__(self) -> str:
+        parts = [f"cell {self.cell.name!r}", *(repr(effect) for effect in self.effects)]
+        parts += [repr(part) for part in (self.correction, self.intervals, self.bands) if part is not None]
+        return f"HybridModel({', '.join(parts)})"
+
     def predict(
         self,
         time_s: Array,

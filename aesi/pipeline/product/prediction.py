@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import over_time
 from aesi.records import ErrorSeries
 
 if TYPE_CHECKING:
     import pandas as pd
+    from plotly.graph_objects import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +32,26 @@ class Prediction:
     soc: Array
     outside: BoolArray
     nominal: float | None = None
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def __repr__(self) -> str:
+        band = "no band" if self.nominal is None else f"{100 * self.nominal:.0f} % band"
+        outside = (
+            f", {100 * self.outside.mean():.0f} % outside the trained range" if self.outside.any() else ""
+        )
+        low, high = float(self.voltage_v.min()), float(self.voltage_v.max())
+        return f"Prediction({len(self):,} rows, {low:.3f} to {high:.3f} V, {band}{outside})"
+
+    def plot(self) -> Figure:
+        """Voltage with its band beside the physics alone, and state of charge, over time: a plotly figure."""
+        voltage = {"predicted": self.voltage_v, "physics alone": self.physics_v}
+        panels = {"voltage, V": voltage, "state of charge": {"state of charge": self.soc}}
+        band = (
+            None if self.nominal is None else (f"{100 * self.nominal:.0f} % band", self.lower_v, self.upper_v)
+        )
+        return over_time(self.time_s, panels, band)
 
     def to_frame(self) -> pd.DataFrame:
         """The prediction as a table, one row a sample."""

@@ -13,6 +13,7 @@ from aesi.pipeline.report.embed import ArrayStore, Embedded, embed
 from aesi.pipeline.report.table_formats import ABSENT
 
 if TYPE_CHECKING:
+    from jinja2 import Environment
     from plotly.graph_objects import Figure
 
 HERE = Path(__file__).parent
@@ -23,8 +24,49 @@ def write_page(path: str | Path, template: str, figures: Mapping[str, Figure], *
 
     The file replaces an older one in one step, so that an interrupted write leaves the old report readable.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
+
+    store = ArrayStore()
+    embedded = {name: embed(fig, store) for name, fig in figures.items()}
+    html = (
+        _environment()
+        .get_template(template)
+        .render(
+            **context,
+            figures={name: _describe(fig, embedded[name]) for name, fig in figures.items()},
+            payload=_script_safe(
+                {"figures": {n: e.data for n, e in embedded.items()}, "arrays": store.arrays}
+            ),
+            plotly_js=get_plotlyjs(),
+            style_css=(HERE / "report.css").read_text(encoding="utf-8"),
+            report_js=(HERE / "report.js").read_text(encoding="utf-8"),
+        )
+    )
+    return _put(Path(path), html)
+
+
+def write_plain_page(
+    path: str | Path, template: str, payload: Any, scripts: Mapping[str, str], **context: Any
+) -> Path:
+    """Render `template` into one offline file without plotly.js.
+
+    scripts : name in the template -> file beside it.
+    """
+    html = (
+        _environment()
+        .get_template(template)
+        .render(
+            **context,
+            **{name: (HERE / file).read_text(encoding="utf-8") for name, file in scripts.items()},
+            payload=_script_safe(payload),
+            style_css=(HERE / "report.css").read_text(encoding="utf-8"),
+        )
+    )
+    return _put(Path(path), html)
+
+
+def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
         loader=FileSystemLoader(HERE),
@@ -34,17 +76,11 @@ def write_page(path: str | Path, template: str, figures: Mapping[str, Figure], *
         lstrip_blocks=True,
     )
     environment.filters |= FILTERS
-    store = ArrayStore()
-    embedded = {name: embed(fig, store) for name, fig in figures.items()}
-    html = environment.get_template(template).render(
-        **context,
-        figures={name: _describe(fig, embedded[name]) for name, fig in figures.items()},
-        payload=_script_safe({"figures": {n: e.data for n, e in embedded.items()}, "arrays": store.arrays}),
-        plotly_js=get_plotlyjs(),
-        style_css=(HERE / "report.css").read_text(encoding="utf-8"),
-        report_js=(HERE / "report.js").read_text(encoding="utf-8"),
-    )
-    target = Path(path)
+    return environment
+
+
+def _put(target: Path, html: str) -> Path:
+    """Write the page in one step."""
     target.parent.mkdir(parents=True, exist_ok=True)
     draft = target.with_name(target.name + ".part")
     try:

@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from aesi.constants import SECONDS_PER_HOUR
-
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
@@ -32,7 +30,6 @@ DIVERGING = "PuOr_r"
 SEQUENTIAL = "Cividis"
 
 MILLIVOLT = 1e3
-LONGEST_IN_SECONDS = 20_000.0
 
 
 def figure(title: str, caption: str, height: int = 380, **layout: Any) -> Figure:
@@ -68,8 +65,3 @@ def translucent(colour: str, alpha: float = 0.22) -> str:
     """The same colour as rgba."""
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     return f"rgba({red},{green},{blue},{alpha:g})"
-
-
-def time_unit(span_s: float) -> tuple[str, float]:
-    """Label and divisor for an axis of that length: seconds, or hours for long tests."""
-    return ("h", SECONDS_PER_HOUR) if span_s > LONGEST_IN_SECONDS else ("s", 1.0)

@@ -26,7 +26,7 @@ from typing import Any, Literal
 from aesi.pipeline.report.table_formats import ABSENT, Table, to_csv, to_latex, to_markdown
 from aesi.pipeline.report.views import Row
 
-Format = Literal["md", "tex", "csv"]
+TableFormat = Literal["md", "tex", "csv"]
 
 MILLIVOLT_PER_VOLT = 1e3
 
@@ -151,7 +151,7 @@ def all_tables(models: Sequence[Row]) -> tuple[Table, ...]:
     return tuple(table for table in built if table.rows and len(table.header) > 1)
 
 
-def render(models: Sequence[Row], format: Format = "md") -> str:
+def render(models: Sequence[Row], format: TableFormat = "md") -> str:
     """All tables of one run as one text, in the given format."""
     write = {"md": to_markdown, "tex": to_latex, "csv": to_csv}[format]
     return "\n".join(write(table) for table in all_tables(models))

@@ -21,7 +21,12 @@ NAME = "DMD with control"
 
 def dmd_with_control(problem: Problem) -> SparseModel:
     """The fit to all training rows. Raises FitError for a library without linear terms."""
-    linear = np.flatnonzero([len(term.factors) < 2 and term.degree <= 1 and term.order == term.degree for term in problem.library.terms])
+    linear = np.flatnonzero(
+        [
+            len(term.factors) < 2 and term.degree <= 1 and term.order == term.degree
+            for term in problem.library.terms
+        ]
+    )
     if len(linear) < 2:
         raise FitError(f"{NAME} needs the linear terms of the library; raise p_c and d to at least 1.")
     columns = np.append(linear, len(problem.library))

@@ -3,8 +3,8 @@
 The rows are handed to PySINDy as a triangular factor R with R' R = [Theta y]' [Theta y]. That poses STLSQ the
 identical problem, |R_y - R_Theta xi|**2 = |y - Theta xi|**2 + const., in as many rows as there are terms.
 
-Tuning: the genome, its ranges, starts, operators, losses, weights and constraint of the AESI search, with generations of 20 of
-which the better half are parents. Without resamples the loss on left-out pieces stands in for out-of-bag.
+Tuning: the genome, its ranges, starts, operators, losses, fitness and constraints of the AESI search, with generations
+of 20 of which the better half are parents. Without resamples the loss on left-out pieces stands in for out-of-bag.
 
 da Silva et al., arXiv:2411.12935.
 """
@@ -12,7 +12,10 @@ da Silva et al., arXiv:2411.12935.
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -29,37 +32,64 @@ from aesi.sparse.search.problem import Problem
 NAME = "SINDy-C"
 
 
+@dataclass(frozen=True)
+class Judge:
+    """Weights of the fitness and least correlations in free run, those of the search it is compared with."""
+
+    weights: FitnessWeights = field(default_factory=FitnessWeights)
+    pearson_train: float = 0.5
+    pearson_valid: float = 0.5
+
+    def admits(self, one: Single) -> bool:
+        """Whether a candidate keeps to the constraints."""
+        return one.pearson_train > self.pearson_train and one.valid.pearson > self.pearson_valid
+
+
 def tuned_sindy_c(
     problem: Problem,
     seed: int = 0,
     candidates: int = 200,
     population: int = 20,
     space: GenomeSpace | None = None,
-    weights: FitnessWeights | None = None,
-    least_pearson: float = -1.0,
+    judge: Judge | None = None,
+    told: Callable[[dict[str, Any]], None] | None = None,
 ) -> SparseModel:
-    """The fittest of `candidates` models; weights and the constraint on the correlation are those of the search.
+    """The fittest of `candidates` models that keep to the constraints, or of all where none does.
 
-    Raises FitError where none survives.
+    told : hears of each candidate, as a row of plain values. Raises FitError where none survives.
     """
-    space = space or GenomeSpace.of(problem.library)
+    space, judge = space or GenomeSpace.of(problem.library), judge or Judge()
     rng = np.random.default_rng([seed, 1])
-    judge = partial(evaluate_sindy_c, problem, weights=weights, least_pearson=least_pearson)
-    return fittest(space, judge, candidates, population, rng).model
+
+    def evaluate(genome: Genome) -> Single | Failed:
+        outcome = evaluate_sindy_c(problem, genome, judge.weights)
+        if told is not None:
+            told(_row(genome, outcome, judge))
+        return outcome
+
+    return fittest(space, evaluate, candidates, population, rng, judge.admits).model
 
 
 def evaluate_sindy_c(
-    problem: Problem,
-    genome: Genome,
-    weights: FitnessWeights | None = None,
-    least_pearson: float = -1.0,
+    problem: Problem, genome: Genome, weights: FitnessWeights | None = None
 ) -> Single | Failed:
     """One candidate of the baseline."""
-    solve = partial(_stlsq, genome.lambda1, genome.lambda2)
-    single = evaluate_single(problem, genome, solve, NAME, weights)
-    if isinstance(single, Single) and single.valid.pearson < least_pearson:
-        return Failed("a correlation below its constraint")
-    return single
+    return evaluate_single(problem, genome, partial(_stlsq, genome.lambda1, genome.lambda2), NAME, weights)
+
+
+def _row(genome: Genome, outcome: Single | Failed, judge: Judge) -> dict[str, Any]:
+    genes = genome.to_dict()
+    if isinstance(outcome, Failed):
+        return {**genes, "failed": outcome.reason}
+    losses = dict(zip(("loss_left_out", "loss_valid", "terms"), outcome.losses, strict=True))
+    return {
+        "genome": genes,
+        **losses,
+        "fitness": outcome.fitness,
+        "pearson_train": outcome.pearson_train,
+        "pearson_valid": outcome.valid.pearson,
+        "admitted": judge.admits(outcome),
+    }
 
 
 def _stlsq(lambda1: float, lambda2: float, factor: Array) -> Array:

@@ -21,12 +21,17 @@ FactorFit = Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Single:
-    """A single fit: its fitness, the model, and how it did on validation."""
+    """A single fit: its losses (left-out pieces, validation, terms), fitness, model, and how it did on validation.
+
+    pearson_train : correlation of error and prediction in free run, on left-out pieces.
+    """
 
     genome: Genome
     fitness: float
     model: SparseModel
     valid: Judged
+    losses: tuple[float, float, int]
+    pearson_train: float
 
 
 def evaluate_single(
@@ -44,9 +49,9 @@ def evaluate_single(
     fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
     runs, memory = fold_runs(problem, active, fits, fits, coefficients)
     model = faded(sparse_model(problem, active, coefficients, memory, name), problem, runs.amplitudes[0])
-    folds, valid = runs.judge(problem, 0), on_validation(problem, runs, (model,))
+    folds, (valid,) = runs.judge(problem, 0), on_validation(problem, runs, (model,))
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")
     losses = (folds.loss, valid.loss, int(np.count_nonzero(coefficients)))
     score = fitness(losses, len(problem.library), weights or FitnessWeights())
-    return Single(genome, score, model, valid)
+    return Single(genome, score, model, valid, losses, folds.pearson)

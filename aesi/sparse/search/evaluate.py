@@ -9,8 +9,8 @@ import numpy as np
 from aesi.numerics.metrics import pearson
 from aesi.numerics.typing import Array, IntArray
 from aesi.records import Failed
-from aesi.sparse.fade import Fade
 from aesi.sparse.ensemble import Ensemble, best_members, combine
+from aesi.sparse.fade import Fade
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.judge import FoldRuns, fold_runs, on_validation
@@ -37,11 +37,12 @@ class HonestResiduals:
     """Errors that a model left which had not seen them, for calibration.
 
     one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
-    by models fitted on all rows but the piece around each.
+    by models fitted on all rows but the piece around each.  stable_v : the same by fits of the stable terms.
     """
 
     record: str
     one_step_v: Array
+    stable_v: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +53,7 @@ class Candidate:
     problem's regime (1 is no better than none). loss_oob is the mean over the members, see out_of_bag.py.
     loss_valid is the mean over both ensembles, on the validation records; where there are none, on the left-out
     pieces, by fits of all and of the stable terms.
+    valid_losses : that of AESI I and that of AESI II.
     loss_sparse : number of active terms of AESI I.
     fitness : 1 - (g1 loss_oob + g2 loss_valid + g3 loss_sparse / library size).
     pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run (on training
@@ -75,6 +77,12 @@ class Candidate:
     residuals: tuple[HonestResiduals, ...]
     fold_sums: Array
     oob_by_resample: Array
+    valid_losses: tuple[float, float]
+
+    @property
+    def better(self) -> SparseModel:
+        """The ensemble of the lower validation loss, AESI I where they are equal."""
+        return self.stability if self.valid_losses[1] < self.valid_losses[0] else self.bagging
 
     @property
     def losses(self) -> tuple[float, float, float]:
@@ -124,8 +132,10 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
             (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
         )
     )
-    valid = on_validation(problem, runs, (bagging, stability))
-    if not np.isfinite(valid.loss):
+    valid, valid_stable = on_validation(problem, runs, (bagging, stability))
+    valid_losses = valid.loss, valid_stable.loss
+    loss_valid = float(np.mean(valid_losses))
+    if not np.isfinite(loss_valid):
         return Failed("the model diverges in free run on the validation data")
     weights = weights or FitnessWeights()
     loss_oob = float(losses[best].mean())
@@ -133,9 +143,9 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     return Candidate(
         genome=genome,
         loss_oob=loss_oob,
-        loss_valid=valid.loss,
+        loss_valid=loss_valid,
         loss_sparse=count,
-        fitness=fitness((loss_oob, valid.loss, count), len(problem.library), weights),
+        fitness=fitness((loss_oob, loss_valid, count), len(problem.library), weights),
         pearson_train=pearson(problem.target, runs.free_run[:, 2]),
         pearson_valid=valid.pearson,
         free_run_valid_mser_pct=valid.mser_pct,
@@ -145,6 +155,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         residuals=_honest(problem, runs),
         fold_sums=runs.sums[:2],
         oob_by_resample=losses,
+        valid_losses=valid_losses,
     )
 
 
@@ -155,9 +166,9 @@ def fitness(losses: tuple[float, float, float], library_size: int, weights: Fitn
 
 
 def _honest(problem: Problem, runs: FoldRuns) -> tuple[HonestResiduals, ...]:
-    one_step = problem.scaling.error_volts_per_unit * (problem.target - runs.one_step[:, 0])
+    left = problem.scaling.error_volts_per_unit * (problem.target[:, None] - runs.one_step[:, :2])
     return tuple(
-        HonestResiduals(record.name, one_step[a:b])
+        HonestResiduals(record.name, left[a:b, 0], left[a:b, 1])
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)
     )
 

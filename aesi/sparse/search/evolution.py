@@ -36,10 +36,12 @@ def fittest(
     candidates: int,
     population: int,
     rng: np.random.Generator,
+    admitted: Callable[[T], bool] = lambda scored: True,
 ) -> T:
     """The fittest of `candidates` genomes, bred in generations of `population`, the better half of all as parents.
 
-    The first ones are the plain starts of the space. Raises FitError where none survives.
+    The first ones are the plain starts of the space. Those that
+    are not `admitted` rank below all that are. Raises FitError where none survives.
     """
     alive: list[T] = []
     starts = list(space.plain_starts())
@@ -51,7 +53,7 @@ def fittest(
                 reason = outcome.reason
             else:
                 alive.append(outcome)
-        alive.sort(key=lambda scored: -scored.fitness)
+        alive.sort(key=lambda scored: (not admitted(scored), -scored.fitness))
     if not alive:
         raise FitError(f"none of {candidates} candidates survives (the last one: {reason}).")
     return alive[0]

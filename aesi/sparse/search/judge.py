@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -177,13 +177,11 @@ def _relative_loss(truth: Sequence[Array], predictions: Sequence[Array], balance
     return float((weights @ left**2) / (weights @ joined**2))
 
 
-def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[SparseModel]) -> Judged:
-    """The first model's verdict, with the mean loss of the given ones: on validation records, or the pieces.
+def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[SparseModel]) -> tuple[Judged, ...]:
+    """A verdict a model: on validation records, or where there are none on the left-out pieces.
 
     models : AESI I and II, or a single one; on pieces the fold's fit and its refit stand for them.
     """
     if problem.split.valid:
-        verdicts = [on_records(model, problem.split.valid, problem) for model in models]
-    else:
-        verdicts = [runs.judge(problem, column) for column in range(len(models))]
-    return replace(verdicts[0], loss=float(np.mean([verdict.loss for verdict in verdicts])))
+        return tuple(on_records(model, problem.split.valid, problem) for model in models)
+    return tuple(runs.judge(problem, column) for column in range(len(models)))

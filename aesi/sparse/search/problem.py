@@ -53,7 +53,7 @@ class Options:
     resamples, block : bootstrap resamples, and rows in a block (default: 500, or a tenth of the rows where
     there are fewer than 5,000).
     best : share of resamples that enters the ensemble.  horizon : rows of a free run (default: the block).
-    fold : rows of a left-out piece (default: a whole training record, or an eighth of the rows of a single one).
+    fold : rows of a left-out piece (default: records, each cut into `cuts`, or an eighth of the rows of a single one).
     regime : what the losses measure.  outside : what happens beyond the trained range.
     feedback : whether terms may hold the error at all.
     fade : whether a correction without such terms gives way to the physics where nothing bears it out (fade.py).
@@ -72,6 +72,7 @@ class Options:
     best: float = 0.1
     horizon: int | None = None
     fold: int | None = None
+    cuts: int = 1
     regime: Regime = "free_run"
     outside: Outside = "clip"
     balance: bool = True
@@ -85,7 +86,8 @@ class Problem:
     """Training rows k -> k + 1 of all records, numbered through, and what was computed from them.
 
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
-    error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.  error, target : (n,) scaled e[k] and
+    error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
+    error, target : (n,) scaled e[k] and
     e[k + 1].
     counts : (resamples, n) how often each resample holds a row.
     fade : (n,) what is left of a correction at each row by a model that has not seen its fold (fade.py).
@@ -147,7 +149,7 @@ class Problem:
             [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
         )
         block = options.block or default_block(n)
-        cut = left_out_pieces(spans, options.fold)
+        cut = left_out_pieces(spans, options.fold, options.cuts)
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         augmented = np.empty((n, len(library) + 1), order="F")
         for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
@@ -183,6 +185,11 @@ class Problem:
             full_factor=r,
             notes=notes,
         )
+
+    @property
+    def folds_are_drives(self) -> bool:
+        """Whether what is left out are records, or the parts of each that were asked for by `Options.cuts`."""
+        return self.options.fold is None and len(self.spans) > 1
 
     @property
     def zero(self) -> float:
@@ -232,11 +239,17 @@ def default_block(n: int) -> int:
     return min(500, max(10, n // 10))
 
 
-def left_out_pieces(spans: Sequence[Span], fold: int | None) -> tuple[Span, ...]:
-    """Pieces of about `fold` rows; where none is asked for, the records themselves, or eighths of a single one."""
+def left_out_pieces(spans: Sequence[Span], fold: int | None, cuts: int) -> tuple[Span, ...]:
+    """Pieces of about `fold` rows; where none is asked for, records cut into `cuts`, or eighths of a single one."""
     if fold is None and len(spans) > 1:
-        return tuple(spans)
+        return tuple(piece for a, b in spans for piece in cut_evenly(a, b, cuts))
     return tuple(pieces(spans, fold or max(10, spans[-1][1] // 8)))
+
+
+def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
+    """The rows a to b - 1 in consecutive pieces."""
+    edges = np.linspace(a, b, cuts + 1).round().astype(int)
+    return [(int(p), int(q)) for p, q in pairwise(edges)]
 
 
 def _fade(inputs: Array, folds: Sequence[Span]) -> Array:

@@ -154,3 +154,15 @@ def test_the_command_compares_and_ends_with_1(call, monkeypatch, tmp_path):
     monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: iter([SPEED]))
     assert call("bench", "espm", "--compare", path)[0] == 0
     assert call("bench", "espm", "--compare", tmp_path / "none.json")[0] == 2
+
+
+def test_a_benchmark_without_its_peer_said_so_after_half_a_minute(monkeypatch, call):
+    monkeypatch.setattr(
+        "flows.benchmarks.find_spec", lambda package: None if package == "mapie" else object()
+    )
+    monkeypatch.setattr("flows.benchmarks.run", lambda name, **_: pytest.fail("it was started"))
+    code, _, err = call("bench", "spci")
+    assert code == 2
+    assert (
+        err == "aesi: `aesi bench spci` compares with mapie, not installed here: pip install 'mapie>=1.5'.\n"
+    )

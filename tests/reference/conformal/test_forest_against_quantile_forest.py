@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from aesi.conformal.bands.regression import FitTask
 from aesi.conformal.regressors.forest import ForestQuantiles
+from aesi.conformal.regressors.model import FitTask
 
 LEVELS = np.array([0.05, 0.25, 0.75, 0.95])
 

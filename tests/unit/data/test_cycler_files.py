@@ -1,46 +1,331 @@
-"""Cyclers' own files, through the Battery Data Alliance's reader."""
+"""Cyclers' exports and own files: each maker's names, units, preamble, states and sign give the same test.
+
+The files are written here in the layout of real exports; those were read with the same code while it was written.
+"""
 
 import sys
+import warnings
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aesi.data import read_measurement
+from aesi.data.read import read
+from aesi.data.reading import Reading
 from aesi.errors import DataError
 
+N = 90
+TIME = np.arange(N) * 10.0
+CURRENT = np.repeat([0.0, 2.0, -1.0, 3.0, 0.0, -2.0], 15)
+"""A, discharge positive, as every file has to come out."""
+VOLTAGE = np.round(3.7 - 0.03 * CURRENT - np.cumsum(CURRENT) * 1e-4, 5)
+TEMPERATURE = np.round(25.0 + np.linspace(0.0, 1.0, N), 3)
+STEP = np.repeat(np.arange(1, 7), 15)
 
-@pytest.fixture
-def mpt(tmp_path):
-    """A BioLogic export: preamble, decimal commas, milliampere, positive on charge."""
-    lines = ["EC-Lab ASCII FILE", "Nb header lines : 4", "", "time/s\tEcell/V\tI/mA\t"]
-    for k in range(100):
-        current_ma = -1000.0 if (k // 10) % 2 == 0 else 2000.0
-        line = f"{k:.3f}\t{3.7 + 1e-5 * current_ma:.5f}\t{current_ma:.3f}\t"
-        lines.append(line.replace(".", ","))
-    path = tmp_path / "test.mpt"
-    path.write_text("\r\n".join(lines) + "\r\n", encoding="latin-1")
+
+def clock(seconds: float) -> str:
+    """h:m:s with milliseconds."""
+    return f"{int(seconds // 3600):02d}:{int(seconds // 60) % 60:02d}:{seconds % 60:06.3f}"
+
+
+def words(discharge: str, charge: str, rest: str) -> list[str]:
+    return [discharge if i > 0 else charge if i < 0 else rest for i in CURRENT]
+
+
+def rows(*columns, separator: str = ",") -> list[str]:
+    return [separator.join(str(cell) for cell in row) for row in zip(*columns, strict=True)]
+
+
+def arbin() -> tuple[str, bytes]:
+    head = "Data_Point,Date_Time,Test_Time(s),Step_Time(s),Step_Index,Cycle_Index,Current(A),Voltage(V),"
+    head += "Charge_Capacity(Ah),Aux_Temperature_1(C)"
+    stamps = [f"09/20/2024 08:{k // 60:02d}:{k % 60:02d}" for k in range(N)]
+    body = rows(
+        range(1, N + 1), stamps, TIME, TIME, STEP, STEP // 4, -CURRENT, VOLTAGE, TIME * 0, TEMPERATURE
+    )
+    return "arbin.csv", "\n".join([head, *body, ""]).encode()
+
+
+def maccor() -> tuple[str, bytes]:
+    lines = ["Today's Date 10/10/2019  Date of Test:\t10/10/2019\t Filename:\tC:\\test.010\tComment: x"]
+    lines.append(
+        "Rec#\tCyc#\tStep\tTestTime\tStepTime\tAmp-hr\tWatt-hr\tAmps\tVolts\tState\tES\tDPt Time\tTemp 1"
+    )
+    lines += rows(
+        range(1, N + 1), STEP // 4, STEP, [f"0d {clock(t)}" for t in TIME], TIME, TIME * 0, TIME * 0,
+        np.abs(CURRENT), VOLTAGE, words("D", "C", "R"), STEP, ["11/02/2019 23:28:51"] * N, TEMPERATURE,
+        separator="\t",
+    )  # fmt: skip
+    return "maccor.010", "\r\n".join([*lines, ""]).encode()
+
+
+def biologic() -> tuple[str, bytes]:
+    lines = ["EC-Lab ASCII FILE", "Nb header lines : 5", "", "Modulo Bat: Temperature max = 70 °C"]
+    lines.append("mode\tNs\ttime/s\tEcell/V\t<I>/mA\tTemperature/°C\tcycle number\t")
+    body = rows(STEP, STEP, TIME, VOLTAGE, -1e3 * CURRENT, TEMPERATURE, STEP // 4, separator="\t")
+    lines += [f"{line}\t".replace(".", ",") for line in body]
+    return "biologic.mpt", "\r\n".join([*lines, ""]).encode("latin-1")
+
+
+def neware() -> tuple[str, bytes]:
+    head = "DataPoint,Cycle Index,Step Index,Step Type,Time,Total Time,Current(mA),Voltage(V),Capacity(mAh),T1(℃),Date"
+    kinds = words("CC DChg", "CC Chg", "Rest")
+    times = [clock(t) for t in TIME]
+    dates = ["2024-03-01 12:00:00"] * N
+    body = rows(
+        range(1, N + 1),
+        STEP // 4,
+        STEP,
+        kinds,
+        times,
+        times,
+        -1e3 * CURRENT,
+        VOLTAGE,
+        TIME * 0,
+        TEMPERATURE,
+        dates,
+    )
+    return "neware.csv", "\n".join([head, *body, ""]).encode("utf-8-sig")
+
+
+def neware_magnitudes() -> tuple[str, bytes]:
+    name, content = neware()
+    return name, content.replace(b",-", b",")
+
+
+def digatron() -> tuple[str, bytes]:
+    lines = ["Digatron,Test,x", "Start Time,6/10/2018 1:36:45 PM", ""]
+    lines.append(
+        "Time Stamp,Step,Status,Prog Time,Step Time,Cycle,Cycle Level,Procedure,Voltage,Current,Temperature,Cnt,"
+    )
+    lines.append(",,,,,,,,[V],[mA],[C],[Cnt],")
+    times = [clock(t) for t in TIME]
+    body = rows(
+        ["6/10/2018 1:36:45 PM"] * N, STEP, words("DCH", "CHA", "PAU"), times, times, STEP // 4, STEP, ["p"] * N,
+        VOLTAGE, -1e3 * CURRENT, TEMPERATURE, STEP,
+    )  # fmt: skip
+    return "digatron.csv", "\n".join([*lines, *[f"{line}," for line in body], ""]).encode()
+
+
+def basytec() -> tuple[str, bytes]:
+    lines = ["~Resultfile from Basytec Battery Test System", "~Battery: cell", "~"]
+    lines.append("~Time[h]\tDataSet\tt-Step[h]\tLine\tCommand\tU[V]\tI[A]\tAh[Ah]\tT1[°C]\tCyc-Count\tState")
+    body = rows(
+        [repr(float(t)) for t in TIME / 3600], range(1, N + 1), TIME / 3600, STEP,
+        words("Discharge", "Charge", "Pause"), VOLTAGE, -CURRENT, TIME * 0, TEMPERATURE, STEP // 4, STEP * 0,
+        separator="\t",
+    )  # fmt: skip
+    return "basytec.txt", "\n".join([*lines, *body, ""]).encode("latin-1")
+
+
+def novonix() -> tuple[str, bytes]:
+    lines = ["[Summary]", "Novonix UHPC data file", "Mass (g): 1.000", "[End Summary]", "[Data]"]
+    lines.append(
+        "Date and Time,Cycle Number,Step Type,Run Time (h),Step Time (h),Current (A),Potential (V),Capacity (Ah),"
+        "Temperature (°C),Circuit Temperature (°C),Step Number"
+    )
+    hours = [repr(float(t)) for t in TIME / 3600]
+    stamps = ["2025-07-19 15:26:20"] * N
+    body = rows(
+        stamps, STEP // 4, STEP, hours, hours, -CURRENT, VOLTAGE, TIME * 0, TEMPERATURE, TEMPERATURE + 1, STEP
+    )
+    return "novonix.csv", "\n".join([*lines, *body, ""]).encode()
+
+
+def bdf() -> tuple[str, bytes]:
+    head = (
+        "Test Time / s,Voltage / V,Current / A,Surface Temperature T1 / degC,Step Index / 1,Cycle Count / 1"
+    )
+    body = rows(TIME, VOLTAGE, -CURRENT, TEMPERATURE, STEP, STEP // 4)
+    return "test.bdf.csv", "\n".join([head, *body, ""]).encode()
+
+
+def workbook() -> tuple[str, bytes]:
+    """Neware's, with a sheet about the test first and clock times as Excel keeps them."""
+    import io
+
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["Start", datetime(2024, 3, 1)])
+    sheet = book.create_sheet("record")
+    sheet.append(["DataPoint", "Cycle Index", "Step Index", "Step Type", "Time", "Total Time", "Current(A)",
+                  "Voltage(V)", "Capacity(Ah)", "T1(°C)"])  # fmt: skip
+    kinds = words("CC DChg", "CC Chg", "Rest")
+    for k in range(N):
+        passed = timedelta(seconds=float(TIME[k]))
+        cells = [k + 1, int(STEP[k] // 4), int(STEP[k]), kinds[k], passed, passed, float(-CURRENT[k])]
+        sheet.append([*cells, float(VOLTAGE[k]), 0.0, float(TEMPERATURE[k])])
+    stream = io.BytesIO()
+    book.save(stream)
+    return "neware.xlsx", stream.getvalue()
+
+
+EXPORTS: tuple[Callable[[], tuple[str, bytes]], ...] = (
+    arbin, maccor, biologic, neware, neware_magnitudes, digatron, basytec, novonix, bdf, workbook,
+)  # fmt: skip
+
+
+def written(folder: Path, export: Callable[[], tuple[str, bytes]]) -> Path:
+    name, content = export()
+    path = folder / name
+    path.write_bytes(content)
     return path
 
 
-def test_a_biologic_file_comes_out_in_amperes_discharge_positive(mpt):
-    pytest.importorskip("bdf")
-    record = read_measurement(mpt)
-    np.testing.assert_allclose(record.time_s, np.arange(100.0))
-    np.testing.assert_allclose(record.current_a[:11], [*[1.0] * 10, -2.0])
-    np.testing.assert_allclose(record.voltage_v[:11], [*[3.69] * 10, 3.72])
-    assert any("batterydf" in note for note in record.notes)
+@pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
+def test_every_export_gives_the_same_test(tmp_path, export):
+    record = read_measurement(written(tmp_path, export))
+    np.testing.assert_allclose(record.time_s, TIME, atol=1e-6)
+    np.testing.assert_allclose(record.current_a, CURRENT, atol=1e-9)
+    np.testing.assert_allclose(record.voltage_v, VOLTAGE, atol=1e-9)
+    assert record.temperature_degc is not None
+    np.testing.assert_allclose(record.temperature_degc, TEMPERATURE, atol=1e-9)
+    assert any("turned" in note or "sign of the current" in note for note in record.notes)
 
 
-def test_without_the_reader_it_says_what_to_install(mpt, monkeypatch):
-    monkeypatch.setitem(sys.modules, "bdf", None)
-    with pytest.raises(DataError, match="pip install batterydf"):
-        read_measurement(mpt)
+@pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
+def test_a_step_of_every_export_can_be_taken(tmp_path, export):
+    record = read_measurement(written(tmp_path, export), step="2:3")
+    np.testing.assert_allclose(record.current_a, CURRENT[15:45], atol=1e-9)
+    assert len(read_measurement(written(tmp_path, export), cycle=0)) == 45
 
 
-def test_a_damaged_file_is_one_sentence(tmp_path):
-    pytest.importorskip("bdf")
-    path = tmp_path / "test.ndax"
-    path.write_bytes(b"nothing of the kind")
-    with pytest.raises(DataError, match=r"test\.ndax") as caught:
+def test_the_battery_data_alliance_reads_the_same(tmp_path):
+    """Voltage and current of BaSyTec's layout; batterydf 0.1 leaves Neware's mA as they are and turns hours twice."""
+    reader = pytest.importorskip("bdf")
+    path = written(tmp_path, basytec)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        frame = reader.read(path, validate=False)
+    record = read_measurement(path)
+    np.testing.assert_allclose(record.voltage_v, frame["Voltage / V"].to_numpy(dtype=float), atol=1e-9)
+    np.testing.assert_allclose(record.current_a, -frame["Current / A"].to_numpy(dtype=float), atol=1e-9)
+
+
+def test_two_rows_at_a_change_of_step_are_one(tmp_path):
+    name, content = arbin()
+    lines = content.decode().split("\n")
+    doubled = [*lines[:16], lines[16].replace("150.0,", "140.0,"), *lines[16:]]
+    path = tmp_path / name
+    path.write_text("\n".join(doubled))
+    record = read_measurement(path)
+    assert len(record) == N
+    assert any("1 rows of a stamp" in note for note in record.notes)
+    with pytest.raises(DataError, match="--duplicates"):
+        read_measurement(path, duplicates="refuse")
+
+
+def test_magnitudes_that_nothing_turns_are_told_and_the_state_turns_them(tmp_path):
+    path = tmp_path / "plain.csv"
+    head = "time_s,current_a,voltage_v,Richtung"
+    long = np.repeat([1.0, -1.0], 60)
+    voltage = np.concatenate([np.linspace(4.0, 3.2, 60), np.linspace(3.2, 4.0, 60)])
+    kinds = ["E" if i > 0 else "L" for i in long]
+    path.write_text("\n".join([head, *rows(60.0 * np.arange(120), np.abs(long), voltage, kinds), ""]))
+    with pytest.raises(DataError, match=r"holds magnitudes.*--state"):
+        read_measurement(path)
+    with pytest.raises(DataError, match="--state-word E=charge or E=discharge"):
+        read_measurement(path, state="Richtung")
+    said = Reading({"state": "Richtung"}, state_words={"E": "discharge", "L": "charge"})
+    np.testing.assert_allclose(read(path, said).current_a, long)
+
+
+@pytest.mark.parametrize(
+    ("cells", "unit"),
+    [
+        ([clock(t) for t in TIME], "h:m:s"),
+        ([f"2024-05-31 12:{int(t) // 60:02d}:{int(t) % 60:02d}" for t in TIME], "date"),
+        ([f"31.05.2024 12:{int(t) // 60:02d}:{int(t) % 60:02d}" for t in TIME], "%d.%m.%Y %H:%M:%S"),
+        ([f"{t / 60!r}" for t in TIME.tolist()], "min"),
+        ([f"{t * 1e3!r}" for t in TIME.tolist()], "ms"),
+    ],
+)
+def test_times_are_read_as_they_are_declared(tmp_path, cells, unit):
+    path = tmp_path / "logger.csv"
+    body = rows(cells, 1e3 * CURRENT, 1e3 * VOLTAGE, 273.15 + TEMPERATURE)
+    path.write_text("\n".join(["t,i,u,temp", *body, ""]))
+    columns = {"time_s": "t", "current_a": "i", "voltage_v": "u", "temperature_degc": "temp"}
+    declared = {"time_s": unit, "current_a": "mA", "voltage_v": "mV", "temperature_degc": "K"}
+    record = read_measurement(path, columns, units=declared)
+    np.testing.assert_allclose(record.time_s, TIME, atol=1e-6)
+    np.testing.assert_allclose(record.current_a, CURRENT, atol=1e-9)
+    np.testing.assert_allclose(record.voltage_v, VOLTAGE, atol=1e-9)
+    np.testing.assert_allclose(record.temperature_degc, TEMPERATURE, atol=1e-9)
+
+
+def test_a_time_that_is_no_clock_time_is_named(tmp_path):
+    path = tmp_path / "logger.csv"
+    path.write_text("time_s,current_a,voltage_v\n00:00:01,1.0,3.7\n00:00:xx,1.0,3.7\n00:00:03,1,3.7\n")
+    with pytest.raises(DataError, match=r"row 2 \(line 3\).*'00:00:xx'"):
+        read_measurement(path, units={"time_s": "h:m:s"})
+    with pytest.raises(DataError, match="--unit time_s=h:m:s"):
+        read_measurement(path)
+
+
+def test_an_unknown_unit_names_those_that_there_are(tmp_path):
+    path = tmp_path / "logger.csv"
+    path.write_text("time_s,current_a,voltage_v\n0,1.0,3.7\n1,1.0,3.7\n")
+    with pytest.raises(DataError, match="A, mA, uA, kA"):
+        read_measurement(path, units={"current_a": "miles"})
+
+
+def test_a_table_below_other_lines_is_found_by_the_names_given(tmp_path):
+    path = tmp_path / "logger.csv"
+    path.write_text("Bench 7, cell 12\nstarted,today\n\nZeit;Strom;Spannung\n0;1,0;3,7\n1;1,0;3,69\n")
+    columns = {"time_s": "Zeit", "current_a": "Strom", "voltage_v": "Spannung"}
+    record = read_measurement(path, columns)
+    np.testing.assert_allclose(record.voltage_v, [3.7, 3.69])
+    assert any("3 lines before the header" in note for note in record.notes)
+
+
+def test_a_temperature_under_another_name_is_not_dropped_in_silence(tmp_path):
+    path = tmp_path / "logger.csv"
+    body = rows(TIME, CURRENT, VOLTAGE, TEMPERATURE)
+    path.write_text("\n".join(["time_s,current_a,voltage_v,Cell Temp (°C)", *body, ""]), encoding="utf-8")
+    notes = read_measurement(path).notes
+    assert any('--column temperature_degc="Cell Temp (°C)"' in note for note in notes)
+    assert not read_measurement(path, {"temperature_degc": None}).notes[0].endswith("is not used;")
+
+
+def test_all_that_is_missing_is_said_at_once_with_the_right_names(tmp_path):
+    path = tmp_path / "logger.csv"
+    path.write_text(
+        "Timestamp,Step Time (s),Test Time (min),I limit (A),Cell current (mA),U (V)\n1,2,3,4,5,6\n1,2,3,4,5,6\n"
+    )
+    with pytest.raises(DataError) as caught:
+        read_measurement(path)
+    message = str(caught.value)
+    assert '--column time_s="Test Time (min)" --unit time_s=min' in message
+    assert '--column current_a="Cell current (mA)" --unit current_a=mA' in message
+    assert '--column voltage_v="U (V)"' in message
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "package"),
+    [
+        ("test.ndax", "bdf", "batterydf"),
+        ("test.mpr", "galvani", "galvani"),
+        ("test.xlsx", "openpyxl", "openpyxl"),
+    ],
+)
+def test_without_the_reader_it_says_what_to_install(tmp_path, monkeypatch, name, module, package):
+    path = tmp_path / name
+    path.write_bytes(b"PK\x03\x04" + b"x" * 50)
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(DataError, match=f"pip install {package}"):
+        read_measurement(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "module"), [("test.ndax", "bdf"), ("test.mpr", "galvani"), ("test.xlsx", "openpyxl")]
+)
+def test_a_damaged_file_is_one_sentence(tmp_path, name, module):
+    pytest.importorskip(module)
+    path = tmp_path / name
+    path.write_bytes(b"PK\x03\x04 nothing of the kind")
+    with pytest.raises(DataError, match=name.replace(".", r"\.")) as caught:
         read_measurement(path)
     assert "\n" not in str(caught.value)

@@ -24,9 +24,7 @@ def drives(seeds, **changes):
 
 def fitted(records) -> tuple[Problem, Candidate]:
     problem = Problem.build(Split(records, (), ()), OPTIONS)
-    candidate = evaluate(
-        problem, Genome.whole(problem.library, 1e-1, 1e-3, 0.5, p_c=2, d=2, feedback=False)
-    )
+    candidate = evaluate(problem, Genome.whole(problem.library, 1e-1, 1e-3, 0.5, p_c=2, d=2, feedback=False))
     assert isinstance(candidate, Candidate)
     return problem, candidate
 

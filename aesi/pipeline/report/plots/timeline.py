@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.numerics.typing import Array
+from aesi.over_time import time_unit
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
 
@@ -31,7 +32,7 @@ class Placed:
 def end_to_end(traces: Sequence[RecordTrace | DiscoveryTrace]) -> tuple[list[Placed], str]:
     """Records one after the other on one axis, and that axis's unit."""
     spans = [float(t.time_s[-1] - t.time_s[0]) for t in traces]
-    unit, divisor = style.time_unit(sum(spans))
+    unit, divisor = time_unit(sum(spans))
     starts = np.concatenate([[0.0], np.cumsum(spans)])
     placed = [Placed(t, (t.time_s - t.time_s[0] + s) / divisor) for t, s in zip(traces, starts, strict=False)]
     return placed, unit

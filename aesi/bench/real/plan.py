@@ -1,0 +1,216 @@
+"""The cases on measured cells: withheld temperatures, faults put in, ageing, and controls."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from aesi.bench.real.case import Fault, RealCase, Take
+from aesi.bench.real.faults import FaultKind
+
+HG2, PANASONIC, NMC, M50T = "lg_18650hg2", "panasonic_ncr18650pf", "about_energy_nmc", "lg_m50t_w8"
+CELLS = {
+    HG2: "lg_18650hg2.bpx.json",
+    PANASONIC: "panasonic_ncr18650pf.bpx.json",
+    NMC: f"{NMC}:cell.bpx.json",
+    M50T: "lg_m50_chen2020.bpx.json",
+}
+"""Files calibrated at 25 degC alone, or published."""
+WINDOW_S = 3600.0
+"""Of a drive: the first hour."""
+THERMOCOUPLE = "thermocouple on the case"
+PUT_IN = "put in"
+COLD_AND_HOT: dict[str, tuple[str, ...]] = {
+    HG2: ("40degC_la92", "10degC_us06", "0degC_mixed1", "n10degC_cap_1c", "40degC_c20_ocv", "0degC_c20_ocv"),
+    PANASONIC: (
+        "10degC_cycle_1",
+        "0degC_cycle_1",
+        "n10degC_cycle_1",
+        "10degC_hppc",
+        "0degC_hppc",
+        "n10degC_hppc",
+    ),
+}
+WARMING: dict[str, tuple[str, ...]] = {
+    HG2: ("25degC_us06", "25degC_cap_1c"),
+    PANASONIC: ("25degC_us06", "25degC_1c_start"),
+}
+SLOW_OR_PULSES = ("c20", "hppc")
+CONTROLS: dict[str, tuple[str, ...]] = {
+    HG2: ("25degC_mixed1", "25degC_mixed2", "25degC_mixed3", "25degC_la92", "25degC_us06", "25degC_cap_1c_b"),
+    PANASONIC: (
+        "25degC_cycle_1",
+        "25degC_cycle_2",
+        "25degC_cycle_3",
+        "25degC_hwfet",
+        "25degC_la92",
+        "25degC_us06",
+    ),
+    NMC: ("drive_cycle", "C2", "1C"),
+    M50T: ("n0_udds", "n0_hppc"),
+}
+COLDER_CONTROLS: dict[str, tuple[str, ...]] = {
+    HG2: ("10degC_us06", "0degC_mixed1", "40degC_la92"),
+    PANASONIC: ("10degC_cycle_1", "0degC_cycle_1", "n10degC_cycle_1"),
+}
+"""The thermocouple is given: what is left is what a file calibrated at 25 degC lacks there, and no temperature."""
+FAULTY = {HG2: "25degC_mixed1", PANASONIC: "25degC_cycle_1", NMC: "drive_cycle"}
+FAULTS: dict[FaultKind, tuple[tuple[float, ...], tuple[str, ...], str]] = {
+    "current_offset": (
+        (0.05, 0.1, 0.3),
+        ("current_sensor_offset", "leakage_current"),
+        "current_sensor_offset.offset_a",
+    ),
+    "current_gain": ((1.01, 1.02, 1.03), ("current_sensor_gain",), "current_sensor_gain.gain"),
+    "voltage_offset": ((0.003, 0.008, 0.015), ("voltage_sensor_offset",), "voltage_sensor_offset.offset_v"),
+    "voltage_lag": ((0.3, 1.0, 2.0), ("clock_skew",), "clock_skew.lag_s"),
+    "wrong_soc0": ((0.02, 0.05, 0.1), (), ""),
+}
+"""Kind -> three sizes, right names, and the parameter that holds the size. An initial state that was told wrongly is
+for the finder to correct, without a name."""
+RESISTANCES_OHM = {HG2: (0.005, 0.015), PANASONIC: (0.005, 0.015), NMC: (0.0005, 0.002)}
+MORE_IN_FILE = 0.05
+LOSSES = ("lithium_inventory_loss", "active_material_loss_negative", "active_material_loss_positive")
+
+
+def plan() -> tuple[RealCase, ...]:
+    """All cases in a fixed order; every other one of a group is for development."""
+    cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing()]
+    there = {case.name for case in cases}
+    seen: dict[str, int] = {}
+    out = []
+    for case in cases:
+        number = seen[case.group] = seen.get(case.group, -1) + 1
+        matched = case.matched if case.matched in there else None
+        out.append(replace(case, development=number % 2 == 0, matched=matched))
+    return tuple(out)
+
+
+def chosen(
+    cases: int | None = None, only: str | None = None, development: bool | None = None, every: int = 1
+) -> list[RealCase]:
+    """Cases of the plan.
+
+    cases : the first so many.  only : a group, or a substring of names.  development : only those that choose, or only
+    those that do not.  every : take each n-th.
+    """
+    found = [c for c in plan() if only is None or only == c.group or only in c.name]
+    found = [c for c in found if development is None or c.development == development]
+    return found[::every][:cases]
+
+
+def _stop(file: str) -> float | None:
+    return None if any(word in file for word in SLOW_OR_PULSES) else WINDOW_S
+
+
+def _soc0(cell: str, file: str) -> float | None:
+    """Every test starts from a full charge but two of the M50T."""
+    if cell != M50T:
+        return 1.0
+    return 0.7816 if file == "n0_udds" else None
+
+
+def _controls() -> Iterator[RealCase]:
+    for given in (CONTROLS, COLDER_CONTROLS):
+        for cell, files in given.items():
+            for file in files:
+                yield RealCase(
+                    name=f"control-{cell}-{file}",
+                    group="control",
+                    cell=CELLS[cell],
+                    take=Take(cell, file, _stop(file)),
+                    soc0=_soc0(cell, file),
+                    answers=(),
+                    source="the same cell at the temperature given, nothing put in",
+                )
+
+
+def _withheld() -> Iterator[RealCase]:
+    for cell, files in COLD_AND_HOT.items():
+        for file in files:
+            yield RealCase(
+                name=f"withheld-{cell}-{file}",
+                group="withheld",
+                cell=CELLS[cell],
+                take=Take(cell, file, _stop(file), temperature=False),
+                soc0=1.0,
+                answers=("ambient_temperature",),
+                source=THERMOCOUPLE,
+                measured="temperature",
+                matched=f"control-{cell}-{file}",
+            )
+    for cell, files in WARMING.items():
+        for file in files:
+            yield RealCase(
+                name=f"warming-{cell}-{file}",
+                group="withheld",
+                cell=CELLS[cell],
+                take=Take(cell, file, _stop(file), temperature=False),
+                soc0=1.0,
+                answers=("self_heating", "ambient_temperature"),
+                source=THERMOCOUPLE,
+                matched=f"control-{cell}-{file}",
+            )
+
+
+def _faults() -> Iterator[RealCase]:
+    for number in range(3):
+        for kind, (sizes, answers, parameter) in FAULTS.items():
+            for cell, file in FAULTY.items():
+                size = sizes[number]
+                yield RealCase(
+                    name=f"{kind}-{size:g}-{cell}",
+                    group="fault",
+                    cell=CELLS[cell],
+                    take=Take(cell, file, WINDOW_S),
+                    soc0=1.0,
+                    answers=answers,
+                    source=PUT_IN,
+                    parameters={parameter: size} if parameter else {},
+                    fault=Fault(kind, size),
+                    matched=f"control-{cell}-{file}",
+                )
+
+
+def _physics() -> Iterator[RealCase]:
+    for cell, file in FAULTY.items():
+        for ohm in RESISTANCES_OHM[cell]:
+            yield RealCase(
+                name=f"contact-{ohm:g}-{cell}",
+                group="physics",
+                cell=CELLS[cell],
+                take=Take(cell, file, WINDOW_S),
+                soc0=1.0,
+                answers=("series_resistance",),
+                source=PUT_IN,
+                parameters={"series_resistance.resistance_ohm": ohm},
+                fault=Fault("contact_resistance", ohm),
+                matched=f"control-{cell}-{file}",
+            )
+        yield RealCase(
+            name=f"capacity-{cell}",
+            group="physics",
+            cell=CELLS[cell],
+            take=Take(cell, file),
+            soc0=1.0,
+            answers=(*LOSSES, "current_sensor_gain"),
+            source=f"{PUT_IN} to the file: {MORE_IN_FILE:.0%} more of both electrodes",
+            fault=Fault("capacity_in_file", MORE_IN_FILE),
+            matched=f"control-{cell}-{file}",
+        )
+
+
+def _ageing() -> Iterator[RealCase]:
+    march = Take(PANASONIC, "25degC_1c_start")
+    for file, answers in (("25degC_1c_end", LOSSES), ("25degC_1c_start", ())):
+        yield RealCase(
+            name=f"ageing-{file}",
+            group="ageing",
+            cell=CELLS[PANASONIC],
+            take=Take(PANASONIC, file),
+            soc0=1.0,
+            answers=answers,
+            source="charge of the 1C discharges of March and July 2017",
+            measured="capacity" if answers else None,
+            against=march if answers else None,
+        )

@@ -1,0 +1,67 @@
+"""What a column's name suggests: for the sentences that propose an option, never for reading."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+
+from aesi.data import units
+from aesi.data.readers.formats.format import plain
+
+LIKELY = {
+    "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
+    "current_a": r"current|strom|\bamps?\b|\bi\b|^<?i>?\b|ampere",
+    "voltage_v": r"volt|spannung|ecell|ewe|potential|\b[uv]\b",
+    "temperature_degc": r"temp|°c|degc|celsius|\bt\d\b",
+    "state": r"^(state|status|step type|mode|md|command|zustand|direction)\b",
+}
+UNLIKELY = {
+    "time_s": r"step|rest\b|date|stamp|real|absolute|cycle|dpt|dt\b|/dt",
+    "current_a": r"density|range|limit|capacity|control|set\b|rate|time|temp|dq|power|shunt|offset",
+    "voltage_v": r"limit|control|set\b|max|min|dv|range|aux|offset|power|upper|lower",
+    "temperature_degc": r"time|/dt|set\b|limit|circuit|ambient|chamber|env",
+    "state": r"time|of charge|soc",
+}
+UNIT = re.compile(
+    r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
+)
+
+
+def nearest(quantity: str, header: Sequence[str], doubtful: bool = False) -> str | None:
+    """The column of the header that most likely holds the quantity, or None.
+
+    doubtful : also one that more likely holds something near it (a step's time, a limit).
+    """
+    likely = [name for name in header if quantity in LIKELY and re.search(LIKELY[quantity], plain(name))]
+    best = min(likely, key=lambda name: _doubt(quantity, name), default=None)
+    return best if best is None or doubtful or not _doubt(quantity, best)[0] else None
+
+
+def unit_in(name: str) -> str:
+    """The unit in a column's name: 'I[mA]', 'Current (mA)', 'Voltage / mV', 'time_ms'; '' without one."""
+    found = UNIT.search(name)
+    return next((text for text in found.groups() if text), "") if found else ""
+
+
+def unit_of(quantity: str, name: str) -> str | None:
+    """The unit of the quantity that a column's name says, as `--unit` takes it; None where it says none."""
+    return units.spelt(quantity, unit_in(name))
+
+
+def options(quantities: Iterable[str], header: Sequence[str]) -> str:
+    """The options that map the quantities to the likeliest columns, with their units where these are not SI."""
+    return " ".join(of_column(quantity, nearest(quantity, header) or "NAME") for quantity in quantities)
+
+
+def of_column(quantity: str, name: str) -> str:
+    """The options that map a quantity to one column, with its unit where that is not SI."""
+    unit = unit_of(quantity, name)
+    declared = f" --unit {quantity}={unit}" if unit is not None and unit != units.SI[quantity] else ""
+    return f'--column {quantity}="{name}"{declared}'
+
+
+def _doubt(quantity: str, name: str) -> tuple[bool, int]:
+    unit = unit_of(quantity, name)
+    return bool(re.search(UNLIKELY[quantity], plain(name))), 0 if unit == units.SI.get(
+        quantity
+    ) else 1 if unit else 2

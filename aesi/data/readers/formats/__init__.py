@@ -1,0 +1,23 @@
+"""The exports of cyclers that are known by the names of their columns: one file each, one line here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from aesi.data.readers.formats import arbin, basytec, biologic, digatron, maccor, neware, novonix
+from aesi.data.readers.formats.format import Format
+
+FORMATS: tuple[Format, ...] = (
+    arbin.FORMAT,
+    maccor.FORMAT,
+    biologic.FORMAT,
+    novonix.FORMAT,
+    digatron.FORMAT,
+    basytec.FORMAT,
+    neware.FORMAT,
+)
+
+
+def recognise(header: Sequence[str]) -> Format | None:
+    """The maker whose export has these names of columns; None where it is no maker's."""
+    return next((one for one in FORMATS if one.recognises(header)), None)

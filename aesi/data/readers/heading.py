@@ -1,0 +1,79 @@
+"""Where a table begins: the line with the names of its columns, below whatever a logger writes above it."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from aesi.data.readers.formats import recognise
+from aesi.data.readers.formats.format import Format, plain
+
+LINES_LOOKED_AT = 600
+"""BioLogic writes some 100 lines above its table, Novonix one a step of the protocol."""
+SEPARATORS = ",;\t|"
+KNOWN = ("time_s", "current_a", "voltage_v", "test time / s", "current / a", "voltage / v")
+UNIT_CELL = re.compile(
+    r"[\[(<]?\s*(s|sec|ms|min|h|hr|d|hh:mm:ss(\.\w+)?|h:m(in)?:s|[mkµu]?a|[mkµu]?v|°?c|degc|k|%|[mk]?ah|[mk]?wh|"
+    r"[mk]?w|[mµu]?ohm|[mµu]?ω|cnt|#|-|1)?\s*[\])>]?",
+    re.IGNORECASE,
+)
+
+
+@dataclass(frozen=True)
+class Heading:
+    """line : its number, counted from 0.  units : what a line of units below it says, '' where nothing.
+
+    has_units : whether there is such a line, which holds no data.
+    """
+
+    line: int
+    header: tuple[str, ...]
+    format: Format | None
+    units: tuple[str, ...]
+
+    @property
+    def has_units(self) -> bool:
+        """Whether a line of units stands between the names and the numbers."""
+        return any(self.units)
+
+
+def find_heading(rows: Sequence[Sequence[str]], wanted: Collection[str] = ()) -> Heading | None:
+    """The heading among rows of cells: a maker's, or one with two of our, BDF's or the wanted names.
+
+    None where there is none of these.
+    """
+    names = {*KNOWN, *(plain(name) for name in wanted)}
+    fallback: Heading | None = None
+    for line, cells in enumerate(rows[:LINES_LOOKED_AT]):
+        if len(cells) < 2:
+            continue
+        header = tuple(cell.strip().lstrip("~") for cell in cells)
+        below = rows[line + 1] if line + 1 < len(rows) else ()
+        form = recognise(header)
+        if form is not None:
+            return Heading(line, header, form, _units(header, below))
+        same = {plain(name) for name in header} & names
+        same |= {name.lower() for name in header} & names
+        if fallback is None and len(same) >= 2:
+            fallback = Heading(line, header, None, _units(header, below))
+    return fallback
+
+
+def split(line: str, separator: str) -> list[str]:
+    """The cells of a line; none where it cannot be split."""
+    try:
+        return next(csv.reader([line], delimiter=separator), [])
+    except csv.Error:
+        return []
+
+
+def _units(header: Sequence[str], below: Sequence[str]) -> tuple[str, ...]:
+    """The units of a line that holds units alone, at least two of them; empty where it is a line of data."""
+    cells = [cell.strip() for cell in below]
+    said = [cell for cell in cells if cell]
+    if len(said) < 2 or not all(UNIT_CELL.fullmatch(cell) and not cell.isdigit() for cell in said):
+        return ()
+    units = [cell.strip("[]()<> ") for cell in cells]
+    return tuple([*units, *[""] * len(header)][: len(header)])

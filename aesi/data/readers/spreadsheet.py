@@ -1,0 +1,87 @@
+"""Excel workbooks (.xlsx), as Arbin and Neware write them, through openpyxl.
+
+The table is taken from the first sheet whose rows hold a heading; clock times and dates become text, so that they
+are read in the same way as from a text file.
+"""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Collection
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from aesi.data.readers.frame import FrameTable
+from aesi.data.readers.heading import LINES_LOOKED_AT, Heading, find_heading
+from aesi.errors import DataError
+
+
+def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
+    """The first sheet with a table of measurements.
+
+    Raises DataError where openpyxl is missing, the file is no workbook, or no sheet has a heading.
+    """
+    try:
+        import openpyxl  # type: ignore[import-untyped]
+    except ImportError:
+        raise DataError(
+            f"{path.name} is an Excel workbook; install its reader (pip install openpyxl), or save the sheet as CSV."
+        ) from None
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+    except Exception as error:
+        # openpyxl raises what zipfile, its XML reader and its own checks raise.
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise DataError(
+            f"{path.name} is a spreadsheet or an archive that cannot be read ({reason[:120]}); save the sheet as CSV."
+        ) from None
+    try:
+        return _first_table(path, book, wanted)
+    finally:
+        book.close()
+
+
+def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:
+    for sheet in book.worksheets:
+        head = [
+            [_word(cell) for cell in row]
+            for row in islice(sheet.iter_rows(values_only=True), LINES_LOOKED_AT)
+        ]
+        heading = find_heading(head, wanted)
+        if heading is not None:
+            return _table(path, sheet, heading)
+    raise DataError(
+        f"{path.name}: no sheet ({', '.join(book.sheetnames[:8])}) names time_s, current_a and voltage_v or the "
+        "columns of a known cycler; name its columns: --column time_s=NAME --column current_a=NAME "
+        "--column voltage_v=NAME."
+    )
+
+
+def _table(path: Path, sheet: Any, heading: Heading) -> FrameTable:
+    start = heading.line + 1 + int(heading.has_units)
+    rows = [
+        row
+        for row in islice(sheet.iter_rows(values_only=True), start, None)
+        if any(c is not None for c in row)
+    ]
+    width = len(heading.header)
+    columns = [[_plain(row[place]) if place < len(row) else None for row in rows] for place in range(width)]
+    notes = (f"Read from the sheet {sheet.title!r}.",)
+    return FrameTable(path, heading.header, columns, notes, heading.units, start + 1)
+
+
+def _word(cell: Any) -> str:
+    return "" if cell is None else str(_plain(cell))
+
+
+def _plain(cell: Any) -> Any:
+    """Clock times as h:m:s and dates as ISO 8601; all else as it is."""
+    if isinstance(cell, datetime.timedelta):
+        seconds = cell.total_seconds()
+        hours, rest = divmod(seconds, 3600.0)
+        minutes, seconds = divmod(rest, 60.0)
+        return f"{int(hours)}:{int(minutes):02d}:{seconds:09.6f}"
+    if isinstance(cell, datetime.datetime | datetime.time):
+        return cell.isoformat()
+    return cell

@@ -1,0 +1,68 @@
+"""How a file is to be read: what the user says of its columns, units, sign and rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, get_args
+
+from aesi.data.readers.formats.format import Sign
+from aesi.data.state import Direction
+from aesi.errors import DataError
+
+Duplicates = Literal["refuse", "first", "last"]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What is said of files; everything else is told by their headers.
+
+    columns : quantity, or `state`, `cycle`, `step` -> the file's name for it; None leaves the temperature out.
+    units : quantity -> unit of the file's column (`mA`, `mV`, `ms`, `h`, `K`, `h:m:s`, `date`, a strptime pattern).
+    sign : which direction of the file's current is positive; None: that of the export, else discharge.
+    state_words : words of the state column -> charge, discharge or rest, where they are not known.
+    cycle, step : keep the rows of this number, or of these from:to.  start_s, stop_s : keep rows between.
+    duplicates : which row of several with one stamp to keep; None: the first in a known export, whose cyclers
+        write the end of a step and the start of the next with one stamp; any other file is refused.
+    """
+
+    columns: Mapping[str, str | None] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    sign: Sign | None = None
+    state_words: Mapping[str, Direction] = field(default_factory=dict)
+    cycle: str | None = None
+    step: str | None = None
+    start_s: float | None = None
+    stop_s: float | None = None
+    duplicates: Duplicates | None = None
+
+    def __post_init__(self) -> None:
+        _check_choice("sign", self.sign, get_args(Sign))
+        _check_choice("duplicates", self.duplicates, get_args(Duplicates))
+        for name in ("cycle", "step"):
+            bounds(name, getattr(self, name))
+
+    @property
+    def selectors(self) -> tuple[str, ...]:
+        """The columns that rows are chosen by."""
+        return tuple(name for name in ("cycle", "step") if getattr(self, name) is not None)
+
+    def but(self, **changes: Any) -> Reading:
+        """The same but for these."""
+        return replace(self, **changes)
+
+
+def bounds(name: str, text: str | None) -> tuple[float, float] | None:
+    """'3' as (3, 3), '3:5' as (3, 5); None for None.  Raises DataError for anything else."""
+    if text is None:
+        return None
+    first, _, last = str(text).partition(":")
+    try:
+        return float(first), float(last or first)
+    except ValueError:
+        raise DataError(f"{name} = {text!r} has to be a number, or from:to, as in 3 or 3:5.") from None
+
+
+def _check_choice(what: str, value: str | None, choices: tuple[str, ...]) -> None:
+    if value is not None and value not in choices:
+        raise DataError(f"{what} = {value!r} is unknown; give {' or '.join(choices)}.")

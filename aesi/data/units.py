@@ -1,0 +1,116 @@
+"""Units in which files hold the four quantities, and the way from there to s, A, V and degC.
+
+A unit comes from a maker's format, which writes it beside the name, or from the user (`--unit current_a=mA`).
+It is never told from the numbers.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+
+SI = {"time_s": "s", "current_a": "A", "voltage_v": "V", "temperature_degc": "degC"}
+FACTORS: dict[str, dict[str, float]] = {
+    "time_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0},
+    "current_a": {"A": 1.0, "mA": 1e-3, "uA": 1e-6, "kA": 1e3},
+    "voltage_v": {"V": 1.0, "mV": 1e-3, "uV": 1e-6},
+    "temperature_degc": {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0},
+}
+OFFSETS = {"K": -273.15, "degF": -32.0}
+"""Added before the factor."""
+CLOCK = "h:m:s"
+DATE = "date"
+SPELLINGS = {
+    "time_s": {
+        "s": ("s", "sec", "secs", "second", "seconds"),
+        "ms": ("ms", "msec", "milliseconds"),
+        "us": ("us", "µs", "μs"),
+        "min": ("min", "mins", "minute", "minutes"),
+        "h": ("h", "hr", "hrs", "hour", "hours"),
+        "d": ("d", "day", "days"),
+        CLOCK: ("h:m:s", "h:min:s", "h:min:s.ms", "hh:mm:ss", "hh:mm:ss.ms", "hh:mm:ss.fff"),
+    },
+    "current_a": {
+        "A": ("a", "amp", "amps", "ampere"),
+        "mA": ("ma",),
+        "uA": ("ua", "µa", "μa"),
+        "kA": ("ka",),
+    },
+    "voltage_v": {"V": ("v", "volt", "volts"), "mV": ("mv",), "uV": ("uv", "µv", "μv")},
+    "temperature_degc": {
+        "degC": ("degc", "°c", "c", "celsius", "℃", "�c", "øc"),
+        "K": ("k", "kelvin"),
+        "degF": ("f", "degf", "°f"),
+    },
+}
+"""How headers and users write each unit, in lower case."""
+CLOCK_TIME = re.compile(
+    r"(?:(\d+)\s*(?:d|days?)[ ,:]\s*)?(\d+):(\d{1,2}):(\d{1,2}(?:[.,]\d+)?)", re.IGNORECASE
+)
+
+
+def spelt(quantity: str, text: str) -> str | None:
+    """The unit that a header or a user means by `text`; None where it is none of the quantity's."""
+    plain = text.strip().lower()
+    for unit, ways in SPELLINGS[quantity].items():
+        if plain in ways:
+            return unit
+    return None
+
+
+def declared(quantity: str, text: str) -> str:
+    """A user's unit.  Raises DataError, with those that there are, for an unknown one."""
+    if quantity not in SI:
+        raise DataError(f"{quantity!r} has no unit to declare; those that have one: {', '.join(SI)}.")
+    if quantity == "time_s" and ("%" in text or text.strip().lower() == DATE):
+        return text.strip() if "%" in text else DATE
+    unit = spelt(quantity, text)
+    if unit is None:
+        also = ", h:m:s, date, or a pattern such as '%d.%m.%Y %H:%M:%S'" if quantity == "time_s" else ""
+        raise DataError(f"{quantity} in {text!r} is unknown; units: {', '.join(FACTORS[quantity])}{also}.")
+    return unit
+
+
+def is_text(unit: str) -> bool:
+    """Whether cells in this unit are words (clock times, dates), not numbers."""
+    return unit in (CLOCK, DATE) or "%" in unit
+
+
+def to_si(quantity: str, values: Array, unit: str) -> Array:
+    """(n,) numbers in `unit` as s, A, V or degC."""
+    if unit == SI[quantity]:
+        return values
+    return (values + OFFSETS.get(unit, 0.0)) * FACTORS[quantity][unit]
+
+
+def clock_to_s(cells: Sequence[str]) -> Array:
+    """(n,) s of '12:34:56.7' or '3d 12:34:56'; empty cells, and what is no such time, become NaN."""
+    seconds = np.full(len(cells), np.nan)
+    for row, cell in enumerate(cells):
+        found = CLOCK_TIME.fullmatch(cell.strip())
+        if found:
+            days, hours, minutes, rest = found.groups()
+            seconds[row] = (
+                86400.0 * int(days or 0)
+                + 3600.0 * int(hours)
+                + 60.0 * int(minutes)
+                + float(rest.replace(",", "."))
+            )
+    return seconds
+
+
+def dates_to_s(cells: Sequence[str], pattern: str) -> Array:
+    """(n,) s since the first date; pattern : 'date' (ISO 8601) or one of strptime.  NaN for what is no date."""
+    import pandas as pd
+
+    form = "ISO8601" if pattern == DATE else pattern
+    stamps = pd.to_datetime(pd.Series(cells).str.strip(), format=form, errors="coerce")
+    first = stamps.dropna()
+    if first.empty:
+        return np.full(len(cells), np.nan)
+    return np.asarray((stamps - first.iloc[0]).dt.total_seconds(), dtype=float)

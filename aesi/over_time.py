@@ -1,0 +1,54 @@
+"""A quick look at columns over time: one panel a quantity, drawn by plotly, which is imported where it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from aesi.constants import SECONDS_PER_HOUR
+from aesi.numerics.typing import Array
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+LONGEST_IN_SECONDS = 20_000.0
+PANEL_HEIGHT = 190
+COLOURS = ("#1f2328", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
+"""Ink, then Okabe and Ito's palette, safe for colour-blind readers."""
+BAND = "rgba(0,114,178,0.2)"
+
+
+def time_unit(span_s: float) -> tuple[str, float]:
+    """Label and divisor for an axis of that length: seconds, or hours for long tests."""
+    return ("h", SECONDS_PER_HOUR) if span_s > LONGEST_IN_SECONDS else ("s", 1.0)
+
+
+def over_time(
+    time_s: Array, panels: Mapping[str, Mapping[str, Array]], band: tuple[str, Array, Array] | None = None
+) -> Figure:
+    """A plotly figure: panels below one another over a common time, from the first sample.
+
+    time_s : (n,) s.  panels : axis title with unit -> name -> (n,).  band : name, lower and upper (n,), in the first.
+    """
+    from plotly.graph_objects import Scatter
+    from plotly.subplots import make_subplots
+
+    unit, divisor = time_unit(float(time_s[-1] - time_s[0]))
+    x = (time_s - time_s[0]) / divisor
+    figure = make_subplots(rows=len(panels), cols=1, shared_xaxes=True, vertical_spacing=0.04)
+    if band is not None:
+        name, low, high = band
+        figure.add_trace(Scatter(x=x, y=low, line={"width": 0}, showlegend=False, hoverinfo="skip"), 1, 1)
+        figure.add_trace(
+            Scatter(x=x, y=high, name=name, line={"width": 0}, fill="tonexty", fillcolor=BAND), 1, 1
+        )
+    for row, (title, columns) in enumerate(panels.items(), start=1):
+        for colour, (name, values) in zip(COLOURS, columns.items(), strict=False):
+            figure.add_trace(
+                Scatter(x=x, y=values, name=name, mode="lines", line={"width": 1.2, "color": colour}), row, 1
+            )
+        figure.update_yaxes(title_text=title, row=row, col=1)
+    figure.update_xaxes(title_text=f"time, {unit}", row=len(panels), col=1)
+    return figure.update_layout(
+        template="plotly_white", height=PANEL_HEIGHT * len(panels) + 80, hovermode="x unified"
+    )

@@ -1,0 +1,69 @@
+"""What `simulate` is given, checked before anything is computed: one sentence for what cannot be meant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, get_args
+
+from aesi.errors import InputError
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect, Effect
+
+FARTHEST_SOC = 1.0
+"""A state of charge further than this outside [0, 1] is a percentage or a voltage, not a cell beyond its limits."""
+
+
+def check_cell(cell: object) -> None:
+    """Raises InputError for what is no Cell, such as the path of its file."""
+    if not isinstance(cell, Cell):
+        raise InputError(
+            f"cell is {_a(cell)}, not a Cell; read one from its file with aesi.Cell.from_bpx(path)."
+        )
+
+
+def checked_effects(effects: object) -> tuple[ActiveEffect, ...]:
+    """The effects as a tuple.  Raises InputError for a name, an effect without values, or no collection at all."""
+    if isinstance(effects, str | Effect | ActiveEffect) or not isinstance(effects, Iterable):
+        raise InputError(
+            f"effects is {_a(effects)}; give a list of them, as in effects=[{_activation(effects)}]."
+        )
+    given = tuple(effects)
+    for effect in given:
+        if not isinstance(effect, ActiveEffect):
+            raise InputError(
+                f"effects holds {_a(effect)}, which has no values yet; give {_activation(effect)}, with "
+                "CATALOGUE from aesi.physics.effects."
+            )
+    return given
+
+
+def check_choice(name: str, value: object, choices: Any) -> None:
+    """Raises InputError where `value` is none of the words of the Literal `choices`."""
+    words = get_args(choices)
+    if value not in words:
+        allowed = " or ".join(repr(word) for word in words)
+        raise InputError(f"{name} = {value!r} is not known; give {allowed}.")
+
+
+def check_soc(soc0: Any) -> None:
+    """Raises InputError for a state of charge that is no share of the capacity."""
+    if soc0 is None:
+        return
+    if (
+        isinstance(soc0, str) or not -FARTHEST_SOC <= soc0 <= 1.0 + FARTHEST_SOC
+    ):  # this way round, NaN fails too
+        raise InputError(
+            f"soc0 = {soc0!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
+            "so 90 % is 0.9."
+        )
+
+
+def _activation(effect: object) -> str:
+    if isinstance(effect, ActiveEffect):
+        return "effect"
+    name = effect.id if isinstance(effect, Effect) else effect if isinstance(effect, str) else "name"
+    return f"CATALOGUE[{name!r}].activate()"
+
+
+def _a(value: object) -> str:
+    return f"the text {value!r}" if isinstance(value, str) else f"of type {type(value).__name__}"

@@ -1,0 +1,103 @@
+"""What `aesi.discover` gives back: the verdict, its figures as a table and a plot, and the model it leads to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from aesi.pipeline.discovery.discover import Case, found_model, to_json, view, write_discovery
+from aesi.pipeline.product.hybrid import HybridModel
+from aesi.tracer import Discovery
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from plotly.graph_objects import Figure
+
+LABELS = {"before": "as declared", "recalibrated": "recalibrated", "after": "after"}
+
+
+@dataclass(frozen=True, eq=False)
+class Finding:
+    """What a discovery says of a cell.  case : what was asked.  found : the tracer's answer, whole."""
+
+    case: Case
+    found: Discovery
+
+    def __repr__(self) -> str:
+        after, before = self.rmse_mv("after"), self.rmse_mv("before")
+        named = f" {', '.join(self.effects)}" if self.effects else ""
+        errors = f"{before:.2f} mV as declared, {after:.2f} mV after, on data that chose nothing"
+        return f"Finding({self.verdict}{named}, {errors})"
+
+    @property
+    def verdict(self) -> str:
+        """`found`, `none` or `unknown`."""
+        return str(self.content["verdict"])
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Ids of the effects that were found, in the order in which they were added."""
+        return tuple(self.content["effects"])
+
+    @property
+    def confidence(self) -> float:
+        """Of the verdict, between 0 and 1."""
+        return float(self.content["confidence"])
+
+    @property
+    def reason(self) -> str:
+        """What the verdict rests on, in a sentence."""
+        return str(self.content["reason"])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was assumed, and what the reader did to the files."""
+        return tuple(self.content["notes"])
+
+    def rmse_mv(
+        self,
+        state: Literal["before", "recalibrated", "after"] = "after",
+        part: Literal["fit", "test"] = "test",
+    ) -> float:
+        """RMS voltage error, mV: as declared, recalibrated, or with what was found; NaN where there is no such part.
+
+        part : "test", which chose nothing, or "fit", which was fitted.
+        """
+        return float(self.content[state][part].get("rmse_mv", float("nan")))
+
+    @cached_property
+    def content(self) -> dict[str, Any]:
+        """What discovery.json holds."""
+        records = (*self.case.measurements, *self.case.tests)
+        return to_json(self.found, [note for m in records for note in m.notes])
+
+    @cached_property
+    def model(self) -> HybridModel:
+        """The cell with what was found, for `predict` and `save`."""
+        return found_model(self.found)
+
+    def to_frame(self) -> pd.DataFrame:
+        """The candidates, best first: one row a parameter, with its 90 % interval."""
+        import pandas as pd
+
+        rows = []
+        for candidate in self.content["candidates"]:
+            about = {key: candidate[key] for key in ("effect", "kind", "score", "test_rmse_mv")}
+            for name, values in (candidate["parameters"] or {None: {}}).items():
+                rows.append(about | {"parameter": name} | values)
+        columns = ("effect", "kind", "score", "test_rmse_mv", "parameter", "value", "low", "high", "unit")
+        return pd.DataFrame(rows, columns=list(columns))
+
+    def plot(self, part: Literal["fit", "test"] = "test") -> Figure:
+        """Measured voltage, current, and the residual in each state of the model, over time: a plotly figure."""
+        from aesi.pipeline.report.plots.records import residual_figure
+
+        traces = view(self.found, self.content, "").of(part)
+        return residual_figure(traces, LABELS)
+
+    def save(self, out: str | Path) -> Path:
+        """Write discovery.json, report.html and model/ to a folder, as `aesi discover` does; returns the folder."""
+        write_discovery(Path(out), self.case, self.found)
+        return Path(out)

@@ -1,0 +1,261 @@
+"""One offline page over several runs: what differs in their settings, what came of it, and where the error is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from aesi.pipeline.report.page import write_plain_page
+from aesi.pipeline.report.table_formats import ABSENT
+
+COLUMNS = {
+    "free_run/test_rmse_mv": "RMSE, free run, mV",
+    "free_run/test_mser_pct": "MSER, free run, %",
+    "one_step/test_rmse_mv": "RMSE, one step, mV",
+    "one_step/persistence_rmse_mv": "persistence, one step, mV",
+    "intervals/coverage_pct": "coverage, one step, %",
+    "intervals/worst_bin_coverage_pct": "worst bin, %",
+    "intervals/average_width_v": "width, one step, V",
+    "tables/free_run_intervals/coverage_pct": "coverage, free run, %",
+    "terms": "terms",
+    "before/test_rmse_mv": "as declared, test, mV",
+    "recalibrated/test_rmse_mv": "recalibrated, test, mV",
+    "after/test_rmse_mv": "with the finding, test, mV",
+    "confidence": "confidence",
+    "seconds": "seconds",
+}
+"""MLflow's name of a metric -> heading; a column is shown where a run has it."""
+MOST_COLUMNS = 40
+"""Of runs side by side; more are summed up in one column."""
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedRun:
+    """One tracked run.
+
+    settings : dotted key -> text.  metrics : by MLflow's names.
+    comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
+    """
+
+    run_id: str
+    name: str
+    experiment: str
+    started: str
+    settings: Mapping[str, str]
+    metrics: Mapping[str, float]
+    tags: Mapping[str, str] = field(default_factory=dict)
+    comparison: Mapping[str, Any] = field(default_factory=dict)
+    discovery: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def label(self) -> str:
+        """A name a person can tell from the others."""
+        return f"{self.name} ({self.run_id[:8]})"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Text, what it sorts by (None: the text), and the range below it."""
+
+    text: str
+    sort: float | None = None
+    range: str = ""
+
+
+@dataclass(frozen=True)
+class PageTable:
+    """A table of the page."""
+
+    key: str
+    title: str
+    caption: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+def write_comparison(path: Path, runs: Sequence[ComparedRun]) -> Path:
+    """Write the page; runs keep their order."""
+    maps = [
+        (f"{run.label}: {model}", content)
+        for run in runs
+        for model, content in run.comparison.get("maps", {}).items()
+    ]
+    limit = _limit([content["mean_mv"] for _, content in maps])
+    return write_plain_page(
+        path,
+        "compare.html",
+        payload={"limit": limit, "maps": [content["mean_mv"] for _, content in maps]},
+        scripts={"compare_js": "compare.js"},
+        title=f"{len(runs)} runs compared",
+        heading=_heading(runs),
+        experiments=list(dict.fromkeys(run.experiment for run in runs)),
+        tables=[table for make in TABLES if (table := make(runs)) is not None],
+        maps=[{"label": label, "range": _range_of(content)} for label, content in maps],
+        limit_mv=limit,
+    )
+
+
+def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
+    """Keys that do not hold the same in all runs, in the order of the first."""
+    keys = dict.fromkeys(key for run in runs for key in run.settings)
+    return [key for key in keys if len({run.settings.get(key) for run in runs}) > 1]
+
+
+def _heading(runs: Sequence[ComparedRun]) -> str:
+    changed = len(differing_settings(runs))
+    return f"{len(runs)} runs, {changed} setting{'s' if changed != 1 else ''} that differ{'s' if changed == 1 else ''}"
+
+
+def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
+    keys = differing_settings(runs)
+    shared = len({key for run in runs for key in run.settings}) - len(keys)
+    return PageTable(
+        "settings",
+        "What was different",
+        f"Only the settings that differ; {shared} are the same in all."
+        if keys
+        else "All settings are the same.",
+        ("run", "started", *keys),
+        tuple(
+            (Cell(run.label), Cell(run.started), *(Cell(run.settings.get(key, ABSENT)) for key in keys))
+            for run in runs
+        ),
+    )
+
+
+def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
+    names = [name for name in COLUMNS if any(name in run.metrics for run in runs)]
+    return PageTable(
+        "metrics",
+        "What came of it",
+        "Of each run's chosen model, on its test records. A click on a heading sorts.",
+        ("run", "model", *(COLUMNS[name] for name in names)),
+        tuple(
+            (
+                Cell(run.label),
+                Cell(run.settings.get("chosen_model", ABSENT)),
+                *(_figure(run, n) for n in names),
+            )
+            for run in runs
+        ),
+    )
+
+
+def _figure(run: ComparedRun, name: str) -> Cell:
+    value = run.metrics.get(name)
+    if value is None:
+        return Cell(ABSENT)
+    model = run.settings.get("chosen_model", "")
+    ends = run.comparison.get("intervals", {}).get(model, {}).get(name.rpartition("/")[2])
+    return Cell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
+
+
+def _verdicts(runs: Sequence[ComparedRun]) -> PageTable | None:
+    found = [run for run in runs if run.discovery]
+    if not found:
+        return None
+    names = list(dict.fromkeys(name for run in found for name in _parameters(run)))
+    return PageTable(
+        "verdicts",
+        "What was found to be missing",
+        "Verdict and effects of each discovery, with the parameters of the effects and their 90 % intervals.",
+        ("run", "verdict", "effects", *names),
+        tuple(
+            (
+                Cell(run.label),
+                Cell(str(run.discovery["verdict"])),
+                Cell(", ".join(run.discovery["effects"]) or "none"),
+                *(_parameters(run).get(name, Cell(ABSENT)) for name in names),
+            )
+            for run in found
+        ),
+    )
+
+
+def _parameters(run: ComparedRun) -> dict[str, Cell]:
+    """effect.parameter -> value with unit, of the effects that were added."""
+    cells = {}
+    for candidate in run.discovery.get("candidates", ()):
+        if candidate["effect"] in run.discovery["effects"]:
+            for name, given in candidate["parameters"].items():
+                low, high = given.get("low"), given.get("high")
+                ends = f"{_text(low)} to {_text(high)}" if low is not None and high is not None else ""
+                cells[f"{candidate['effect']}.{name}"] = Cell(
+                    f"{_text(given['value'])} {given.get('unit', '')}".strip(), given["value"], ends
+                )
+    return cells
+
+
+def _genes(runs: Sequence[ComparedRun]) -> PageTable | None:
+    names = list(dict.fromkeys(name for run in runs for name in run.comparison.get("genome", {})))
+    if not names:
+        return None
+    return PageTable(
+        "genes",
+        "What the search chose",
+        "The genes of the chosen candidate.",
+        ("run", *names),
+        tuple(
+            (Cell(run.label), *(_value(run.comparison.get("genome", {}).get(name)) for name in names))
+            for run in runs
+        ),
+    )
+
+
+def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
+    having = [run for run in runs if run.comparison.get("terms")]
+    if len(having) < 2:
+        return None
+    count: dict[str, int] = {}
+    for run in having:
+        for term in run.comparison["terms"]:
+            count[term] = count.get(term, 0) + 1
+    differing = sorted(
+        (term for term in count if count[term] < len(having)), key=lambda term: (-count[term], term)
+    )
+    shared = len(count) - len(differing)
+    caption = (
+        f"Coefficients of the terms that not all runs hold; {shared} terms are in all {len(having)} runs."
+    )
+    if len(having) > MOST_COLUMNS:
+        counted = tuple((Cell(term), Cell(str(count[term]), count[term])) for term in differing)
+        return PageTable("terms", "Terms", caption, ("term", "in runs"), counted)
+    rows = tuple(
+        (Cell(term), *(_value(run.comparison["terms"].get(term)) for run in having)) for term in differing
+    )
+    return PageTable("terms", "Terms", caption, ("term", *(run.label for run in having)), rows)
+
+
+TABLES: tuple[Callable[[Sequence[ComparedRun]], PageTable | None], ...] = (
+    _settings,
+    _metrics,
+    _verdicts,
+    _genes,
+    _terms,
+)
+"""The tables of the page, in their order."""
+
+
+def _value(value: Any) -> Cell:
+    if value is None:
+        return Cell(ABSENT)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return Cell(str(value))
+    return Cell(_text(value), float(value))
+
+
+def _text(value: float) -> str:
+    return f"{value:.4g}"
+
+
+def _limit(maps: Sequence[Sequence[Sequence[float | None]]]) -> float:
+    """A colour range that single bins cannot stretch, mV."""
+    values = sorted(abs(v) for rows in maps for row in rows for v in row if v is not None)
+    return values[int(0.98 * (len(values) - 1))] if values else 1.0
+
+
+def _range_of(content: Mapping[str, Any]) -> str:
+    current, soc = content["current_a"], content["soc"]
+    return f"{current[0]:.3g} to {current[-1]:.3g} A, {100 * soc[0]:.3g} to {100 * soc[-1]:.3g} % of charge"

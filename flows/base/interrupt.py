@@ -1,0 +1,75 @@
+"""Ctrl-C ends a command within two seconds, whatever is running.
+
+What is worth keeping is on disk at every moment, and a run that was cut off is closed by whoever comes next; so
+after a moment for a tidy end, in which Prefect and MLflow may not have finished, the process and its children go.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+TIDY_S = 1.5
+"""For a tidy end; with the half second that stopping the children takes, two seconds."""
+INTERRUPTED = 130
+"""What shells return for a process that Ctrl-C ended."""
+
+
+_asked = threading.Event()
+
+
+@contextmanager
+def ending_soon_on_interrupt() -> Iterator[None]:
+    """Within, the first Ctrl-C interrupts and, after a moment, ends the process; a second one ends it at once."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, _interrupt)
+    try:
+        yield
+    finally:
+        if _asked.is_set():
+            end_now()
+        signal.signal(signal.SIGINT, before)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> None:
+    if _asked.is_set():
+        end_now()
+    _asked.set()
+    threading.Thread(target=_end_later, daemon=True).start()
+    raise KeyboardInterrupt
+
+
+def _end_later() -> None:
+    time.sleep(TIDY_S)
+    end_now()
+
+
+def end_now() -> None:
+    """End the children (workers, Prefect's temporary server) and the process, without waiting for anything."""
+    import psutil
+
+    print("Interrupted.", file=sys.stderr, flush=True)
+    children = psutil.Process().children(recursive=True)
+    for child in children:
+        _signal(child, signal.SIGTERM)
+    psutil.wait_procs(children, timeout=0.3)
+    for child in children:
+        _signal(child, signal.SIGKILL)
+    os._exit(INTERRUPTED)
+
+
+def _signal(child: object, number: int) -> None:
+    import psutil
+
+    try:
+        child.send_signal(number)  # type: ignore[attr-defined]
+    except psutil.Error:
+        return  # it has ended by itself

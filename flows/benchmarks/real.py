@@ -1,0 +1,47 @@
+"""Findings on measured cells (`aesi.bench.real`), spread over processes or Dask workers, tracked, with a report.
+
+Each case is a nested run in the experiment `real`; its parent holds the rates and the confusion matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from aesi.bench.real import chosen, judged, summary, write_report
+from aesi.bench.real.judge import LIMIT_S
+from flows.benchmarks.cases import Cases, tracked
+
+SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
+
+
+def run(
+    cells: str = "experiments/cells",
+    cases: int | None = None,
+    only: str | None = None,
+    development: bool | None = None,
+    every: int = 1,
+    limit_s: float | None = LIMIT_S,
+    workers: int = 1,
+    address: str | None = None,
+    report: str | None = None,
+) -> Iterator[dict[str, Any]]:
+    """One dict a case as it is judged, and a last one with `summary`: true.
+
+    cells : folder of the declared cell files.  cases, only, development, every : which cases, see `chosen`.
+    limit_s : processor seconds a case.  workers, address : processes here, or a Dask scheduler.
+    report : an HTML file to write.
+    """
+    specs = chosen(cases, only, development, every)
+    judge = partial(judged, cells=cells, limit_s=limit_s)
+    rows = []
+    for row in tracked(Cases("real", 0, specs, judge, summary, SHOWN), workers, address):
+        if row.get("summary"):
+            if report:
+                write_report(Path(report), rows, row)
+            yield row
+        else:
+            rows.append(row)
+            yield {key: value for key, value in row.items() if key != "residual"}

@@ -1,0 +1,155 @@
+"""`aesi candidate`: any candidate of any tracked run, made again from the tracking store alone.
+
+A run carries what its candidates were made from (the error series by role, the declared cell, the settings), and
+every candidate its genome. An evaluation is a pure function of these, so the model and all its figures come back
+to the last digit where the libraries are those of the run.
+
+    from flows.results.candidate import rebuild
+    rebuilt = rebuild("RUN_ID")
+    rebuilt.candidate.bagging.free_run(rebuilt.problem.split.valid[0])
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aesi.errors import AesiError, FitError, InputError
+from aesi.pipeline.experiment.candidate import weights
+from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
+from aesi.pipeline.experiment.conformalise import conformalise
+from aesi.pipeline.experiment.fit import build_problem, final_models
+from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.product.hybrid import HybridModel
+from aesi.records import Failed
+from aesi.sparse import Candidate, Genome, Problem, evaluate
+from flows.base import codec
+from flows.tracking.experiment_log import DECLARED, INPUTS, RECORDS, candidate_metrics, coefficients
+from flows.tracking.store import KIND, PARENT, Store
+
+GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
+
+
+@dataclass(frozen=True, eq=False)
+class Rebuilt:
+    """A candidate made again. tracked, metrics : its figures then and now, by MLflow's names."""
+
+    run_id: str
+    number: int
+    config: ExperimentConfig
+    declared: HybridModel
+    problem: Problem
+    candidate: Candidate
+    tracked: Mapping[str, float]
+    metrics: Mapping[str, float]
+
+    @property
+    def differing(self) -> dict[str, tuple[float, float]]:
+        """Figure -> (then, now) of those that are not equal to the last digit."""
+        return {
+            name: (self.tracked[name], value)
+            for name, value in self.metrics.items()
+            if name in self.tracked and self.tracked[name] != value
+        }
+
+
+def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
+    """The candidate of a tracked run; for the run of an experiment, the one that was chosen.
+
+    Raises InputError where the run is no candidate, had failed, or lacks what it was made from.
+    """
+    store = Store(uri)
+    run = _candidate(store, run_id)
+    parent = run.data.tags[PARENT]
+    config = parse_experiment(json.loads(store.read(parent, "experiment.json").read_text(encoding="utf-8")))
+    split = codec.loads(store.read(parent, f"{INPUTS}/{RECORDS}").read_bytes())
+    declared = HybridModel.load(store.read(parent, f"{INPUTS}/{DECLARED}"))
+    loaded = Loaded(declared.cell, declared.cell.name, declared.effects, split, {}, {}, (), config)
+    problem = build_problem(loaded, config)
+    candidate = evaluate(problem, _genome(run), weights(config))
+    if isinstance(candidate, Failed):
+        raise FitError(
+            f"candidate {run_id} comes to nothing here ({candidate.reason}); it was made with other code."
+        )
+    number = int(run.data.params["number"])
+    metrics = {name: float(value) for name, value in candidate_metrics(candidate).items()}
+    return Rebuilt(run.info.run_id, number, config, declared, problem, candidate, run.data.metrics, metrics)
+
+
+def save(rebuilt: Rebuilt, out: Path) -> Path:
+    """Write candidate.json and the hybrid model of its better ensemble below `out`; the model's folder."""
+    one = rebuilt.candidate.better
+    only = rebuilt.config.model_copy(update={"models": (one.name,)})
+    (fitted,) = conformalise(
+        final_models(rebuilt.problem, rebuilt.candidate, only), rebuilt.problem, rebuilt.candidate, only
+    )
+    model = HybridModel(
+        cell=rebuilt.declared.cell,
+        effects=rebuilt.declared.effects,
+        correction=one,
+        intervals=fitted.intervals,
+        bands=fitted.bands,
+        dt_s=rebuilt.config.data.dt_s,
+        hold=rebuilt.config.data.hold,
+        soc0=rebuilt.declared.soc0,
+    )
+    model.save(out / "model")
+    content = {
+        "run_id": rebuilt.run_id,
+        "number": rebuilt.number,
+        "genome": rebuilt.candidate.genome.to_dict(),
+        "model": one.name,
+        "metrics": dict(rebuilt.metrics),
+        "tracked": dict(rebuilt.tracked),
+        "coefficients": coefficients(rebuilt.candidate),
+    }
+    (out / "candidate.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    return out / "model"
+
+
+def said(rebuilt: Rebuilt, out: Path) -> str:
+    """What came back, in one line."""
+    candidate = rebuilt.candidate
+    return (
+        f"candidate {rebuilt.number}: {len(candidate.bagging.terms)} and {len(candidate.stability.terms)} terms, "
+        f"{candidate.free_run_valid_mser_pct!r} % less squared error on validation in free run; "
+        f"{candidate.better.name} is in {out / 'model'}"
+    )
+
+
+class Differs(AesiError):
+    """A candidate did not come back to the last digit."""
+
+    def __init__(self, rebuilt: Rebuilt) -> None:
+        name, (then, now) = next(iter(rebuilt.differing.items()))
+        super().__init__(
+            f"{len(rebuilt.differing)} figures differ from those tracked ({name}: {then!r} then, {now!r} now); compare "
+            "the run's parameter `versions` with what is installed."
+        )
+
+
+def _candidate(store: Store, run_id: str) -> Any:
+    """The tracked run of a candidate that did not fail."""
+    run = store.run(run_id)
+    if run.data.tags.get(KIND) == "run":
+        number = run.data.params.get("chosen_candidate")
+        if number is None:
+            raise InputError(
+                f"run {run_id} has chosen no candidate yet; give the id of one of its candidates."
+            )
+        run = store.children(run.info.experiment_id, run_id)[f"candidate:{number}"]
+    if run.data.tags.get(KIND) != "candidate":
+        raise InputError(f"run {run_id} is no candidate of a search, nor the run of an experiment.")
+    if "aesi.failed" in run.data.tags:
+        raise InputError(f"candidate {run_id} had failed: {run.data.tags['aesi.failed']}")
+    if "terms" not in run.data.params:
+        raise InputError(f"candidate {run_id} was tracked without its terms, by an earlier version.")
+    return run
+
+
+def _genome(run: Any) -> Genome:
+    params = run.data.params
+    return Genome(terms=params["terms"], **{name: json.loads(params[name]) for name in GENES})

@@ -1,0 +1,89 @@
+"""`aesi compare`: tracked runs side by side, on one offline page, from the tracking store alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from aesi.errors import InputError
+from aesi.pipeline.report.compare import ComparedRun, write_comparison
+from flows.tracking.store import KIND, Store
+
+SHORTEST_ID = 4
+OF_THE_RESULT = ("chosen_candidate",)
+"""Parameters that are what came of a run, not what was asked for."""
+
+
+def compare(wanted: Sequence[str], out: Path, uri: str | None = None) -> list[ComparedRun]:
+    """Write the page about the runs that are named; returns what it shows.
+
+    wanted : run ids or their beginnings, or names of experiments for all of their finished runs.
+    Raises InputError where a name stands for nothing that is tracked, or fewer than two runs are left.
+    """
+    store = Store(uri)
+    runs = [_compared(store, name, run) for name, run in _chosen(store, wanted)]
+    if len(runs) < 2:
+        raise InputError(
+            f"there is {len(runs) or 'no'} run to compare; name two runs, or an experiment with several."
+        )
+    write_comparison(out, runs)
+    return runs
+
+
+def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
+    """(experiment, run) of what was named, each once, in the order of the names; oldest first in an experiment."""
+    experiments = {e.experiment_id: e.name for e in store.client.search_experiments()}
+    by_name = {name: number for number, name in experiments.items()}
+    known: list[Any] | None = None
+    found: dict[str, tuple[str, Any]] = {}
+    for name in wanted:
+        if name in by_name:
+            condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
+            matching = list(store.runs(by_name[name], condition))[::-1]
+        else:
+            known = known if known is not None else _all(store, list(experiments))
+            matching = _beginning(known, name)
+        if not matching:
+            there = ", ".join(sorted(set(by_name) - {"Default"})) or "none"
+            raise InputError(
+                f"{name!r} is no tracked run and no experiment with a finished run; experiments: {there}."
+            )
+        found |= {run.info.run_id: (experiments[run.info.experiment_id], run) for run in matching}
+    return list(found.values())
+
+
+def _all(store: Store, experiments: Sequence[str]) -> list[Any]:
+    return [run for number in experiments for run in store.runs(number, f"tags.`{KIND}` = 'run'")]
+
+
+def _beginning(known: Sequence[Any], name: str) -> list[Any]:
+    """The one run whose id begins so."""
+    matching = [run for run in known if run.info.run_id.startswith(name)] if len(name) >= SHORTEST_ID else []
+    if len(matching) > 1:
+        raise InputError(f"{name!r} is the beginning of {len(matching)} run ids; give more of it.")
+    return matching
+
+
+def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
+    return ComparedRun(
+        run_id=run.info.run_id,
+        name=run.info.run_name or experiment,
+        experiment=experiment,
+        started=datetime.fromtimestamp(run.info.start_time / 1000, UTC).strftime("%Y-%m-%d %H:%M"),
+        settings={k: v for k, v in run.data.params.items() if k not in OF_THE_RESULT},
+        metrics=run.data.metrics,
+        tags=run.data.tags,
+        comparison=_content(store, run, "comparison.json"),
+        discovery=_content(store, run, "discovery.json") if "verdict" in run.data.tags else {},
+    )
+
+
+def _content(store: Store, run: Any, name: str) -> dict[str, Any]:
+    """A JSON artifact, or nothing where the run carries none: runs of earlier versions have no comparison.json."""
+    path = store.artifact(run, name)
+    if path is None:
+        return {}
+    return dict(json.loads(path.read_text(encoding="utf-8")))

@@ -1,0 +1,161 @@
+"""An effect of the user's own, from its file, goes wherever an effect of the catalogue goes."""
+
+import json
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aesi
+from aesi.errors import ConfigError, InputError
+from aesi.physics import Effect
+from aesi.physics.effects import CATALOGUE, activated, known_effects, load_effect
+from aesi.pipeline.discovery.discover import Case, write_discovery
+from aesi.pipeline.experiment.config import parse_experiment
+from aesi.pipeline.experiment.load import load
+from aesi.pipeline.simulation import predict_file, simulate_file
+from aesi.records import Measurement
+from aesi.tracer import discover
+
+CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
+OWN = '''"""Ohmic drop of a lead.
+
+    V = V_cell - I R      I > 0 on discharge
+
+Leaves out its inductance. Holds at any current.
+
+Source: Ohm's law.
+"""
+
+from aesi.parameters import Parameter
+from aesi.physics import Contribution, Effect
+
+PARAMETERS = {"lead_ohm": Parameter(1e-3, "ohm", (0.0, 0.01), "a lead", neutral=0.0, description="R")}
+
+
+def drop(trace, *, lead_ohm):
+    return Contribution(-lead_ohm * trace.current_a, {"lead_v": lead_ohm * trace.current_a})
+
+
+EFFECT = Effect("lead", "physics", __doc__, PARAMETERS, on_voltage=drop)
+'''
+LEAD_OHM = 1e-3
+SOC0 = 0.8
+TIME = np.arange(1800.0)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("own") / "lead.py"
+    path.write_text(OWN)
+    return path
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return aesi.Cell.from_bpx(CELL)
+
+
+@pytest.fixture(scope="module")
+def current():
+    rng = np.random.default_rng(0)
+    held = np.repeat(rng.normal(10.0, 30.0, len(TIME) // 20), 20)
+    held[:60] = 0.0
+    return held
+
+
+@pytest.fixture(scope="module")
+def bare(cell, current):
+    return aesi.simulate(cell, TIME, current, SOC0).voltage_v
+
+
+@pytest.fixture(scope="module")
+def measured(bare, current, tmp_path_factory):
+    """The record of a cell with the lead, as a file and as a measurement."""
+    noise = 1e-3 * np.random.default_rng(1).normal(size=len(TIME))
+    record = Measurement(TIME, current, bare - LEAD_OHM * current + noise, name="drive")
+    path = tmp_path_factory.mktemp("record") / "drive.csv"
+    table = np.column_stack([record.time_s, record.current_a, record.voltage_v])
+    np.savetxt(path, table, delimiter=",", header="time_s,current_a,voltage_v", comments="")
+    return path, record
+
+
+def test_it_is_simulated_from_a_file_on_the_command_line(file, measured, bare, current, tmp_path):
+    run = simulate_file(
+        CELL,
+        measured[0],
+        tmp_path / "out.csv",
+        soc0=SOC0,
+        effects=[("lead", {"lead_ohm": LEAD_OHM})],
+        effect_files=[file],
+    )
+    assert run.voltage_v == pytest.approx(bare - LEAD_OHM * current, abs=1e-9)
+    assert "lead_v" in (tmp_path / "out.csv").read_text().splitlines()[0]
+
+
+def test_it_is_found_reported_saved_simulated_and_predicted(file, cell, measured, bare, current, tmp_path):
+    own = known_effects([file])
+    effects = {name: own[name] for name in ("lead", "voltage_sensor_offset")}
+    found = discover(cell, [measured[1]], soc0=SOC0, effects=effects)
+    assert found.verdict.effects == ("lead",)
+    content = write_discovery(tmp_path, Case(CELL, (measured[1],), effect_files=(file,)), found)
+    assert content["effects"] == ["lead"]
+    assert "V_cell - I R" in (tmp_path / "report.html").read_text()
+    simulate_file(tmp_path / "model", measured[0], tmp_path / "simulated.csv", soc0=SOC0)
+    predict_file(tmp_path / "model", measured[0], tmp_path / "predicted.csv", soc0=SOC0)
+    for name in ("simulated.csv", "predicted.csv"):
+        table = np.genfromtxt(tmp_path / name, delimiter=",", names=True)
+        assert table["voltage_v"] == pytest.approx(bare - LEAD_OHM * current, abs=2e-3)
+
+
+def test_an_experiment_takes_it(file, measured, current):
+    content = {
+        "name": "own",
+        "data": {
+            "kind": "files",
+            "record": str(measured[0]),
+            "hold": "linear",
+            "repeats": {"period_s": 600, "train": [1, 2], "test": [3]},
+        },
+        "cell": {"bpx": str(CELL), "soc0": SOC0, "effects": {"lead": {"lead_ohm": LEAD_OHM}}},
+    }
+    with pytest.raises(ConfigError, match="no effect 'lead'"):
+        load(parse_experiment(content))
+    content["cell"]["effect_files"] = [str(file)]
+    loaded = load(parse_experiment(content))
+    left = np.concatenate([series.error_v for series in loaded.split.train])
+    assert np.std(left) == pytest.approx(1e-3, rel=0.1), "what is left is the noise"
+
+
+def test_it_reaches_another_process(file, tmp_path):
+    (active,) = activated([("lead", {"lead_ohm": 2e-3})], [file])
+    kept = tmp_path / "active.pickle"
+    kept.write_bytes(pickle.dumps(active))
+    code = (
+        "import pickle, sys; a = pickle.load(open(sys.argv[1], 'rb')); print(a.id, a.parameters['lead_ohm'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(kept)], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["lead", "0.002"]
+
+
+def test_one_of_the_catalogue_arrives_as_itself_and_one_of_a_session_by_value():
+    assert pickle.loads(pickle.dumps(CATALOGUE["series_resistance"])) is CATALOGUE["series_resistance"]
+    made = Effect("mine", "physics", "Mine.", on_voltage=np.copy)
+    assert pickle.loads(pickle.dumps(made)).id == "mine"
+
+
+def test_two_files_with_one_id_are_refused(file, tmp_path):
+    other = tmp_path / "other.py"
+    other.write_text(OWN)
+    assert set(known_effects([file, file])) == {*CATALOGUE, "lead"}
+    with pytest.raises(InputError, match="both define the effect 'lead'"):
+        known_effects([file, other])
+
+
+def test_the_saved_model_names_the_file(file, cell, tmp_path):
+    aesi.HybridModel(cell, (load_effect(file).activate(),), soc0=SOC0).save(tmp_path / "model")
+    (saved,) = json.loads((tmp_path / "model" / "effects.json").read_text())
+    assert saved["file"] == str(file)

@@ -1,0 +1,44 @@
+"""Ctrl-C ends a command soon, whatever it is busy with, and takes its children along."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+BUSY = """
+import subprocess, sys, time
+from flows.base.interrupt import ending_soon_on_interrupt
+deaf = "import signal, time; signal.signal(2, signal.SIG_IGN); time.sleep(60)"
+child = subprocess.Popen([sys.executable, "-c", deaf])
+with ending_soon_on_interrupt():
+    print(child.pid, flush=True)
+    try:
+        time.sleep(60)
+    finally:
+        print("closing", flush=True)
+        time.sleep({closing})
+"""
+
+
+@pytest.mark.parametrize("closing", [0, 60], ids=["a tidy end", "an end that hangs"])
+def test_it_ends_within_seconds_with_its_children(closing):
+    busy = subprocess.Popen(
+        [sys.executable, "-c", BUSY.format(closing=closing)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    child = psutil.Process(int(busy.stdout.readline()))
+    started = time.monotonic()
+    os.killpg(busy.pid, signal.SIGINT)
+    out, err = busy.communicate(timeout=30)
+    assert busy.returncode == 130
+    assert time.monotonic() - started < 10  # 2 s on a machine that does nothing else
+    assert "closing" in out
+    assert err.count("Interrupted.") == 1
+    assert not child.is_running() or child.status() == psutil.STATUS_ZOMBIE

@@ -1,0 +1,70 @@
+"""A candidate made again from the tracking store, with nothing else of the run left."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from aesi.errors import InputError
+from aesi.pipeline.product.hybrid import HybridModel
+from flows.tracking.store import KIND, Store
+
+
+@pytest.fixture
+def store_alone(finished, tmp_path, monkeypatch):
+    """The store and its artifacts in another folder; caches, run folders and the data are not with them."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    for path in finished.glob("mlflow.db*"):
+        shutil.copy(path, elsewhere)
+    shutil.copytree(finished / "mlartifacts", elsewhere / "mlartifacts")
+    monkeypatch.setenv("AESI_CACHE", str(tmp_path / "empty"))
+    monkeypatch.delenv("AESI_DATA", raising=False)
+    return f"sqlite:///{elsewhere / 'mlflow.db'}"
+
+
+def runs_of(uri, kind):
+    store = Store(uri)
+    return list(store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = '{kind}'"))
+
+
+def test_a_candidate_could_not_be_made_again_from_what_was_tracked(store_alone, tmp_path, call):
+    run = next(run for run in runs_of(store_alone, "candidate") if "aesi.failed" not in run.data.tags)
+    code, _, err = call("candidate", run.info.run_id, "--out", tmp_path / "back", "--uri", store_alone)
+    assert code == 0, err
+    content = json.loads((tmp_path / "back" / "candidate.json").read_text())
+    assert content["metrics"]["free_run/valid_mser_pct"] == run.data.metrics["free_run/valid_mser_pct"]
+    assert content["metrics"]["loss/oob"] == run.data.metrics["loss/oob"]
+    logged = json.loads(Store(store_alone).read(run.info.run_id, "coefficients.json").read_text())
+    assert content["coefficients"] == logged
+    model = HybridModel.load(tmp_path / "back" / "model")
+    prediction = model.predict(np.arange(60.0), np.full(60, 10.0), soc0=0.6)
+    assert np.isfinite(prediction.voltage_v).all()
+
+
+def test_the_run_of_an_experiment_gives_the_candidate_that_it_chose(store_alone):
+    from flows.results.candidate import rebuild
+
+    (run,) = runs_of(store_alone, "run")
+    assert rebuild(run.info.run_id, store_alone).number == int(run.data.params["chosen_candidate"])
+
+
+def test_another_run_is_refused_in_one_sentence(store_alone):
+    from flows.results.candidate import rebuild
+
+    model = runs_of(store_alone, "model")[0]
+    with pytest.raises(InputError, match="is no candidate of a search"):
+        rebuild(model.info.run_id, store_alone)
+    with pytest.raises(InputError, match="no run 'abc' is tracked"):
+        rebuild("abc", store_alone)
+
+
+def test_coverage_is_tracked_for_both_ensembles(store_alone):
+    metrics = [
+        run.data.metrics for run in runs_of(store_alone, "candidate") if "aesi.failed" not in run.data.tags
+    ]
+    for one in metrics:
+        assert 50 < one["intervals/valid_coverage_pct"] <= 100
+        assert 50 < one["intervals/valid_coverage_pct_aesi_ii"] <= 100
+        assert one["loss/valid"] == pytest.approx((one["loss/valid_aesi_i"] + one["loss/valid_aesi_ii"]) / 2)

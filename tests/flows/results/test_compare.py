@@ -1,0 +1,88 @@
+"""Runs side by side on one page."""
+
+import json
+import re
+import time
+
+import pytest
+
+from aesi.errors import InputError
+from aesi.pipeline.report.compare import ComparedRun, differing_settings, write_comparison
+from flows.results.compare import compare
+from flows.tracking.store import KIND, Store
+
+
+def run_of(number, **settings):
+    grid = [[round(0.1 * number * (i - j), 3) for j in range(16)] for i in range(16)]
+    one_map = {"current_a": list(range(16)), "soc": [i / 16 for i in range(16)], "mean_mv": grid}
+    return ComparedRun(
+        run_id=f"{number:032x}",
+        name=f"cell {number}",
+        experiment="study",
+        started="2026-01-01 00:00",
+        settings={"seed": str(number), "data.dt_s": "1.0", "chosen_model": "ESPM + AESI I", **settings},
+        metrics={"free_run/test_rmse_mv": 2.0 + number, "intervals/coverage_pct": 90.5},
+        comparison={
+            "genome": {"lambda1": 0.1 * (number + 1), "d": 2},
+            "terms": {"T1(I)": 0.5, f"T{number}(soc)": 0.1},
+            "intervals": {"ESPM + AESI I": {"test_rmse_mv": [1.5 + number, 2.5 + number]}},
+            "maps": {"ESPM": one_map, "ESPM + AESI I": one_map},
+        },
+    )
+
+
+def test_only_settings_that_differ_are_shown(tmp_path):
+    runs = [run_of(1), run_of(2, extra="yes")]
+    assert differing_settings(runs) == ["seed", "extra"]
+    html = write_comparison(tmp_path / "page.html", runs).read_text()
+    assert '<th scope="col">extra</th>' in html
+    assert "data.dt_s</th>" not in html
+    assert "2.5 to 3.5" in html
+    assert "T1(soc)" in html
+    assert "T1(I)" not in html  # all runs hold it
+
+
+def test_the_page_needs_nothing_from_elsewhere(tmp_path):
+    html = write_comparison(tmp_path / "page.html", [run_of(1), run_of(2)]).read_text()
+    assert not re.search(r'(src|href)="(?!data:)', html)
+    payload = json.loads(re.search(r'id="maps-data">(.*?)</script>', html, re.DOTALL)[1])
+    assert len(payload["maps"]) == 4
+
+
+def test_a_discovery_shows_its_verdict_and_parameters(tmp_path):
+    parameters = {"resistance_ohm": {"value": 1.5e-3, "low": 1.4e-3, "high": 1.6e-3, "unit": "ohm"}}
+    found = {
+        "verdict": "found",
+        "effects": ["series_resistance"],
+        "candidates": [{"effect": "series_resistance", "parameters": parameters}],
+    }
+    runs = [
+        run_of(1),
+        ComparedRun("ab" * 16, "trace", "discover", "now", {}, {"confidence": 0.97}, discovery=found),
+    ]
+    html = write_comparison(tmp_path / "page.html", runs).read_text()
+    assert "series_resistance.resistance_ohm" in html
+    assert "0.0014 to 0.0016" in html
+
+
+def test_tracked_runs_are_found_by_the_beginning_of_their_id(finished, tmp_path):
+    uri = f"sqlite:///{finished / 'mlflow.db'}"
+    store = Store(uri)
+    (run,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
+    with pytest.raises(InputError, match="there is 1 run to compare"):
+        compare([run.info.run_id[:8], "smoke"], tmp_path / "page.html", uri)
+    with pytest.raises(InputError, match="'nowhere' is no tracked run and no experiment"):
+        compare(["nowhere"], tmp_path / "page.html", uri)
+    content = json.loads(store.artifact(run, "comparison.json").read_text())
+    assert set(content["maps"]) == {"ESPM", run.data.params["chosen_model"]}
+    low, high = content["intervals"][run.data.params["chosen_model"]]["test_rmse_mv"]
+    assert low < run.data.metrics["free_run/test_rmse_mv"] < high
+    assert content["intervals"]["ESPM"]["test_mser_pct"] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_five_hundred_runs_take_two_seconds_of_processor_time(tmp_path):
+    runs = [run_of(number) for number in range(500)]
+    started = time.process_time()
+    path = write_comparison(tmp_path / "page.html", runs)
+    assert time.process_time() - started < 2.0
+    assert path.stat().st_size < 20e6

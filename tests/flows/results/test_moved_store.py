@@ -1,0 +1,52 @@
+"""A store that was copied with its artifacts, the original gone."""
+
+import shutil
+
+from flows.results.tables import tables_of
+from flows.tracking.store import KIND, Store
+
+
+def copied(source, target):
+    target.mkdir()
+    for path in source.glob("mlflow.db*"):
+        shutil.copy(path, target)
+    shutil.copytree(source / "mlartifacts", target / "mlartifacts")
+    return target
+
+
+def test_a_moved_store_carried_no_readable_summary(finished, tmp_path, monkeypatch):
+    original = copied(finished, tmp_path / "original")
+    here = f"sqlite:///{original / 'mlflow.db'}"
+    before = tables_of("smoke", uri=here)
+    moved = tmp_path / "a folder with spaces" / "moved"
+    moved.parent.mkdir()
+    shutil.copytree(original, moved)
+    shutil.rmtree(original)
+    uri = f"sqlite:///{moved / 'mlflow.db'}"
+    store = Store(uri)
+    (note,) = store.notes
+    assert str(moved / "mlartifacts" / "smoke") in note
+    assert tables_of("smoke", uri=uri) == before
+    for run in store.runs(store.find_experiment("smoke"), ""):
+        assert run.info.artifact_uri.startswith((moved / "mlartifacts").as_uri())
+    assert not Store(uri).notes  # once is enough
+
+
+def test_a_store_whose_artifacts_stayed_is_left_alone(finished, tmp_path):
+    alone = tmp_path / "database only"
+    alone.mkdir()
+    for path in finished.glob("mlflow.db*"):
+        shutil.copy(path, alone)
+    store = Store(f"sqlite:///{alone / 'mlflow.db'}")
+    assert not store.notes
+    (run,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
+    assert store.read(run.info.run_id, "summary.json").is_file()
+
+
+def test_artifacts_go_beside_the_database(tmp_path, empty_store, monkeypatch):
+    other = tmp_path / "other"
+    other.mkdir()
+    shutil.copy(empty_store, other / "mlflow.db")
+    store = Store(f"sqlite:///{other / 'mlflow.db'}")
+    run_id = store.create_run(store.experiment("one"), "run", {})
+    assert store.client.get_run(run_id).info.artifact_uri.startswith((other / "mlartifacts" / "one").as_uri())

@@ -1,0 +1,67 @@
+"""A record is told from another cell's, and from one in other units, by its voltages and its charge."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aesi
+from aesi.errors import DataError
+from aesi.pipeline.belonging import capacity_bounds, check_belongs
+from aesi.records import Measurement
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+
+
+@pytest.fixture(scope="module")
+def m50():
+    return aesi.Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+
+
+@pytest.fixture(scope="module")
+def record(m50):
+    """A rest, a 1C discharge of two thirds of the cell with pulses, a rest."""
+    time_s = np.arange(0.0, 3600.0, 2.0)
+    current_a = np.where((time_s > 120) & (time_s < 3000), 4.0 + 3.0 * np.sign(np.sin(time_s / 40.0)), 0.0)
+    current_a[(time_s > 120) & (time_s < 3000) & (np.sin(time_s / 300.0) > 0.9)] = -2.0
+    run = aesi.simulate(m50, time_s, current_a, soc0=0.95)
+    return Measurement(time_s, current_a, run.voltage_v, name="drive")
+
+
+def test_the_capacity_lies_within_its_bounds(m50, record):
+    bounds = capacity_bounds(m50, record)
+    assert bounds.low_ah <= m50.capacity_ah <= bounds.high_ah
+    assert bounds.high_ah / bounds.low_ah < 2.5
+    check_belongs(m50, [record])
+
+
+@pytest.mark.parametrize("share", [0.7, 1.25])
+def test_an_aged_cell_and_another_batch_belong(m50, record, share):
+    check_belongs(m50, [replace(record, current_a=share * record.current_a)])
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"time_s": 1 / 3600}, "--unit time_s=h"),
+        ({"time_s": 1 / 60}, "--unit time_s=min"),
+        ({"time_s": 1000}, "--unit time_s=ms"),
+        ({"current_a": 1000}, "--unit current_a=mA"),
+        ({"current_a": 3}, "another cell's"),
+        ({"current_a": 1 / 4}, "another cell's"),
+        ({"voltage_v": 1.1}, "is full at"),
+    ],
+)
+def test_what_cannot_be_of_this_cell_is_told_with_the_likely_cause(m50, record, change, words):
+    ((name, factor),) = change.items()
+    with pytest.raises(DataError) as caught:
+        check_belongs(m50, [replace(record, **{name: factor * getattr(record, name)})])
+    message = str(caught.value)
+    assert words in message
+    assert message.startswith("drive")
+    assert "\n" not in message
+
+
+def test_a_profile_without_a_voltage_says_nothing(m50, record):
+    check_belongs(m50, [replace(record, voltage_v=np.full_like(record.voltage_v, np.nan))])

@@ -1,0 +1,142 @@
+"""`import aesi` at a prompt: what it offers, what it shows, and what it says of what cannot be meant."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import aesi
+from aesi.errors import InputError
+from aesi.physics.effects import CATALOGUE
+
+CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
+TIME = np.arange(1800.0)
+SOC0 = 0.8
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return aesi.Cell.from_bpx(CELL)
+
+
+@pytest.fixture(scope="module")
+def current():
+    held = np.repeat(np.random.default_rng(0).normal(10.0, 30.0, len(TIME) // 20), 20)
+    held[:60] = 0.0
+    return held
+
+
+@pytest.fixture(scope="module")
+def run(cell, current):
+    return aesi.simulate(cell, TIME, current, SOC0)
+
+
+@pytest.fixture(scope="module")
+def record(cell, current):
+    worse = aesi.simulate(
+        cell, TIME, current, SOC0, [CATALOGUE["series_resistance"].activate(resistance_ohm=1e-3)]
+    )
+    noise = 1e-3 * np.random.default_rng(1).normal(size=len(TIME))
+    return aesi.Measurement(TIME, current, worse.voltage_v + noise, np.full(len(TIME), 25.0), name="drive")
+
+
+def test_dir_shows_the_api():
+    assert set(dir(aesi)) == {*aesi.__all__, "__version__"}
+    assert all(callable(getattr(aesi, name)) for name in aesi.__all__)
+
+
+def test_a_run_is_short_in_words_and_whole_in_a_table_and_a_plot(run):
+    assert repr(run).startswith("Run(1,800 rows over 1,799 s, ")
+    frame = run.to_frame()
+    assert list(frame.columns[:3]) == ["time_s", "current_a", "voltage_v"]
+    assert set(run.states.columns) < set(frame.columns)
+    assert len(frame) == len(run)
+    assert [axis.title.text for axis in run.plot().select_yaxes()] == [
+        "voltage, V",
+        "current, A",
+        "state of charge",
+    ]
+
+
+def test_a_measurement_has_its_temperature_where_it_was_measured(record):
+    assert repr(record) == "Measurement('drive', 1,800 rows over 1,799 s, with temperature)"
+    assert list(record.to_frame().columns) == ["time_s", "current_a", "voltage_v", "temperature_degc"]
+    assert len(record.plot().data) == 3
+    bare = aesi.Measurement(record.time_s, record.current_a, record.voltage_v)
+    assert list(bare.to_frame().columns) == ["time_s", "current_a", "voltage_v"]
+    assert len(bare.plot().data) == 2
+    assert repr(bare.take(slice(0, 0))) == "Measurement('measurement', no rows)"
+
+
+def test_a_model_and_its_prediction_are_short_in_words(cell, record):
+    effect = CATALOGUE["series_resistance"].activate(resistance_ohm=1e-3)
+    model = aesi.HybridModel(cell, (effect,), soc0=SOC0)
+    assert repr(cell) == f"Cell({cell.name!r}, 30 Ah, {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V)"
+    assert repr(model) == f"HybridModel(cell {cell.name!r}, series_resistance(resistance_ohm=0.001))"
+    prediction = model.predict(record.time_s, record.current_a)
+    assert len(repr(prediction)) < 100
+    assert "no band" in repr(prediction)
+    assert {trace.name for trace in prediction.plot().data} == {
+        "predicted",
+        "physics alone",
+        "state of charge",
+    }
+
+
+def test_a_long_test_is_drawn_in_hours(record):
+    slow = aesi.Measurement(60.0 * TIME, record.current_a, record.voltage_v)
+    assert list(slow.plot().select_xaxes())[-1].title.text == "time, h"
+    assert slow.plot().data[0].x[-1] == pytest.approx(1799 / 60)
+
+
+def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, tmp_path, monkeypatch):
+    few = {name: CATALOGUE[name] for name in ("series_resistance", "voltage_sensor_offset")}
+    monkeypatch.setattr("aesi.pipeline.discovery.discover.known_effects", lambda files: few)
+    found = aesi.discover(cell, record, soc0=SOC0)
+    assert found.effects == ("series_resistance",)
+    assert repr(found).startswith("Finding(found series_resistance, ")
+    assert found.rmse_mv("after") < 1.2 < found.rmse_mv("before")
+    frame = found.to_frame()
+    assert isinstance(frame, pd.DataFrame)
+    best = frame.iloc[0]
+    assert (best.effect, best.parameter, best.unit) == ("series_resistance", "resistance_ohm", "ohm")
+    assert best.low <= 1e-3 <= best.high
+    assert {trace.name for trace in found.plot("test").data} >= {"measured", "after", "as declared"}
+    assert found.model.effects[-1].id == "series_resistance"
+    folder = found.save(tmp_path / "found")
+    assert {path.name for path in folder.iterdir()} == {"discovery.json", "report.html", "model"}
+
+
+def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        "aesi.pipeline.discovery.discover.known_effects",
+        lambda files: {"series_resistance": CATALOGUE["series_resistance"]},
+    )
+    record.to_frame().to_csv(tmp_path / "drive.csv", index=False)
+    found = aesi.discover(CELL, str(tmp_path / "drive.csv"), soc0=SOC0, out=tmp_path / "out")
+    assert found.effects == ("series_resistance",)
+    assert (tmp_path / "out" / "discovery.json").is_file()
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"hold": "zoh"}, "hold = 'zoh' is not known; give 'linear' or 'backward'."),
+        ({"hold": ""}, "hold = '' is not known"),
+        ({"on_depletion": "ignore"}, "on_depletion = 'ignore' is not known; give 'raise' or 'clip'."),
+        ({"cell": "cell.bpx.json"}, "cell is the text 'cell.bpx.json', not a Cell; read one from its file"),
+        ({"effects": "series_resistance"}, r"effects=\[CATALOGUE\['series_resistance'\].activate\(\)\]"),
+        ({"effects": ["series_resistance"]}, r"give CATALOGUE\['series_resistance'\].activate\(\)"),
+        ({"effects": [CATALOGUE["double_layer"]]}, r"give CATALOGUE\['double_layer'\].activate\(\)"),
+        ({"effects": 3}, "effects is of type int; give a list"),
+        ({"soc0": 90}, "soc0 = 90 is not a state of charge; .* so 90 % is 0.9"),
+        ({"soc0": float("nan")}, "soc0 = nan is not a state of charge"),
+        ({"soc0": "full"}, "soc0 = 'full' is not a state of charge"),
+    ],
+)
+def test_what_cannot_be_meant_is_said_in_one_sentence(cell, current, changes, sentence):
+    given = {"cell": cell, "time_s": TIME, "current_a": current, "soc0": SOC0} | changes
+    with pytest.raises(InputError, match=sentence) as caught:
+        aesi.simulate(**given)
+    assert "\n" not in str(caught.value)
