@@ -13,7 +13,8 @@ from aesi.physics.cell.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
 DEFAULT_ELECTROLYTE_ORDER = 3
-DEFAULT_ELECTRODE_POINTS = 5
+DEFAULT_ELECTRODE_POINTS = 6
+"""Twice as many move the voltage by 0.16 mV RMS at worst: LG M50 at 2C until the salt is all but gone."""
 DEFAULT_SUBSTEP_S = 1.0
 ANY_NUMBER = 2**31
 
