@@ -22,7 +22,7 @@ def run_porous_electrode(
 
     Raises InputError for an electrode cut into regions.
     """
-    from aesi.physics.dfn.kernels import run_porous
+    from aesi.physics.dfn.record_kernels import run_porous
 
     if model.regions != 1:
         raise InputError(

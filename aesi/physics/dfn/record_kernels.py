@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
+from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
-from aesi.physics.dfn.newton_kernels import GAS_OVER_FARADAY
-from aesi.physics.dfn.step_kernels import advance, hold_layers, settle
-from aesi.physics.dfn.transport_kernels import renew, salt_forcing
+from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY
+from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle
 from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
 from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
 
