@@ -27,7 +27,8 @@ from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
 from aesi.physics.effect import ActiveEffect, Record, Trace
-from aesi.physics.espm.extended import ParticleUnits, interface_capacity, ohmic_drops, particle_units
+from aesi.physics.espm.extended import interface_capacity, ohmic_drops, particle_units
+from aesi.physics.espm.layout import Units
 from aesi.physics.espm.plain import arrhenius, shifted_ocp, stack_of
 from aesi.physics.espm.tables import solid_diffusion
 from aesi.physics.model import EspmModel
@@ -81,8 +82,9 @@ class _Linear:
         """(n,) ohm.  The currents of all units and the two potentials, per ampere, from one system a frequency."""
         cell = self.model.cell
         units = particle_units(self.model)
-        n, regions = len(units.side), self.model.regions
-        region = units.side * regions + units.region
+        side_of, within = units.place.T
+        n, regions = len(side_of), self.model.regions
+        region = side_of * regions + within
         s: ComplexArray = np.asarray(1j * omega, dtype=np.complex128)
         local = self._local(units, s)
         salt = self._salt(s)
@@ -92,7 +94,7 @@ class _Linear:
         into = np.broadcast_to(belongs.astype(complex), (len(s), 2 * regions, n)).copy()
         for r in range(2 * regions):
             first = int(np.flatnonzero(region == r)[0])
-            capacity = interface_capacity(self.model, int(units.side[first]))
+            capacity = interface_capacity(self.model, int(side_of[first]))
             into[:, r, first] += s * capacity * local[:, first]
         drop = ohm[None] + salt
         matrix = np.zeros((len(s), n + 2, n + 2), dtype=complex)
@@ -100,7 +102,7 @@ class _Linear:
         matrix[:, :n, :n] = drop[:, region] @ into
         matrix[:, np.arange(n), np.arange(n)] += local
         for side in range(2):
-            matrix[:, np.flatnonzero(units.side == side), n + side] = -1.0
+            matrix[:, np.flatnonzero(side_of == side), n + side] = -1.0
             of_side = np.arange(2 * regions) // regions == side
             matrix[:, n + side, :n] = into[:, of_side].sum(axis=1)
             right[:, n + side] = (1.0 if side == 0 else -1.0) / cell.total_area_m2
@@ -113,13 +115,13 @@ class _Linear:
         contact = cell.contact_resistance_ohm + film
         return cast(ComplexArray, solved[:, n] - solved[:, n + 1] + gap / cell.total_area_m2 + contact)
 
-    def _local(self, units: ParticleUnits, s: ComplexArray) -> ComplexArray:
+    def _local(self, units: Units, s: ComplexArray) -> ComplexArray:
         """(frequencies, units) ohm m2: kinetics, and open-circuit slope times what the surface loses."""
         cell = self.model.cell
-        out = np.zeros((len(s), len(units.side)), dtype=complex)
+        out = np.zeros((len(s), len(units.place)), dtype=complex)
         for side, electrode in enumerate((cell.negative, cell.positive)):
             at = self.rest[side]
-            here = np.flatnonzero(units.side == side)
+            here = np.flatnonzero(units.place[:, 0] == side)
             slope = _slope(shifted_ocp(electrode, self.kelvin - cell.reference_temperature_k), at)
             kinetic = arrhenius(electrode.rate_ea_j_mol, self.kelvin, cell.reference_temperature_k)
             thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
