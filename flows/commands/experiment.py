@@ -107,11 +107,23 @@ def candidate(
 
 
 def ui(
-    port: Annotated[int, typer.Option(min=1, max=65535)] = 5000,
+    port: Annotated[
+        int | None, typer.Option(min=1, max=65535, help="5000 without it; 8080 for Optuna's dashboard.")
+    ] = None,
     host: Annotated[str, typer.Option(help="Loopback unless you say otherwise.")] = "127.0.0.1",
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+    optuna: Annotated[
+        bool, typer.Option("--optuna", help="Optuna's dashboard, also while a search runs.")
+    ] = False,
+    storage: Annotated[
+        str | None,
+        typer.Option(help="With --optuna: a database, as in runner.storage; else the workspace's journal."),
+    ] = None,
 ) -> None:
-    """The MLflow UI on the tracking store in use."""
-    from flows.results.ui import serve
+    """The MLflow UI on the tracking store in use, or Optuna's dashboard on the searches."""
+    from flows.results.ui import serve, serve_studies
 
-    serve(port=port, host=host, uri=uri)
+    if optuna:
+        serve_studies(port=port or 8080, host=host, url=storage)
+    else:
+        serve(port=port or 5000, host=host, uri=uri)

@@ -65,7 +65,11 @@ def _stages(
     track_start(tracker, config, loaded, folder)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
     follow = CandidateTracker(tracker, config, loaded, problem)
-    found = run("search", lambda: run_study(problem, config, console, request.use_cache, follow))
+    name = f"{config.name}, seed {config.seed} ({tracker.run_id[:8]})"
+    found = run(
+        "search", lambda: run_study(problem, config, console, request.use_cache, follow, publish_as=name)
+    )
+    tracker.metrics({f"importance/{gene}": share for gene, share in found.result.importances().items()})
     cache = Cache(console.say, request.use_cache)
     key = (config.digest, found.key)
     models = run(

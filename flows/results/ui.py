@@ -1,4 +1,4 @@
-"""`aesi ui`: MLflow's own UI on the tracking store in use, on loopback unless told otherwise."""
+"""`aesi ui`: MLflow's UI on the tracking store, or Optuna's on the searches; on loopback unless told otherwise."""
 
 from __future__ import annotations
 
@@ -30,6 +30,22 @@ def serve(port: int, host: str, uri: str | None) -> None:
     os.execve(
         sys.executable, command, os.environ | QUIETLY
     )  # so that whatever ends this process ends the server
+
+
+def serve_studies(port: int, host: str, url: str | None) -> None:
+    """Optuna's dashboard on the studies of the workspace, or of the database at `url`, until interrupted."""
+    from optuna_dashboard import run_server
+
+    from flows.search.published_study import journal, study_storage
+
+    if not url and not journal().exists():
+        raise InputError(
+            f"no search has been run in this workspace ({journal()} is not there); `aesi run` makes one."
+        )
+    if not _free(host, port):
+        raise InputError(f"port {port} on {host} is taken; give another with --port.")
+    print(f"Optuna's dashboard shows the searches at http://{host}:{port}/ (Ctrl-C ends it)", flush=True)
+    run_server(study_storage(url), host=host, port=port)
 
 
 def _free(host: str, port: int) -> bool:
