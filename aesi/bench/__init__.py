@@ -1,5 +1,10 @@
 """Benchmarks against the peers, by name: each yields one JSON-ready dict a line, peer and ours in one run."""
 
+from typing import Any
+
+CaseRow = dict[str, Any]
+"""What is told of one case: JSON-ready values by name."""
+
 BENCHMARKS = {
     "espm": "aesi.bench.espm",
     "ensemble": "aesi.bench.ensemble",

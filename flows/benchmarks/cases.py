@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
 
-from aesi.bench.real.summary import CaseRow
+from aesi.bench import CaseRow
 from aesi.pipeline.experiment.sections import TrackingConfig
 
 

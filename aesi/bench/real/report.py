@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.real.summary import CaseRow
+from aesi.bench import CaseRow
 
 WIDTH, HEIGHT, MARGIN = 760, 220, 48
 WORST = 5

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from aesi.bench import CaseRow
 from aesi.bench.scoring import rate
 
-CaseRow = dict[str, Any]
 NEAR_K = 2.0
 
 
