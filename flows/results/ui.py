@@ -1,4 +1,4 @@
-"""`aesi ui`: MLflow's UI on the tracking store, or Optuna's on the searches; on loopback unless told otherwise."""
+"""`aesi ui`: MLflow on what is tracked, Optuna on the searches, Prefect on the flow runs; on loopback."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import socket
 import sys
 
 from aesi.errors import InputError
+from flows.base import environment
 from flows.tracking.store import Store, default_uri
 
 TRAINING = "#/experiments?workflowType=machine_learning"
@@ -46,6 +47,18 @@ def serve_studies(port: int, host: str, url: str | None) -> None:
         raise InputError(f"port {port} on {host} is taken; give another with --port.")
     print(f"Optuna's dashboard shows the searches at http://{host}:{port}/ (Ctrl-C ends it)", flush=True)
     run_server(study_storage(url), host=host, port=port)
+
+
+def serve_flows(port: int, host: str) -> None:
+    """Prefect's server on the flow runs of the workspace, until interrupted."""
+    if not _free(host, port):
+        raise InputError(f"port {port} on {host} is taken; give another with --port.")
+    environment.prepare()
+    environment.make_prefect_home()
+    print(f"Prefect shows the flow runs at http://{host}:{port}/runs (Ctrl-C ends it)", flush=True)
+    command = [sys.executable, "-m", "prefect", "server", "start", "--host", host, "--port", str(port)]
+    api = {"PREFECT_UI_API_URL": f"http://{host}:{port}/api"}
+    os.execve(sys.executable, command, os.environ | api)
 
 
 def _free(host: str, port: int) -> bool:

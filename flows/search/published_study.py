@@ -7,12 +7,14 @@ is written once a candidate, from what the search has told, and Optuna's dashboa
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import optuna
 from optuna.distributions import BaseDistribution
+from optuna.exceptions import ExperimentalWarning
 from optuna.storages import BaseStorage, JournalStorage, RDBStorage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import TrialState, create_trial
@@ -75,7 +77,8 @@ class PublishedStudy:
                 directions=["minimize"] * len(LOSSES),
                 load_if_exists=True,
             )
-            self._study.set_metric_names(list(LOSSES))
+            with warnings.catch_warnings(action="ignore", category=ExperimentalWarning):
+                self._study.set_metric_names(list(LOSSES))
             self._there = {trial.user_attrs[CANDIDATE] for trial in self._study.get_trials(deepcopy=False)}
         except Exception as error:
             self._give_up(error)

@@ -85,7 +85,7 @@ class SearchResult:
         if len(told) < LEAST_TOLD:
             return {}
         return dict(
-            get_param_importances(self.study, target=lambda trial: trial.user_attrs[RECORD]["fitness"])
+            get_param_importances(self.study, target=lambda trial: -trial.user_attrs[RECORD]["fitness"])
         )
 
     def best(self, weights: FitnessWeights | None = None) -> Pick:

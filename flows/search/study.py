@@ -66,9 +66,11 @@ def run_study(
     on_scored: OnScored | None = None,
     tally: Tally | None = None,
     publish_as: str | None = None,
+    on_generation: Callable[[int, int], None] | None = None,
 ) -> Found:
     """Search until all candidates of the experiment are known, and pick one.
 
+    on_generation : told how many candidates of how many are done, a generation at a time.
     publish_as : name of the study in Optuna's storage; None publishes nothing.
 
     Raises FitError, with the reasons counted, where no candidate is feasible.
@@ -97,6 +99,9 @@ def run_study(
             on_scored(number, genome, scored[number])
         if published is not None:
             published.add(number, genome, scored[number])
+        done, total = len(scored), config.search.candidates
+        if on_generation is not None and (done % config.search.population == 0 or done == total):
+            on_generation(done, total)
         console.progress("candidates", len(scored), config.search.candidates, started, _best(scored))
 
     try:
