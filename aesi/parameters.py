@@ -11,7 +11,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.errors import ParameterError
-from aesi.numerics.typing import Array
+
+
+@dataclass(frozen=True)
+class Spread:
+    """By how much a declared parameter is off in cell files: standard deviations, of the natural logarithm where the
+    parameter is logarithmic.
+
+    tight : of a careful parametrisation of this very cell, None where it leaves nothing open.
+    loose : of one of a cell of the same make, or of one that was not checked, None where even that leaves nothing open.
+    source : where the two are from.  ohmic : True where they are ohm for a cell of one ampere-hour.
+    """
+
+    tight: float | None
+    loose: float | None
+    source: str
+    ohmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -23,7 +38,8 @@ class Parameter:
     of its distance from neutral (or from the default; of the logarithm where `log`) where small ones are likelier
     than large ones, None where all within bounds are alike. `linear` says that the voltage is all but linear in it,
     so that a fit need not take its slope anew at every step. `low_is_limit` says that the lower bound stands for
-    nought, which a logarithmic scale does not reach: to end there is a value like others.
+    nought, which a logarithmic scale does not reach: to end there is a value like others. `spread` says by how much
+    cell files are off in it, so that a hypothesis about something else may move it by that much.
     """
 
     default: float
@@ -36,6 +52,7 @@ class Parameter:
     expected: float | None = None
     linear: bool = False
     low_is_limit: bool = False
+    spread: Spread | None = None
 
     def __post_init__(self) -> None:
         low, high = self.bounds
@@ -90,13 +107,3 @@ def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) ->
                 f"unknown parameter {name!r}{hint} Known: {', '.join(parameters) or 'none'}."
             )
     return {name: p.check(name, float(values.get(name, p.default))) for name, p in parameters.items()}
-
-
-def to_vector(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> Array:
-    """Values as a vector in [0, 1]^n, in declaration order."""
-    return np.array([p.to_unit_interval(values[name]) for name, p in parameters.items()])
-
-
-def from_vector(parameters: Mapping[str, Parameter], vector: Array) -> dict[str, float]:
-    """Inverse of `to_vector`."""
-    return {n: p.from_unit_interval(float(u)) for (n, p), u in zip(parameters.items(), vector, strict=True)}

@@ -30,6 +30,7 @@ app.command("discover", short_help="Find what physics a model lacks, and add it.
 app.command("calibrate", short_help="Fit the physics model's own parameters.")(cell.calibrate)
 app.command("simulate")(cell.simulate)
 app.command("predict")(cell.predict)
+app.command("export", short_help="A cell and what was found, as BPX or for PyBaMM.")(cell.export)
 app.command("tables", short_help="The paper's tables, from tracked runs alone.")(experiment.tables)
 app.command("effects", short_help="The catalogue of effects.")(effects.effects)
 app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")

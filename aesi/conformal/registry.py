@@ -68,4 +68,4 @@ METHODS: dict[str, Method] = {
 }
 
 COMPARED: dict[str, Method | RefittedForest] = {**METHODS, REFITTED: RefittedForest()}
-"""What the tables of a run may show: the methods, and the paper's forest refitted as it goes, which is replayed only."""
+"""What the tables of a run may show: the methods, and the paper's forest refitted as it goes, replayed only."""

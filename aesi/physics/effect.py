@@ -25,6 +25,8 @@ from aesi.physics.model import EspmModel
 Kind = Literal["physics", "parameter", "instrument"]
 Measurable = Literal["temperature"]
 """Quantities that a record may hold beside current and voltage."""
+Refinement = Literal["discretisation", "reduction"]
+"""Approximations between the declared porous electrode and what is solved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +68,8 @@ class Effect:
 
     infers : the quantity that the effect supplies where it was not measured; with the measurement it has nothing to
     say and does not compete.
+    refines : the approximation of the model itself that the effect takes back; it is settled before anything is sought
+    in the cell.
     """
 
     id: str
@@ -78,6 +82,7 @@ class Effect:
     on_reading: Callable[..., Array] | None = None
     file: str | None = None
     infers: Measurable | None = None
+    refines: Refinement | None = None
 
     def __repr__(self) -> str:
         return f"Effect({self.id!r}, {self.kind}, parameters {', '.join(self.parameters) or 'none'})"

@@ -15,7 +15,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import model_with
 from aesi.records import Measurement
-from aesi.tracer.candidates import Estimate
+from aesi.tracer.candidate_effects import Estimate
 from aesi.tracer.cell_start import one_branch, sized, with_activation
 from aesi.tracer.checks import check_measurement, check_record
 from aesi.tracer.cycler_zero import OFFSET, ZERO, ZERO_ERROR, zero_noted

@@ -8,18 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.records import Run
-from aesi.tracer.fit import Fit
-from aesi.tracer.knobs import SOC0
-from aesi.tracer.problem import Problem
-from aesi.tracer.records import Record
+from aesi.tracer.case.records import PreparedRecord
+from aesi.tracer.states import ModelState
 
 State = Literal["before", "recalibrated", "after"]
 Part = Literal["fit", "test"]
-States = Mapping[State, Fit | None]
-"""The fit behind each state; None is the model as declared."""
+States = Mapping[State, ModelState]
 
 RESAMPLES = 400
 BOOTSTRAP_BLOCK_S = 300.0
@@ -66,47 +62,28 @@ class FileOutcome:
         return Errors.of(self.residual_v(state))
 
 
-def simulated(problem: Problem, fit: Fit | None, record: Record, index: int | None, thin: bool) -> Run:
-    """One record under a fit (None: as declared).
-
-    index : place of the record among those of the fit, or None for one that the fit has not seen; its state
-    of
-    charge is then the one given, or the one at which the fitted model rests at its first voltage.
-    """
-    data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
-    if fit is None:
-        return problem.run(data, record.soc0, problem.fixed, hold)
-    values = fit.values
-    effects = problem.active(values)
-    if index is not None:
-        return problem.run(data, values[SOC0][str(index)], effects, hold)
-    if record.soc0_given or record.rest_voltage_v is None:
-        return problem.run(data, record.soc0, effects, hold)
-    try:
-        return problem.run(data, None, effects, hold, record.rest_voltage_v)
-    except AesiError:
-        return problem.run(data, record.soc0, effects, hold)
-
-
 def outcomes(
-    problem: Problem, states: States, tests: Sequence[Record], rng: np.random.Generator
+    records: Sequence[PreparedRecord],
+    states: States,
+    tests: Sequence[PreparedRecord],
+    rng: np.random.Generator,
 ) -> tuple[FileOutcome, ...]:
     """Every file, cut into the part that fits have seen and the part that chose nothing."""
     out = []
-    for index, record in enumerate(problem.records):
-        runs = {s: simulated(problem, fit, record, index, thin=False) for s, fit in states.items()}
+    for index, record in enumerate(records):
+        runs = {name: state.simulated(record, index, thin=False) for name, state in states.items()}
         cut = record.fit_rows_full
         out.append(_outcome(record, "fit", slice(0, cut), runs, rng))
         if cut < len(record.data):
             out.append(_outcome(record, "test", slice(cut, len(record.data)), runs, rng))
     for record in tests:
-        runs = {s: simulated(problem, fit, record, None, thin=False) for s, fit in states.items()}
+        runs = {name: state.simulated(record, None, thin=False) for name, state in states.items()}
         out.append(_outcome(record, "test", slice(record.seen_rows, len(record.data)), runs, rng))
     return tuple(out)
 
 
 def _outcome(
-    record: Record, part: Part, rows: slice, runs: Mapping[State, Run], rng: np.random.Generator
+    record: PreparedRecord, part: Part, rows: slice, runs: Mapping[State, Run], rng: np.random.Generator
 ) -> FileOutcome:
     data = record.data.take(rows)
     voltages = {s: run.voltage_v[rows] for s, run in runs.items()}
@@ -133,24 +110,18 @@ def rmse_difference(
     return value, float(low), float(high)
 
 
-def test_rmse_v(problem: Problem, fit: Fit, tests: Sequence[Record]) -> float:
+def test_rmse_v(
+    state: ModelState, records: Sequence[PreparedRecord], tests: Sequence[PreparedRecord]
+) -> float:
     """RMSE on what the fits have not seen (on the fit part where there is nothing else), thinned, V."""
     parts = []
     for record in tests:
-        run = simulated(problem, fit, record, None, thin=True)
-        parts += [(record.thin.voltage_v - run.voltage_v)[record.seen_rows_thin :]]
-    for index, record in enumerate(problem.records):
-        if not tests and record.n_fit < len(record.thin):
-            run = simulated(problem, fit, record, index, thin=True)
-            parts.append((record.thin.voltage_v - run.voltage_v)[record.n_fit :])
-    return float(np.sqrt(np.mean(np.concatenate(parts or [fit.residual_v]) ** 2)))
-
-
-def polarisation_v(problem: Problem, fit: Fit | None) -> float:
-    """Root mean square distance of the modelled voltage from equilibrium on the fit part, V."""
-    parts = []
-    for index, record in enumerate(problem.records):
-        run = simulated(problem, fit, record, index, thin=True)
-        rest = problem.cell.rest_voltage_v(run.series["soc"])
-        parts.append((run.voltage_v - rest)[: record.n_fit])
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        run = state.simulated(record, None, thin=True)
+        parts.append((record.thin.voltage_v - run.voltage_v)[record.seen_rows_thin :])
+    for index, record in enumerate(records):
+        if tests and record.n_fit == len(record.thin):
+            continue
+        run = state.simulated(record, index, thin=True)
+        residual = record.thin.voltage_v - run.voltage_v
+        parts.append(residual[record.n_fit :] if record.n_fit < len(record.thin) else residual)
+    return Errors.of(np.concatenate(parts)).rmse_v

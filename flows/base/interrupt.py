@@ -22,6 +22,7 @@ INTERRUPTED = 130
 
 
 _asked = threading.Event()
+_ending = threading.Lock()
 
 
 @contextmanager
@@ -56,6 +57,8 @@ def end_now() -> None:
     """End the children (workers, Prefect's temporary server) and the process, without waiting for anything."""
     import psutil
 
+    if not _ending.acquire(blocking=False):
+        time.sleep(60.0)  # another thread is at it
     print("Interrupted.", file=sys.stderr, flush=True)
     children = psutil.Process().children(recursive=True)
     for child in children:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -150,3 +150,20 @@ def discover(
     )
     options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
     flow(case, out, prefect)
+
+
+def export(
+    cell: options.CellOption,
+    to: Annotated[Literal["bpx", "pybamm"], typer.Option(help="A BPX file, or a script that PyBaMM runs.")],
+    out: Annotated[Path, typer.Option(help="File to write: .json for bpx, .py for pybamm.")],
+) -> None:
+    """A cell, and what was found about it, for other tools; says what they cannot hold."""
+    from aesi.pipeline.export import export as write
+
+    done = write(cell, out, to)
+    for sentence in done.held:
+        typer.echo(sentence, err=True)
+    for sentence in done.left:
+        typer.echo(f"Not in it: {sentence}", err=True)
+    for file in done.files:
+        typer.echo(str(file))

@@ -19,7 +19,7 @@ from flows.base.console import Console, duration
 
 if TYPE_CHECKING:
     from aesi.tracer import Discovery
-    from aesi.tracer.search import Admission, Scored
+    from aesi.tracer.discovery import TriedHypothesis
     from flows.jobs.stages import Stages
     from flows.tracking.tracker import Tracker
 
@@ -88,34 +88,28 @@ class Follow:
         self._tracker, self._console = tracker, console
         self._started, self._done = time.monotonic(), 0
 
-    def __call__(self, name: str, scored: Scored, admission: Admission | None) -> None:
-        """One hypothesis: its evidence, its error and its parameters."""
+    def __call__(self, tried: TriedHypothesis) -> None:
+        """One hypothesis: what it says of unseen data, its error and its parameters."""
         self._done += 1
+        name = "+".join(tried.effects)
         # How many there will be is not known: each is judged by what the ones before it left.
         self._console.count("hypotheses", self._done, self._started, name)
         if self._tracker is None:
             return
-        values = scored.fit.values
-        parameters = {f"{owner}.{key}": v for owner, given in values.items() for key, v in given.items()}
-        metrics = {
-            "evidence_nats": scored.evidence,
-            "fit/rmse_mv": MV * scored.fit.rmse_v,
-            "held_out/rmse_mv": MV * scored.held_out_rmse_v,
-            "structured_mv": MV * scored.structured_v,
-            "simulations": float(scored.fit.simulations),
+        parameters = {
+            f"{owner}.{key}": v for owner, given in tried.values.items() for key, v in given.items()
         }
-        if admission is not None:
-            metrics |= {
-                "added/evidence_nats": admission.evidence_nats,
-                "added/gain_mv": MV * admission.gain_v,
-                "added/placebo_mv": MV * admission.placebo_v,
-            }
-        remark = admission.reason if admission is not None else ""
+        metrics = {
+            "gain_nats": tried.gain_nats,
+            "fit/rmse_mv": MV * tried.rmse_v,
+            "model_error_mv": MV * tried.delta_v,
+            "simulations": float(tried.simulations),
+        }
         self._tracker.nested(
             f"{name}#{self._done}",
             name or "nothing",
             "hypothesis",
-            {"hypothesis": name, "remark": remark, **parameters},
+            {"hypothesis": name, "trust": tried.trust, **parameters},
             metrics,
         )
 

@@ -24,7 +24,7 @@ class CaseSpec:
     records : what was run, each from a rest.  rate : of the currents, times those of the default vehicle.
     spread : whether the own parameters are off by `spread.SPREADS` (as declared otherwise).
     warmth : 'none': no temperature column, and the cell is at its reference; 'ambient': the column of a cell in a
-    chamber at another temperature; 'course': of one that also warms up.
+    chamber at another temperature; 'course': of one that warms up.
     soc0_given : whether the finder is told the state of charge.  dt_s : rows of drives and pulses.
     """
 

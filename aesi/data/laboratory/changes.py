@@ -86,6 +86,18 @@ def _ambient(parameters: Any, values: Values) -> None:
         _update(parameters, {name: float(parameters[name]) + values["shift_k"]})
 
 
+def _course(parameters: Any, values: Values) -> None:
+    """The cell's temperature from the reference and a shift towards a plateau, as under a steady load in a chamber."""
+    import pybamm
+
+    start = float(parameters["Initial temperature [K]"]) + values["shift_k"]
+
+    def ambient(y: Any, z: Any, t: Any) -> Any:
+        return start + values["rise_k"] * (1 - pybamm.exp(-t / values["constant_s"]))
+
+    _update(parameters, {"Ambient temperature [K]": ambient, "Initial temperature [K]": start})
+
+
 def _resistance(parameters: Any, values: Values) -> None:
     there = float(parameters.get(CONTACT_RESISTANCE, 0.0))
     _update(parameters, {CONTACT_RESISTANCE: there + values["resistance_ohm"]})
@@ -251,6 +263,7 @@ CHANGES: dict[str, Change] = {
     for change in (
         Change("self_heating", {"cooling_w_m2_k": 10.0}, {"thermal": "lumped"}, _heat),
         Change("ambient_temperature", {"shift_k": -5.0}, alter=_ambient),
+        Change("temperature_course", {"shift_k": 0.0, "rise_k": 5.0, "constant_s": 1000.0}, alter=_course),
         Change("series_resistance", {"resistance_ohm": 5e-4}, {"contact resistance": "true"}, _resistance),
         Change("film_growth", {"growth_ohm_ah": 0.0, "growth_ohm_h": 0.0}, terminal_voltage=_film),
         Change(

@@ -8,11 +8,11 @@ import numpy as np
 
 from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.collocation import gauss_layer, lobatto_to
-from aesi.numerics.galerkin import sphere_modes, stack_modes
+from aesi.numerics.galerkin import gauss_lobatto, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table, solid_diffusion
-from aesi.physics.model import EspmModel, Plating
+from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
 
 NO_PLATING = Plating(0.0, 0.5)
 
@@ -78,12 +78,10 @@ def _stack(model: EspmModel) -> Stack:
     )
     diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)
     layer = gauss_layer(order)
-    positions = (layer.x, layer.x, 1.0 - layer.x)  # each electrode's points count from its collector
-    at = [
-        lobatto_to(x, order) @ stack.to_nodes[k * order : (k + 1) * order + 1]
-        for k, x in enumerate(positions)
-    ]
-    at_places = np.vstack([at[0], at[2]])
+    positions = ((0, layer.x), (2, 1.0 - layer.x))  # each electrode's points count from its collector
+    at_places = np.vstack(
+        [lobatto_to(x, order) @ stack.to_nodes[k * order : (k + 1) * order + 1] for k, x in positions]
+    )
     at_places[:, 0] = at_places[:, 0].mean()  # the conserved mode is the same everywhere: to the last digit
     return Stack(
         rates=stack.lam * diffusion.d0,
@@ -96,10 +94,16 @@ def _stack(model: EspmModel) -> Stack:
         c0=e.c0_mol_m3,
         supply=(1.0 - e.transference) / FARADAY_C_MOL,
         kappa=conductivity_table(e.conductivity, e.c0_mol_m3),
-        gap_at=at[1],
-        gap_path=layer.weight * s.thickness_m / s.transport_efficiency,
+        gap_path=_gap_path(order, s.thickness_m / s.transport_efficiency),
         path=np.array([x.thickness_m / x.transport_efficiency for x in (layers[0], layers[2])]),
     )
+
+
+def _gap_path(order: int, length_m: float) -> Array:
+    """(nodes,) m of the separator by node, so that the sum over conductivities there is its resistance."""
+    path = np.zeros(3 * order + 1)
+    path[order : 2 * order + 1] = 0.5 * length_m * gauss_lobatto(order + 1)[1]
+    return path
 
 
 def _electrodes(model: EspmModel) -> Electrodes:
@@ -124,6 +128,7 @@ def _electrodes(model: EspmModel) -> Electrodes:
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
         alpha=np.array([x.transfer_coefficient for _, x in sides]),
+        has_layers=any(x.double_layer_f_m2 > 0.0 for _, x in sides),
         capacity=np.concatenate(capacity),
         exchange=np.concatenate(exchange),
         node_share=np.concatenate([layer.weight, layer.weight]),
@@ -131,29 +136,10 @@ def _electrodes(model: EspmModel) -> Electrodes:
             [area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient, e.c0_mol_m3]
         ),
         plating_to_c=1.0 / (FARADAY_C_MOL * n.thickness_m),
-        energies=_energies(model),
-        heat=_heat(model),
+        energies=activation_energies(model.cell),
+        heat=heat_numbers(model),
         area=cell.total_area_m2,
         contact=cell.contact_resistance_ohm,
         transference=e.transference,
         reference_k=cell.reference_temperature_k,
     )
-
-
-def _energies(model: EspmModel) -> Array:
-    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
-    n, p, e = model.cell.negative, model.cell.positive, model.cell.electrolyte
-    return np.array(
-        [
-            n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
-        ]
-    )  # fmt: skip
-
-
-def _heat(model: EspmModel) -> Array:
-    """Heat capacity J/K (0 for none), conductance W/K, surroundings K."""
-    if model.heat is None:
-        return np.zeros(3)
-    balance = model.heat
-    return np.array([balance.heat_capacity_j_k, balance.conductance_w_k, model.cell.ambient_temperature_k])

@@ -2,6 +2,8 @@
 
 Units are particles: of one size, at one place. Places are Gauss points, those of the negative electrode first, each
 counted from its collector. Currents of units and places are per area of the cell, positive for delithiation.
+
+numba's cache on disk names these classes: who renames one deletes `__pycache__` of this folder.
 """
 
 from __future__ import annotations
@@ -41,8 +43,7 @@ class Stack(NamedTuple):
     rates : (modes,) 1/s.  at : (places, modes) salt at the places, and how the reaction there feeds the modes.
     to_nodes, project : (nodes, modes) both ways.  psi, strength, top : the variable part of diffusion.  c0 : mol/m3.
     supply : mol/C, (1 - t+) / F.  kappa : table of conductivity on [0, top].
-    gap_at, gap_path : points in the separator (points, modes), and thickness over transport efficiency (points,) m.
-    path : (2,) the same of the electrodes.
+    path : (2,) m, thickness over transport efficiency of the electrodes.  gap_path : (nodes,) of the separator.
     """
 
     rates: Array
@@ -55,7 +56,6 @@ class Stack(NamedTuple):
     c0: float
     supply: float
     kappa: Array
-    gap_at: Array
     gap_path: Array
     path: Array
 
@@ -76,6 +76,7 @@ class Electrodes(NamedTuple):
     ocp: Array
     entropic: Array
     alpha: Array
+    has_layers: bool
     capacity: Array
     exchange: Array
     node_share: Array
@@ -118,9 +119,12 @@ class DfnState(NamedTuple):
 class DfnTrial(NamedTuple):
     """Scratch of a step. `calm_...` is its end without what the reaction there does; `..._start` is its start.
 
-    reach, give : (units,) surface = reach - give y.  exchange : (units,) A/m2.  force, forcing, q, c, c_predicted,
-    salt, kappa : at the end.  ohm : (places, points of an electrode) ohm m2.  layer_c A/(V m2), layer_old A/m2 :
-    (places,) double layers.  no_give, no_spread : zeros, for an instant.
+    reach, give : (units,) surface = reach - give y.  force (units, modes + 1), forcing (salt modes,) : at the end.
+    q, c, kappa : at the end.  salt_before : (places,) over rest, a step ago.  forcing_before : the same.
+    ohm : (places, points of an electrode) ohm m2.  layer_c A/(V m2), layer_old A/m2 : (places,) double layers.
+    total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
+    between.  faster : (3,) factors of diffusion, negative, positive, salt.
+    no_spread : zeros, for an instant.  rates : (6,) Arrhenius factors, by `Electrodes.energies`.
     """
 
     calm_z: Array
@@ -129,16 +133,15 @@ class DfnTrial(NamedTuple):
     calm_salt: Array
     reach: Array
     give: Array
-    no_give: Array
-    exchange: Array
     y_start: Array
     given_start: Array
     force: Array
     force_end: Array
     forcing: Array
+    forcing_before: Array
+    salt_before: Array
     q: Array
     c: Array
-    c_predicted: Array
     salt: Array
     nodes: Array
     kappa: Array
@@ -146,13 +149,34 @@ class DfnTrial(NamedTuple):
     layer_c: Array
     layer_old: Array
     no_spread: Array
-    work: Array
-    rhs: Array
     z_end: Array
+    rates: Array
+    total: Array
+    before: Array
+    change: Array
+    faster: Array
+
+
+class NewtonScratch(NamedTuple):
+    """Scratch of Newton's method: by unit pot, slope, by_salt, d_y; by place the others; d_phi of both collectors."""
+
+    pot: Array
+    slope: Array
+    by_salt: Array
+    slack: Array
+    shift: Array
+    conductance: Array
+    d_y: Array
+    d_psi: Array
+    d_given: Array
+    d_salt: Array
+    d_phi: Array
+    matrix: Array
+    rhs: Array
 
 
 class Weights(NamedTuple):
-    """Weights of step lengths in use, by slot: see `transport_kernels.renew`."""
+    """Weights of step lengths in use, by slot: see `diffusion_kernels.renew`."""
 
     keys: IntArray
     particle: Array

@@ -1,12 +1,18 @@
 """Compiled relations at one place of a porous electrode: kinetics, potential, salt."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 from numba import njit
 
 from aesi.physics.espm.electrode_kernels import overpotential
-from aesi.physics.espm.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY, lookup
+from aesi.physics.espm.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY
 
+_OPTIONS: Any = {"cache": True, "nogil": True, "fastmath": FASTMATH, "_nrt": False}
+compiled: Callable[[Any], Any] = njit(**_OPTIONS)
+"""Of every function that is not inlined. numba counts the references to each array that it takes out of a named tuple,
+one atomic instruction at each use: without (nothing here allocates) a sample takes 2.5 us instead of 8.4."""
 SMALLEST_SALT = 1e-4
 """Of the rest concentration: below it the logarithm goes on as its tangent."""
 
@@ -22,16 +28,25 @@ def kinetic_drop(y, exchange, alpha, thermal):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def equilibrium(ocp, entropic, rise, theta):  # type: ignore[no-untyped-def]
+def row_lookup(tables, row, position):  # type: ignore[no-untyped-def]
+    """As `kernels.lookup`, of one row of tables; a view of the row would cost more than the value."""
+    last = tables.shape[1] - 1
+    s = min(max(position, 0.0), 1.0) * last
+    i = min(int(s), last - 1)
+    return tables[row, i] + (s - i) * (tables[row, i + 1] - tables[row, i])
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def equilibrium(ocp, entropic, side, rise, theta):  # type: ignore[no-untyped-def]
     """Open-circuit potential (V) at a surface stoichiometry and its slope, falling on outside [0, 1]."""
     inside = min(max(theta, 0.0), 1.0)
-    last = ocp.shape[0] - 1
+    last = ocp.shape[1] - 1
     s = inside * last
     cell = min(int(s), last - 1)
-    step = ocp[cell + 1] - ocp[cell]
-    value = ocp[cell] + (s - cell) * step - BEYOND_RANGE_V * (theta - inside)
+    step = ocp[side, cell + 1] - ocp[side, cell]
+    value = ocp[side, cell] + (s - cell) * step - BEYOND_RANGE_V * (theta - inside)
     if rise != 0.0:
-        value += rise * lookup(entropic, inside)
+        value += rise * row_lookup(entropic, side, inside)
     return value, step * last if theta == inside else -BEYOND_RANGE_V
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
-from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, Particles, Stack, Weights
+from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
 from aesi.physics.espm.kernels import CACHE_SLOTS
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
@@ -22,7 +22,7 @@ def run_porous_electrode(
 
     Raises InputError for an electrode cut into regions.
     """
-    from aesi.physics.dfn.kernels import run_porous
+    from aesi.physics.dfn.record_kernels import run_porous
 
     if model.regions != 1:
         raise InputError(
@@ -33,10 +33,10 @@ def run_porous_electrode(
     out = np.empty((9, len(time)))
     given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
-    state, trial, weights = _memory(particles, stack, electrodes)
+    state, trial, newton, weights = _memory(particles, stack, electrodes)
     fault_at, fault = run_porous(
         time, current, kelvin, given, hold == "backward", model.substep_s, model.most_substeps,
-        np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, weights,
+        np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, newton, weights,
         out, np.zeros((0, 4, stack.at.shape[0])),
     )  # fmt: skip
     extra = {"temperature_k": out[7]}
@@ -45,7 +45,7 @@ def run_porous_electrode(
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
 
 
-def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, Weights]:
+def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, NewtonScratch, Weights]:
     """State and scratch at rest."""
     units, modes, kinds = len(p.place), len(p.gains), len(p.side)
     places, salt_modes = s.at.shape
@@ -56,16 +56,22 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
 
     state = DfnState(
         z=of(units, modes), mean=of(units), y=of(units), trend=of(units), theta=of(units), force=of(units, modes + 1),
-        q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), given=of(places), psi=of(places), salt=of(places),
+        q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), given=of(places), psi=of(places), salt=np.ones(places),
         layer=of(places), plated=of(places), plating=of(places),
     )  # fmt: skip
     trial = DfnTrial(
         calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
-        reach=of(units), give=of(units), no_give=of(units), exchange=of(units), y_start=of(units),
-        given_start=of(places), force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes),
-        q=of(salt_modes), c=of(nodes), c_predicted=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
+        reach=of(units), give=of(units), y_start=of(units), given_start=of(places),
+        force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
+        salt_before=np.ones(places), q=of(salt_modes), c=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
         kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),
-        no_spread=of(places, places), work=of(places, places), rhs=of(places, 3), z_end=of(modes),
+        no_spread=of(places, places), z_end=of(modes), rates=np.ones(6),
+        total=of(2), before=of(2), change=of(2), faster=np.ones(3),
+    )  # fmt: skip
+    newton = NewtonScratch(
+        pot=of(units), slope=of(units), by_salt=of(units), slack=of(places), shift=of(places), conductance=of(places),
+        d_y=of(units), d_psi=of(places), d_given=of(places), d_salt=of(places), d_phi=of(2),
+        matrix=of(places, places), rhs=of(places, 3),
     )  # fmt: skip
     weights = Weights(
         keys=np.full(CACHE_SLOTS, -1, dtype=np.int64),
@@ -74,4 +80,4 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
         salt=of(CACHE_SLOTS, 3, salt_modes),
         spread=of(CACHE_SLOTS, places, places),
     )
-    return state, trial, weights
+    return state, trial, newton, weights

@@ -11,7 +11,7 @@ Leaves out the change of porosity and conductivity. Holds for isolated or cracke
 Source: Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
 """
 
-from aesi.parameters import Parameter
+from aesi.parameters import Parameter, Spread
 from aesi.physics.balance import with_active_material
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
@@ -24,6 +24,7 @@ PARAMETERS = {
         neutral=0.0,
         source="an electrode declared too small by 30 % to half of it gone",
         description="share of the declared active material",
+        spread=Spread(None, 0.05, "coating weights and cell-to-cell capacity, a few per cent"),
     ),
     "lost_at_soc": Parameter(
         1.0,

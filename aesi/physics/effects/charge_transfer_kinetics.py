@@ -8,11 +8,17 @@ rate; at small currents it cannot be told from a resistance.
 Source: scatter of published values, Wang et al., Prog. Energy 4 (2022) 032004, doi:10.1088/2516-1083/ac692c.
 """
 
-from aesi.parameters import Parameter
+from aesi.parameters import Parameter, Spread
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 RANGE = "an order of magnitude either way, the scatter of published values"
+SPREAD = Spread(
+    tight=0.22,
+    loose=1.0,
+    source="the LG M50 parametrised twice (doi:10.1149/1945-7111/ab9050, 10.1016/j.electacta.2022.140700): 0.31 apart, "
+    "over the root of two; loose: scatter of published values",
+)
 PARAMETERS = {
     name: Parameter(
         0.5,
@@ -21,6 +27,7 @@ PARAMETERS = {
         RANGE,
         log=True,
         neutral=1.0,
+        spread=SPREAD,
         description=f"factor, {name[:8]} electrode",
     )
     for name in ("negative_factor", "positive_factor")

@@ -12,7 +12,7 @@ voltages.
 Source: Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
 """
 
-from aesi.parameters import Parameter
+from aesi.parameters import Parameter, Spread
 from aesi.physics.balance import without_lithium
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
@@ -25,6 +25,7 @@ PARAMETERS = {
         neutral=0.0,
         source="a cell more than new (declared too low) to its end of life",
         description="share of the declared capacity",
+        spread=Spread(None, 0.03, "first-cycle losses of cells of one make differ by a few per cent"),
     )
 }
 

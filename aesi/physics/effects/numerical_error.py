@@ -38,4 +38,6 @@ def refine(model: EspmModel, *, refinement: float) -> EspmModel:
     )
 
 
-EFFECT = Effect("numerical_error", "instrument", __doc__, PARAMETERS, on_model=refine)
+EFFECT = Effect(
+    "numerical_error", "instrument", __doc__, PARAMETERS, on_model=refine, refines="discretisation"
+)

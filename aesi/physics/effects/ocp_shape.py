@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.parameters import Parameter
+from aesi.parameters import Parameter, Spread
 from aesi.physics.cell import Electrode
 from aesi.physics.cell.relations import LookupTable, Sum
 from aesi.physics.effect import Effect
@@ -48,6 +48,7 @@ PARAMETERS = {
         neutral=0.0,
         expected=float(expected),
         linear=True,
+        spread=Spread(None, float(expected), "half-cell to half-cell scatter, Chen et al. 2020"),
         source="scatter of half-cell measurements, tens of millivolts",
         description=f"coefficient of cos({k} pi z)" if k else "constant part",
     )

@@ -23,9 +23,9 @@ PARAMETERS = {
     "strength": Parameter(
         1.0,
         "dimensionless",
-        bounds=(0.0, 3.0),
+        bounds=(0.0, 1.0),
         neutral=0.0,
-        source="0 single particle, 1 porous electrode, beyond: transport worse than declared",
+        source="0 single particle, 1 porous electrode",
         description="share of the difference between regions, s",
     )
 }
@@ -38,4 +38,6 @@ def cut_into_regions(model: EspmModel, *, strength: float) -> EspmModel:
     return replace(model, regions=REGIONS, region_contrast=strength)
 
 
-EFFECT = Effect("reaction_nonuniformity", "physics", __doc__, PARAMETERS, on_model=cut_into_regions)
+EFFECT = Effect(
+    "reaction_nonuniformity", "physics", __doc__, PARAMETERS, on_model=cut_into_regions, refines="reduction"
+)

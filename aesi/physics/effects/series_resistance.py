@@ -8,7 +8,7 @@ Source: Ohm's law; the size from Taheri et al., J. Power Sources 196 (2011) 6525
 doi:10.1016/j.jpowsour.2011.03.056.
 """
 
-from aesi.parameters import Parameter
+from aesi.parameters import Parameter, Spread
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
@@ -20,6 +20,7 @@ PARAMETERS = {
         neutral=0.0,
         source="0.1 mohm (large pouch, welded tabs) to 100 mohm (small cylindrical cell in a clamp)",
         description="resistance added to what the cell file declares",
+        spread=Spread(None, 0.02, "tabs, welds and clamps of small cells, Taheri et al. 2011", ohmic=True),
     )
 }
 

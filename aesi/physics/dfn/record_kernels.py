@@ -5,9 +5,11 @@ import math
 import numpy as np
 from numba import njit
 
-from aesi.physics.dfn.step_kernels import GAS_OVER_FARADAY, advance, hold_layers, settle
-from aesi.physics.dfn.transport_kernels import renew, salt_forcing
-from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
+from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
+from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
+from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY
+from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle
+from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
 from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
 
 TEMPERATURE_STEP_K = 0.01
@@ -16,7 +18,7 @@ DIFFUSIONS = (0, 1, 4)
 """Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def run_porous(  # type: ignore[no-untyped-def]
     time,
     current,
@@ -31,6 +33,7 @@ def run_porous(  # type: ignore[no-untyped-def]
     e,
     state,
     t,
+    newton,
     weights,
     out,
     profile,
@@ -43,15 +46,15 @@ def run_porous(  # type: ignore[no-untyped-def]
     Returns (sample, what) of the first fault: 1, 2 a surface, 3 the salt, 4 no solution.
     """
     half = s.at.shape[0] // 2
-    total, before, change, faster = np.zeros(2), np.zeros(2), np.zeros(2), np.ones(3)
+    total, before, change, faster = t.total, t.before, t.change, t.faster
     start(p, s, state, t, half, theta0)
-    t_k, t_weights = temperature[0], -1.0
+    t_k, t_weights, t_rates = temperature[0], -1.0, temperature[0]
+    set_rates(e, t, t_k)
     watts, last_dt = 0.0, 0.0
     fault_at, fault = -1, 0
     total[0] = current[0] / e.area
     total[1] = -total[0]
-    phi_n, phi_p, steps = settle(p, s, e, state, t, total, total, t_k)
-    has_layers = np.max(e.capacity) > 0.0
+    phi_n, phi_p, steps = settle(p, s, e, state, t, newton, total, total, t_k)
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
         if k > 0 and backward and current[k] != current[k - 1]:
@@ -59,17 +62,17 @@ def run_porous(  # type: ignore[no-untyped-def]
             change[1] = -change[0]
             total[0], total[1] = current[k] / e.area, -current[k] / e.area
             last_dt = 0.0
-            if has_layers:
+            if e.has_layers:
                 for r in range(2 * half):
                     state.given[r] += e.node_share[r] * change[0 if r < half else 1]
                     state.layer[r] = 0.0
             else:
-                settle(p, s, e, state, t, change, total, t_k)
+                settle(p, s, e, state, t, newton, change, total, t_k)
         parts = min(max(1, math.ceil(whole / substep - 1e-9)), most) if k > 0 else 0
         for part in range(parts):
             dt = whole / parts
             share = (part + 1.0) / parts
-            before[:] = total
+            before[0], before[1] = total[0], total[1]
             i1 = current[k] if backward else current[k - 1] + (current[k] - current[k - 1]) * share
             i0 = before[0] * e.area
             total[0], total[1] = i1 / e.area, -i1 / e.area
@@ -81,9 +84,12 @@ def run_porous(  # type: ignore[no-untyped-def]
                 t_k = heated(start_k, watts, dt, e.heat)
             if abs(t_k - t_weights) > TEMPERATURE_STEP_K:
                 t_weights = t_k
-                weights.keys[:] = -1
+                weights.keys.fill(-1)
                 for i in range(3):
                     faster[i] = arrhenius(e.energies[DIFFUSIONS[i]], t_k, e.reference_k)
+            if t_k != t_rates:
+                t_rates = t_k
+                set_rates(e, t, t_k)
             key = np.int64(dt * NANOSECONDS + 0.5)
             slot = key % CACHE_SLOTS
             w, taken, w_salt, spread = (
@@ -95,10 +101,10 @@ def run_porous(  # type: ignore[no-untyped-def]
             if weights.keys[slot] != key:
                 weights.keys[slot] = key
                 renew(p, s, faster, dt, w, taken, w_salt, spread)
-            if has_layers:
+            if e.has_layers:
                 hold_layers(e, state, t, dt, GAS_OVER_FARADAY * t_k)
             phi_n, phi_p, steps = advance(
-                p, s, e, state, t, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k
+                p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k
             )
             last_dt = dt
             if steps < 0 and fault_at < 0:
@@ -109,12 +115,12 @@ def run_porous(  # type: ignore[no-untyped-def]
                     state.plated[r] = max(state.plated[r] - gone, 0.0)
             if e.heat[0] > 0.0:
                 power = heat_power(
-                    p, e, state, half, i1, voltage_of(s, e, state, phi_n, phi_p, total[0], t_k), t_k
+                    p, e, state, half, i1, voltage_of(s, e, state, t, phi_n, phi_p, total[0]), t_k
                 )
                 if not given:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat)
                 watts = power
-        voltage = voltage_of(s, e, state, phi_n, phi_p, total[0], t_k)
+        voltage = voltage_of(s, e, state, t, phi_n, phi_p, total[0])
         if k == 0 and e.heat[0] > 0.0:
             watts = heat_power(p, e, state, half, current[0], voltage, t_k)
         out[0, k] = voltage
@@ -127,20 +133,20 @@ def run_porous(  # type: ignore[no-untyped-def]
                 profile[k, 3, r] = state.psi[r]
             for u in range(p.place.shape[0]):
                 profile[k, 0, p.place[u]] += state.theta[u] * p.share[u] / e.node_share[p.place[u]]
-        if fault_at < 0:
+        if fault_at < 0 or (fault_at == k and fault == 4):
             if not 0.0 <= out[1, k] <= 1.0:
                 fault_at, fault = k, 1
             elif not 0.0 <= out[2, k] <= 1.0:
                 fault_at, fault = k, 2
-            elif not np.min(state.c) >= 0.0:
+            elif not smallest(state.c) >= 0.0:
                 fault_at, fault = k, 3
     return fault_at, fault
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def start(p, s, state, t, half, theta0):  # type: ignore[no-untyped-def]
     """Rest: uniform particles, uniform salt, no reaction."""
-    state.c[:] = s.c0
+    state.c.fill(s.c0)
     if s.strength > 0.0:
         salt_forcing(s, state.c, state.forcing)
     for u in range(p.place.shape[0]):
@@ -150,32 +156,46 @@ def start(p, s, state, t, half, theta0):  # type: ignore[no-untyped-def]
             solid_forcing(state.mean[u], state.z[u], p.at, p.project, p.psi[side], t.nodes, state.force[u])
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
-def voltage_of(s, e, state, phi_n, phi_p, density, t_k):  # type: ignore[no-untyped-def]
+@njit(inline="always", fastmath=FASTMATH)
+def smallest(values):  # type: ignore[no-untyped-def]
+    """The smallest of (n,) values; not a number where one is not."""
+    low = values[0]
+    for value in values:
+        if not value >= low:
+            low = value
+    return low
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def set_rates(e, t, t_k):  # type: ignore[no-untyped-def]
+    """Arrhenius factors of everything that has an activation energy."""
+    for i in range(6):
+        t.rates[i] = arrhenius(e.energies[i], t_k, e.reference_k)
+
+
+@compiled
+def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untyped-def]
     """Terminal voltage: both collectors, less the drop in the separator and the contacts."""
-    warmer = arrhenius(e.energies[5], t_k, e.reference_k)
     gap = 0.0
-    for i in range(s.gap_at.shape[0]):
-        salt = s.c0
-        for j in range(s.rates.shape[0]):
-            salt += s.gap_at[i, j] * state.q[j]
-        gap += s.gap_path[i] / lookup(s.kappa, salt / s.top)
-    return phi_p - phi_n - density * (gap / warmer + e.contact * e.area)
+    for i in range(s.gap_path.shape[0]):
+        if s.gap_path[i] > 0.0:
+            gap += s.gap_path[i] / lookup(s.kappa, state.c[i] / s.top)
+    return phi_p - phi_n - density * (gap / t.rates[5] + e.contact * e.area)
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-untyped-def]
     """Heat released (W): what the reaction gives, with its entropy, less what leaves as electric power."""
     power = -current * voltage
     for u in range(p.place.shape[0]):
         side = 0 if p.place[u] < half else 1
-        slope = lookup(e.entropic[side], state.theta[u])
-        level = open_circuit(e.ocp[side], state.theta[u]) + (t_k - e.reference_k) * slope
+        slope = row_lookup(e.entropic, side, state.theta[u])
+        level = equilibrium(e.ocp, e.entropic, side, t_k - e.reference_k, state.theta[u])[0]
         power += e.area * state.y[u] * (t_k * slope - level)
     return power
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def record(p, e, state, half, out, k):  # type: ignore[no-untyped-def]
     """Averages of the electrodes, salt at the collectors, plated lithium."""
     for row in range(1, 7):

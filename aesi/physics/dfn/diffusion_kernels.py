@@ -10,10 +10,11 @@ this without y1.
 
 from numba import njit
 
+from aesi.physics.dfn.local_kernels import compiled
 from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def renew(p, s, faster, dt, w, taken, w_salt, spread):  # type: ignore[no-untyped-def]
     """Weights of one step length and of factors `faster` (3,) of diffusion (negative, positive, salt).
 
@@ -35,7 +36,7 @@ def renew(p, s, faster, dt, w, taken, w_salt, spread):  # type: ignore[no-untype
             spread[r, v] = spread[v, r] = s.supply * total / s.c0
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def calm_particles(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
     """Modes, means and surfaces of all particles without what the reaction at the end of the step does."""
     for u in range(p.place.shape[0]):
@@ -56,15 +57,18 @@ def calm_particles(p, state, t, faster, dt, w):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def end_particle(p, t, u, y, dt, w, z):  # type: ignore[no-untyped-def]
-    """Modes z (modes,) of one particle with a reaction y at the end of the step; returns its mean."""
-    k = p.kind[u]
-    for j in range(p.gains.shape[0]):
-        z[j] = t.calm_z[u, j] - p.scale[u] * p.gains[j] * w[k, 2, j] * y
+def end_mode(p, t, u, j, y, w):  # type: ignore[no-untyped-def]
+    """Mode j of particle u with a reaction y at the end of the step."""
+    return t.calm_z[u, j] - p.scale[u] * p.gains[j] * w[p.kind[u], 2, j] * y
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def end_mean(p, t, u, y, dt):  # type: ignore[no-untyped-def]
+    """Mean of particle u with a reaction y at the end of the step."""
     return t.calm_mean[u] - 1.5 * p.scale[u] * dt * y
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def calm_salt(s, state, t, faster, w):  # type: ignore[no-untyped-def]
     """Modes, and salt over rest at the places, without what the reaction at the end of the step does."""
     strength = s.strength * faster
@@ -80,20 +84,21 @@ def calm_salt(s, state, t, faster, w):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def end_salt(s, t, given, w, q, c):  # type: ignore[no-untyped-def]
-    """Modes q and concentrations c (mol/m3, at the nodes) with a reaction `given` at the end of the step."""
-    for j in range(q.shape[0]):
+def end_salt(s, t, given, w):  # type: ignore[no-untyped-def]
+    """Modes t.q and concentrations t.c (mol/m3, at the nodes) with a reaction `given` at the end of the step."""
+    for i in range(t.c.shape[0]):
+        t.c[i] = s.c0
+    for j in range(t.q.shape[0]):
         source = 0.0
         for v in range(s.at.shape[0]):
             source += s.at[v, j] * given[v]
-        q[j] = t.calm_q[j] + w[2, j] * s.supply * source
-    for i in range(c.shape[0]):
-        c[i] = s.c0
-        for j in range(q.shape[0]):
-            c[i] += s.to_nodes[i, j] * q[j]
+        t.q[j] = t.calm_q[j] + w[2, j] * s.supply * source
+    for i in range(t.c.shape[0]):
+        for j in range(t.q.shape[0]):
+            t.c[i] += s.to_nodes[i, j] * t.q[j]
 
 
-@njit(inline="always", fastmath=FASTMATH)
+@compiled
 def salt_at_places(s, q, salt):  # type: ignore[no-untyped-def]
     """salt (places,) over rest."""
     for r in range(s.at.shape[0]):
@@ -103,7 +108,7 @@ def salt_at_places(s, q, salt):  # type: ignore[no-untyped-def]
         salt[r] = 1.0 + value / s.c0
 
 
-@njit(inline="always", fastmath=FASTMATH)
+@compiled
 def salt_forcing(s, c, forcing):  # type: ignore[no-untyped-def]
     """forcing[j] : mode j of the integral psi of the diffusivity's variable part, at concentrations c of the nodes."""
     forcing[:] = 0.0
@@ -113,17 +118,18 @@ def salt_forcing(s, c, forcing):  # type: ignore[no-untyped-def]
             forcing[j] += s.project[i, j] * value
 
 
-@njit(inline="always", fastmath=FASTMATH)
+@compiled
 def drops(kappa, path, before, after, solid, ohm):  # type: ignore[no-untyped-def]
-    """ohm[r, v] (ohm m2) of one electrode: drop from collector to place r and on to the separator, per current at v.
+    """ohm[r, v] (ohm m2): drop from the collector to place r and on to the separator, per current at point v.
 
-    kappa : (n,) S/m at the places.  path : thickness over transport efficiency, m.  solid : ohm m2.
+    kappa : (places,) S/m.  path : (2,) thickness over transport efficiency, m.  solid : (2, points, points) ohm m2.
     """
-    n = kappa.shape[0]
-    for r in range(n):
+    n = before.shape[0]
+    for r in range(2 * n):
+        side, i = r // n, r % n
         for v in range(n):
-            ohm[r, v] = solid[r, v]
+            ohm[r, v] = solid[side, i, v]
         for m in range(n):
-            part = path * after[r, m] / kappa[m]
+            part = path[side] * after[i, m] / kappa[side * n + m]
             for v in range(n):
                 ohm[r, v] += part * before[m, v]

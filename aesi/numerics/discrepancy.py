@@ -1,0 +1,125 @@
+"""White noise on top of a slowly wandering model error: whitening and log-determinant in one pass.
+
+    y_k = a_k sum_j x_j(t_k) + w_k v_k,   x_j Ornstein-Uhlenbeck of unit variance / m and correlation length tau_j   (1)
+
+a (n,) and w (n,) are the standard deviations of the model error and of the white noise in each row. Equal shares over
+correlation lengths a decade apart stand for a spectrum that falls as one over the frequency between them. The Kalman
+filter of (1) is linear in y, so that it whitens a residual and its sensitivities alike. The process starts afresh at
+each block, so that blocks are independent and any of them can be left out in closed form.
+Kennedy & O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, for the model error; Durbin & Koopman, Time Series Analysis by
+State Space Methods, 2nd ed. (2012), chapters 4 and 7, for the filter.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from aesi.numerics.typing import Array, IntArray
+
+CORRELATION_LENGTHS_S = (30.0, 300.0, 3000.0)
+
+
+@njit(cache=True, nogil=True)
+def _filter(columns, time_s, opens, amplitude, white, tau_s):  # type: ignore[no-untyped-def]
+    n, m = columns.shape
+    k = len(tau_s)
+    out = np.empty((n, m))
+    log_det = np.empty(n)
+    state = np.zeros((k, m))
+    p = np.zeros((k, k))
+    phi = np.empty(k)
+    gain = np.empty(k)
+    share = 1.0 / k
+    last = -1.0
+    for i in range(n):
+        if opens[i]:
+            state[:] = 0.0
+            p[:] = 0.0
+            for a in range(k):
+                p[a, a] = share
+        else:
+            gap = time_s[i] - time_s[i - 1]
+            if gap != last:
+                last = gap
+                for a in range(k):
+                    phi[a] = np.exp(-gap / tau_s[a])
+            for a in range(k):
+                for b in range(k):
+                    p[a, b] *= phi[a] * phi[b]
+                p[a, a] += share * (1.0 - phi[a] * phi[a])
+                for j in range(m):
+                    state[a, j] *= phi[a]
+        scale = amplitude[i]
+        variance = white[i] * white[i]
+        for a in range(k):
+            total = 0.0
+            for b in range(k):
+                total += p[a, b]
+            gain[a] = total * scale
+            variance += gain[a] * scale
+        root = 1.0 / np.sqrt(variance)
+        for j in range(m):
+            predicted = 0.0
+            for a in range(k):
+                predicted += state[a, j]
+            innovation = columns[i, j] - scale * predicted
+            out[i, j] = innovation * root
+            step = innovation / variance
+            for a in range(k):
+                state[a, j] += gain[a] * step
+        for a in range(k):
+            for b in range(k):
+                p[a, b] -= gain[a] * gain[b] / variance
+        log_det[i] = np.log(variance)
+    return out, log_det
+
+
+def whiten(
+    columns: Array,
+    time_s: Array,
+    starts: IntArray,
+    amplitude: Array,
+    white: Array,
+    correlation_lengths_s: tuple[float, ...] = CORRELATION_LENGTHS_S,
+) -> tuple[Array, Array]:
+    """Whitened columns (n, m), of unit variance, and the log-determinant of the covariance row by row (n,).
+
+    columns : (n, m).  time_s : (n,) s, rising within each block.  starts : first rows of the blocks.
+    amplitude, white : (n,) standard deviations of model error and noise, in the unit of `columns`.
+    """
+    opens = np.zeros(len(time_s), dtype=np.bool_)
+    opens[starts] = True
+    table = np.ascontiguousarray(columns, dtype=float)
+    out = _filter(table, time_s, opens, amplitude, white, np.array(correlation_lengths_s))
+    return out[0], out[1]
+
+
+def draw(
+    time_s: Array,
+    starts: IntArray,
+    amplitude: Array,
+    white: Array,
+    rng: np.random.Generator,
+    correlation_lengths_s: tuple[float, ...] = CORRELATION_LENGTHS_S,
+) -> Array:
+    """(n,) one draw of (1)."""
+    from scipy.signal import lfilter
+
+    out = white * rng.normal(size=len(time_s))
+    share = 1.0 / len(correlation_lengths_s)
+    ends = [*starts[1:], len(time_s)]
+    for first, end in zip(starts, ends, strict=True):
+        gap = np.diff(time_s[first:end])
+        for tau in correlation_lengths_s:
+            noise = np.sqrt(share) * rng.normal(size=end - first)
+            phi = np.exp(-gap / tau)
+            if len(gap) and np.ptp(gap) < 1e-6 * gap[0]:
+                noise[1:] *= np.sqrt(1.0 - phi[0] ** 2)
+                x = lfilter([1.0], [1.0, -phi[0]], noise)
+            else:
+                x = noise
+                for i, keep in enumerate(phi):
+                    x[i + 1] = keep * x[i] + np.sqrt(1.0 - keep**2) * x[i + 1]
+            out[first:end] += amplitude[first:end] * x
+    return out

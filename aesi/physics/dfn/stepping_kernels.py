@@ -1,0 +1,163 @@
+"""Compiled step of the porous electrode, and its state at an instant at which the current jumps."""
+
+from numba import njit
+
+from aesi.physics.dfn.diffusion_kernels import (
+    calm_particles,
+    calm_salt,
+    drops,
+    end_mean,
+    end_mode,
+    end_salt,
+    salt_at_places,
+    salt_forcing,
+)
+from aesi.physics.dfn.local_kernels import compiled
+from aesi.physics.dfn.reaction_kernels import solve_reaction
+from aesi.physics.espm.electrode_kernels import end_weight
+from aesi.physics.espm.kernels import FASTMATH, lookup
+from aesi.physics.espm.transport_kernels import solid_forcing
+
+SALT_TOLERANCE = 1e-3
+"""Of the rest concentration: how far from its prediction the salt may end before a step is repeated. What rests on the
+prediction, conductivity and the variable part of diffusion, is then known to 0.1 %."""
+SURFACE_TOLERANCE = 1e-6
+"""Of stoichiometry: the same of a surface whose diffusivity varies."""
+PASSES = 6
+
+
+@compiled
+def find_reaction(p, s, e, state, t, newton, spread, total, t_k):  # type: ignore[no-untyped-def]
+    """Solve for the reaction, with the conductivity at the salt `t.salt`; returns as `solve_reaction`."""
+    half = s.at.shape[0] // 2
+    for r in range(2 * half):
+        t.kappa[r] = t.rates[5] * lookup(s.kappa, t.salt[r] * s.c0 / s.top)
+    drops(t.kappa, s.path, e.before, e.after, e.solid, t.ohm)
+    return solve_reaction(
+        p, e, t, newton, spread, total, t_k,
+        state.y, state.theta, state.psi, state.given, state.salt, state.plated, state.plating,
+    )  # fmt: skip
+
+
+@compiled
+def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-untyped-def]
+    """The reaction at an instant: particles and salt stay as they are, the current has jumped by `change` (2,)."""
+    half = s.at.shape[0] // 2
+    for u in range(p.place.shape[0]):
+        state.y[u] += p.share[u] * change[0 if p.place[u] < half else 1]
+        state.trend[u] = 0.0
+        t.give[u] = 0.0
+        t.reach[u] = state.mean[u]
+        for j in range(p.gains.shape[0]):
+            t.reach[u] += state.z[u, j]
+    salt_at_places(s, state.q, t.calm_salt)
+    for r in range(2 * half):
+        t.salt[r] = t.calm_salt[r]
+        t.layer_c[r], t.layer_old[r] = 0.0, 0.0
+    return find_reaction(p, s, e, state, t, newton, t.no_spread, total, t_k)
+
+
+@compiled
+def hold_layers(e, state, t, dt, thermal):  # type: ignore[no-untyped-def]
+    """Double layers over a step as a conductance and a current; exact for one that relaxes by its own kinetics."""
+    for r in range(e.capacity.shape[0]):
+        t.layer_c[r], t.layer_old[r] = 0.0, 0.0
+        if e.capacity[r] > 0.0:
+            weight = end_weight(dt * e.exchange[r] / (e.capacity[r] * thermal))
+            t.layer_c[r] = e.capacity[r] / (dt * weight)
+            t.layer_old[r] = t.layer_c[r] * state.psi[r] + (1.0 - weight) / weight * state.layer[r]
+
+
+@compiled
+def advance(  # type: ignore[no-untyped-def]
+    p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k
+):  # fmt: skip
+    """One step to the currents `total` (2,), which changed by `change` (2,); temperature t_k at its end.
+
+    last_dt : of the step before, 0 after a jump.  Returns as `solve_reaction`.
+    """
+    predict(p, s, e, state, t, dt, last_dt, taken, change)
+    varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
+    if varies:
+        calm_particles(p, state, t, faster, dt, w)
+        end_forces(p, state, t, dt, w)
+    phi_n, phi_p, steps = 0.0, 0.0, 0
+    for _ in range(PASSES):
+        calm_salt(s, state, t, faster[2], w_salt)
+        calm_particles(p, state, t, faster, dt, w)
+        phi_n, phi_p, steps = find_reaction(p, s, e, state, t, newton, spread, total, t_k)
+        end_salt(s, t, state.given, w_salt)
+        if s.strength > 0.0:
+            salt_forcing(s, t.c, t.forcing)
+        off = 0.0
+        for r in range(t.salt.shape[0]):
+            off = max(off, abs(state.salt[r] - t.salt[r]))
+            t.salt[r] = state.salt[r]
+        settled = off < SALT_TOLERANCE
+        if varies:
+            settled = end_forces(p, state, t, dt, w) < SURFACE_TOLERANCE and settled
+        if settled:
+            break
+    commit(p, s, e, state, t, dt, w, change, varies)
+    return phi_n, phi_p, steps
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def predict(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-untyped-def]
+    """Start values at the end of the step: each share of the current and its trend; salt and forcing as last moved."""
+    half, ahead = s.at.shape[0] // 2, dt / last_dt if last_dt > 0.0 else 0.0
+    for r in range(2 * half):
+        t.given_start[r] = state.given[r]
+        t.salt[r] = state.salt[r] + ahead * (state.salt[r] - t.salt_before[r])
+        t.salt_before[r] = state.salt[r]
+    for j in range(state.forcing.shape[0]):
+        t.forcing[j] = state.forcing[j] + ahead * (state.forcing[j] - t.forcing_before[j])
+        t.forcing_before[j] = state.forcing[j]
+    for u in range(p.place.shape[0]):
+        t.y_start[u] = state.y[u]
+        state.y[u] += p.share[u] * change[0 if p.place[u] < half else 1] + state.trend[u] * dt
+        t.give[u] = p.scale[u] * taken[p.kind[u]]
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def end_forces(p, state, t, dt, w):  # type: ignore[no-untyped-def]
+    """Variable part of diffusion at the end of the step, t.force; returns by how much it moves a surface."""
+    worst = 0.0
+    for u in range(p.place.shape[0]):
+        k = p.kind[u]
+        side = p.side[k]
+        if p.strength[side] > 0.0:
+            for j in range(p.gains.shape[0]):
+                t.z_end[j] = end_mode(p, t, u, j, state.y[u], w)
+                t.force_end[j + 1] = t.force[u, j + 1]
+            mean = end_mean(p, t, u, state.y[u], dt)
+            solid_forcing(mean, t.z_end, p.at, p.project, p.psi[side], t.nodes, t.force[u])
+            moved = 0.0
+            for j in range(p.gains.shape[0]):
+                change = t.force[u, j + 1] - t.force_end[j + 1]
+                moved += p.strength[side] * p.rates[k, j] * w[k, 2, j] * change
+            worst = max(worst, abs(moved))
+    return worst
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped-def]
+    """Take the end of the step as the state."""
+    half = s.at.shape[0] // 2
+    for u in range(p.place.shape[0]):
+        state.mean[u] = end_mean(p, t, u, state.y[u], dt)
+        for j in range(p.gains.shape[0]):
+            state.z[u, j] = end_mode(p, t, u, j, state.y[u], w)
+        moved = p.share[u] * change[0 if p.place[u] < half else 1]
+        state.trend[u] = (state.y[u] - t.y_start[u] - moved) / dt
+        if varies:
+            for j in range(p.gains.shape[0] + 1):
+                state.force[u, j] = t.force[u, j]
+    for j in range(state.q.shape[0]):
+        state.q[j] = t.q[j]
+        state.forcing[j] = t.forcing[j]
+    for i in range(state.c.shape[0]):
+        state.c[i] = t.c[i]
+    if e.has_layers:
+        for r in range(2 * half):
+            state.layer[r] = t.layer_c[r] * state.psi[r] - t.layer_old[r]

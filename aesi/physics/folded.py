@@ -1,0 +1,53 @@
+"""Effects that do no more than change numbers of the cell file, written into the cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.model import EspmModel
+
+
+@dataclass(frozen=True)
+class Folded:
+    """cell : with what it can hold.  held, left : the effects that are in it now, and those that are not."""
+
+    cell: Cell
+    held: tuple[ActiveEffect, ...]
+    left: tuple[ActiveEffect, ...]
+
+    def same_window(self, declared: Cell) -> bool:
+        """Whether a state of charge means the same: a loss of lithium or of active material moves full and empty."""
+        return all(
+            (new.theta_min, new.theta_max) == (old.theta_min, old.theta_max)
+            for new, old in ((self.cell.negative, declared.negative), (self.cell.positive, declared.positive))
+        )
+
+
+def folded(cell: Cell, effects: Iterable[ActiveEffect]) -> Folded:
+    """The cell with every effect in it that acts on nothing but the cell's own parameters.
+
+    An effect on the record, on the reading, on the voltage, or on what a cell file does not declare (layers, particle
+    sizes, a heat balance) is left.
+    """
+    held: list[ActiveEffect] = []
+    left: list[ActiveEffect] = []
+    for active in effects:
+        changed = _on_cell_alone(cell, active)
+        if changed is None:
+            left.append(active)
+        else:
+            cell = changed
+            held.append(active)
+    return Folded(cell, tuple(held), tuple(left))
+
+
+def _on_cell_alone(cell: Cell, active: ActiveEffect) -> Cell | None:
+    effect = active.effect
+    if effect.on_model is None or effect.on_record or effect.on_voltage or effect.on_reading:
+        return None
+    before = EspmModel(cell)
+    after = effect.on_model(before, **active.parameters)
+    return after.cell if replace(after, cell=cell) == before else None

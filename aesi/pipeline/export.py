@@ -1,0 +1,188 @@
+"""A cell and what was found about it, for other tools: a BPX file, or a script that PyBaMM runs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from aesi.errors import InputError
+from aesi.physics import Cell
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.folded import folded
+from aesi.physics.model import PLAIN, EspmModel
+from aesi.pipeline.product.declared import declared_model
+
+Target = Literal["bpx", "pybamm"]
+SUFFIX = {"bpx": ".json", "pybamm": ".py"}
+
+
+@dataclass(frozen=True)
+class Exported:
+    """files : what was written.  held, left : sentences on what is in them, and on what they cannot hold."""
+
+    files: tuple[Path, ...]
+    held: tuple[str, ...]
+    left: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Pybamm:
+    """What PyBaMM needs beside the BPX file."""
+
+    options: dict[str, Any] = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)
+
+
+def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
+    """Write a BPX file, or a Python script for PyBaMM with its BPX file beside it.
+
+    model : a BPX file, or a folder of a saved model, whose effects are written as far as the target holds them.
+    Raises InputError where `out` has the wrong suffix or cannot be written.
+    """
+    if out.suffix != SUFFIX[to]:
+        raise InputError(f"{out} has to end in {SUFFIX[to]} for --to {to}.")
+    declared = declared_model(model)
+    found = folded(declared.cell, declared.effects)
+    held = [f"{_said(effect)}: written into the cell." for effect in found.held]
+    left = (
+        []
+        if declared.correction is None
+        else ["the sparse correction and its bands: no part of a cell file."]
+    )
+    if not found.same_window(declared.cell):
+        held.append("State of charge 0 and 1 are now those of the changed electrodes.")
+    if to == "bpx":
+        left += [f"{_said(effect)}: BPX has no field for it." for effect in found.left]
+        if found.cell.contact_resistance_ohm:
+            left.append(
+                f"{found.cell.contact_resistance_ohm:.4g} ohm of contacts: in the section User-defined, which other "
+                "tools do not read; --to pybamm hands it over."
+            )
+        return Exported((_write(out, _bpx(found.cell)),), tuple(held), tuple(left))
+    more, unknown = _for_pybamm(found.cell, found.left)
+    held += [f"{_said(effect)}: as an option of the model." for effect in found.left if effect not in unknown]
+    left += [f"{_said(effect)}: PyBaMM's model from BPX has no counterpart." for effect in unknown]
+    beside = out.with_suffix(".bpx.json")
+    written = (_write(out, _script(beside.name, more)), _write(beside, _bpx(found.cell)))
+    return Exported(written, tuple(held), tuple(left))
+
+
+def _for_pybamm(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[_Pybamm, list[ActiveEffect]]:
+    """Options and values of PyBaMM for what BPX does not hold, and the effects that have none."""
+    options: dict[str, Any] = {}
+    values: dict[str, float] = {}
+    unknown = []
+    if cell.contact_resistance_ohm:
+        options["contact resistance"] = "true"
+        values["Contact resistance [Ohm]"] = cell.contact_resistance_ohm
+    for effect in effects:
+        known = _options_of(cell, effect)
+        if known is None:
+            unknown.append(effect)
+            continue
+        options |= known.options
+        values |= known.values
+    return _Pybamm(options, values), unknown
+
+
+def _options_of(cell: Cell, active: ActiveEffect) -> _Pybamm | None:
+    """PyBaMM's counterpart of what an effect does to the particles' surface; None where it has none.
+
+    The double layer is left out: the form of the surface potential that it needs there moves the voltage by 4 mV.
+    """
+    effect = active.effect
+    if effect.on_model is None or effect.on_record or effect.on_voltage or effect.on_reading:
+        return None
+    before = EspmModel(cell)
+    after = effect.on_model(before, **active.parameters)
+    if replace(after, negative=before.negative, positive=before.positive) != before:
+        return None
+    options: dict[str, Any] = {}
+    values: dict[str, float] = {}
+    for name, side in (("Negative", after.negative), ("Positive", after.positive)):
+        if replace(side, transfer_coefficient=PLAIN.transfer_coefficient) != PLAIN:
+            return None
+        if {after.negative.transfer_coefficient, after.positive.transfer_coefficient} != {0.5}:
+            options["intercalation kinetics"] = "asymmetric Butler-Volmer"
+            values[f"{name} electrode Butler-Volmer transfer coefficient"] = side.transfer_coefficient
+    return _Pybamm(options, values)
+
+
+def _bpx(cell: Cell) -> str:
+    return json.dumps(cell.to_bpx(), indent=1) + "\n"
+
+
+def _said(effect: ActiveEffect) -> str:
+    values = ", ".join(
+        f"{name} {value:.4g} {effect.effect.parameters[name].unit}" for name, value in effect.values
+    )
+    return f"{effect.id} ({values})" if values else effect.id
+
+
+def _write(path: Path, text: str) -> Path:
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
+    return path
+
+
+def _script(bpx: str, more: _Pybamm) -> str:
+    return SCRIPT.format(bpx=bpx, options=repr(more.options), values=repr(more.values))
+
+
+SCRIPT = '''"""The cell of {bpx} in PyBaMM, written by `aesi export --to pybamm`.
+
+    python FILE.py                     a 1C discharge, its voltage printed
+    from FILE import simulation        simulation(time_s, current_a, soc0).solve(t_eval=..., t_interp=...)
+
+Current is positive on discharge. Give PyBaMM the times at which the current bends as t_eval: it may step over a pulse.
+"""
+
+import json
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pybamm
+
+BPX = Path(__file__).parent / "{bpx}"
+OPTIONS = {options}
+VALUES = {values}
+"""What BPX has no field for."""
+
+
+def parameter_values(soc0: float = 1.0) -> pybamm.ParameterValues:
+    """The cell's parameters; state of charge 0 and 1 are the file's limits of stoichiometry."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # about open-circuit voltages that the file does not repeat
+        values = pybamm.ParameterValues.create_from_bpx(BPX)
+    values.update(VALUES, check_already_exists=False)
+    parts = json.loads(BPX.read_text(encoding="utf-8"))["Parameterisation"]
+    for name, full in (("negative", "Maximum stoichiometry"), ("positive", "Minimum stoichiometry")):
+        part = parts[name.capitalize() + " electrode"]
+        low, high = part["Minimum stoichiometry"], part["Maximum stoichiometry"]
+        share = soc0 if full == "Maximum stoichiometry" else 1.0 - soc0
+        concentration = (low + share * (high - low)) * part["Maximum concentration [mol.m-3]"]
+        values[f"Initial concentration in {{name}} electrode [mol.m-3]"] = concentration
+    return values
+
+
+def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lithium_ion.SPMe) -> pybamm.Simulation:
+    """PyBaMM's simulation under a current (A) that is a straight line between the times (s); 1C without."""
+    values = parameter_values(soc0)
+    if time_s is not None:
+        current = pybamm.Interpolant(np.asarray(time_s, float), np.asarray(current_a, float), pybamm.t)
+        values.update({{"Current function [A]": current}})
+    points = {{"x_n": 30, "x_s": 20, "x_p": 30, "r_n": 60, "r_p": 60}}  # the default 20 a particle miss by millivolts
+    return pybamm.Simulation(model(options=OPTIONS), parameter_values=values, var_pts=points)
+
+
+if __name__ == "__main__":
+    solution = simulation().solve([0, 3600])
+    time_s, voltage_v = solution["Time [s]"].entries, solution["Voltage [V]"].entries
+    print(f"{{voltage_v[0]:.4f}} V at the start, {{voltage_v[-1]:.4f}} V after {{time_s[-1]:.0f}} s")
+'''

@@ -1,0 +1,1 @@
+"""What all hypotheses of one case share: records, own parameters, effects, and one way to simulate."""

@@ -1,0 +1,69 @@
+"""Blocks of rows that can be left out, and the conditions that blocks are left out by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from aesi.numerics.typing import Array, IntArray
+from aesi.tracer.case.problem import InverseProblem
+
+BLOCKS = 24
+FEWEST = 4
+"""Blocks of all records together, and the fewest of one."""
+RANGES = 3
+"""Ranges of rate, and of charge."""
+
+
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """starts : (b + 1,) first rows of the blocks, and the number of rows.  record : (b,) that each block is of.
+
+    folds : partition -> list of sets of blocks that are left out in turn.
+    """
+
+    starts: IntArray
+    record: IntArray
+    folds: dict[str, tuple[tuple[int, ...], ...]]
+
+    def __len__(self) -> int:
+        return len(self.record)
+
+    @cached_property
+    def of_row(self) -> IntArray:
+        """(n,) block of each row."""
+        return np.repeat(np.arange(len(self)), np.diff(self.starts))
+
+
+def blocks_of(problem: InverseProblem) -> Blocks:
+    """Contiguous blocks by rows, shared among the records, and the folds: blocks, records, rates, charges."""
+    total = len(problem.measured)
+    starts: list[int] = []
+    record: list[int] = []
+    for i, rows in enumerate(problem.slices):
+        length = rows.stop - rows.start
+        pieces = max(FEWEST, round(BLOCKS * length / total))
+        edges = np.linspace(rows.start, rows.stop, pieces + 1).astype(int)[:-1]
+        starts += edges.tolist()
+        record += [i] * pieces
+    bounds = np.array([*starts, total])
+    rows_of = [slice(int(a), int(b)) for a, b in pairwise(bounds)]
+    current = np.concatenate([m.current_a for m in problem.seen])
+    rate = np.array([np.sqrt(np.mean(current[r] ** 2)) for r in rows_of])
+    charge = np.array([np.mean(problem.declared_soc[r]) for r in rows_of])
+    folds: dict[str, tuple[tuple[int, ...], ...]] = {"block": tuple((b,) for b in range(len(record)))}
+    if len(problem.records) > 1:
+        folds["record"] = tuple(
+            tuple(b for b, i in enumerate(record) if i == k) for k in range(len(problem.records))
+        )
+    for name, size in (("rate", rate), ("charge", charge)):
+        folds[name] = _ranges(size)
+    return Blocks(bounds, np.array(record), folds)
+
+
+def _ranges(size: Array) -> tuple[tuple[int, ...], ...]:
+    order = np.argsort(size, kind="stable")
+    return tuple(tuple(sorted(part.tolist())) for part in np.array_split(order, RANGES) if len(part))

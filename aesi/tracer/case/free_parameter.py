@@ -1,0 +1,147 @@
+"""A scalar that a fit may move, in the coordinate in which its prior is a standard normal.
+
+    x = (phi(value) - phi(centre)) / sd        phi the natural logarithm or the identity
+
+The declared parameters of a cell (its own ones) have the spread that is declared beside them; those of an effect under
+test have a prior as wide as the effect allows; the initial state of charge of a record has its standard deviation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.parameters import Parameter
+
+STATE_OF_CHARGE = "soc0"
+"""Owner of the parameters that shift a record's initial state of charge."""
+FURTHEST_SDS = 4.0
+"""An own parameter may not leave this many of its standard deviations."""
+BOUND_SHARE = 0.02
+"""Share of the range next to a bound that counts as the bound."""
+
+
+@dataclass(frozen=True)
+class FreeParameter:
+    """One scalar: who owns it, its bounds, and its normal prior.
+
+    owner : id of an effect, or STATE_OF_CHARGE with the number of a record as the name.
+    low, high, centre : in `unit`.  sd : of the natural logarithm where `log`, else in `unit`.
+    own : True for what the declared model has anyway, False for what an effect under test adds.
+    amplitude : False for parameters that only shape an effect (a rate, a time constant).
+    typical : where the effect is usually seen.  low_is_limit : the lower bound stands for nought.
+    """
+
+    owner: str
+    name: str
+    unit: str
+    low: float
+    high: float
+    log: bool
+    centre: float
+    sd: float
+    own: bool
+    amplitude: bool = True
+    typical: float = 0.0
+    low_is_limit: bool = False
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """(owner, name)."""
+        return self.owner, self.name
+
+    def coordinate(self, value: float) -> float:
+        """x of a value."""
+        if self.log:
+            return float(np.log(value / self.centre)) / self.sd
+        return (value - self.centre) / self.sd
+
+    def value(self, x: float) -> float:
+        """Inverse of `coordinate`, held within the bounds against round-off."""
+        value = self.centre * float(np.exp(x * self.sd)) if self.log else self.centre + x * self.sd
+        return min(max(value, self.low), self.high)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Of x."""
+        return self.coordinate(self.low), self.coordinate(self.high)
+
+    def on_bound(self, x: float) -> bool:
+        """True where the parameter of an effect ended on a bound of what is plausible: not at its neutral point, and
+        not where a bound is the end of what a shape can mean at all."""
+        if self.own or not (self.amplitude or self.log):
+            return False
+        low, high = self.bounds
+        near = BOUND_SHARE * (high - low)
+        below = x - low < near and abs(low) > near and not self.low_is_limit
+        return below or (high - x < near and abs(high) > near)
+
+
+def of_effect(effect: str, parameters: Mapping[str, Parameter]) -> list[FreeParameter]:
+    """The parameters of an effect under test: as wide as the effect allows."""
+    return [_of_effect(effect, name, p) for name, p in parameters.items()]
+
+
+def _of_effect(effect: str, name: str, p: Parameter) -> FreeParameter:
+    low, high = p.bounds
+    inside = p.neutral is not None and low <= p.neutral <= high
+    centre = float(p.neutral) if inside and p.neutral is not None else p.default
+    log = p.log and centre > 0
+    scale = np.log if log else float
+    reach = max(scale(high) - scale(centre), scale(centre) - scale(low))
+    return FreeParameter(
+        effect, name, p.unit, low, high, log, centre, p.expected or float(reach) / 2.0, False,
+        p.neutral is not None, p.default, p.low_is_limit,
+    )  # fmt: skip
+
+
+def own(effect: str, name: str, p: Parameter, sd: float) -> FreeParameter:
+    """A parameter of the declared model that may be off by `sd`."""
+    centre = p.default if p.neutral is None else p.neutral
+    log = p.log and centre > 0
+    reach = FURTHEST_SDS * sd
+    low, high = (centre * np.exp(-reach), centre * np.exp(reach)) if log else (centre - reach, centre + reach)
+    low, high = max(float(low), p.bounds[0]), min(float(high), p.bounds[1])
+    return FreeParameter(effect, name, p.unit, low, high, log, centre, sd, True)
+
+
+def state_of_charge(record: int, soc0: float, sd: float) -> FreeParameter:
+    """Initial state of charge of a record, known to `sd`."""
+    reach = FURTHEST_SDS * sd
+    return FreeParameter(STATE_OF_CHARGE, str(record), "1", soc0 - reach, soc0 + reach, False, soc0, sd, True)
+
+
+def values_of(free: Sequence[FreeParameter], x: Array) -> dict[str, dict[str, float]]:
+    """owner -> name -> value of the coordinates (n_free,)."""
+    out: dict[str, dict[str, float]] = {}
+    for one, coordinate in zip(free, x, strict=True):
+        out.setdefault(one.owner, {})[one.name] = one.value(float(coordinate))
+    return out
+
+
+def coordinates_of(
+    free: Sequence[FreeParameter], known: Mapping[tuple[str, str], float], elsewhere: float = 0.0
+) -> Array:
+    """(n_free,) coordinates of known values by (owner, name), `elsewhere` for the others."""
+    return np.array(
+        [one.coordinate(known[one.key]) if one.key in known else elsewhere for one in free], dtype=float
+    )
+
+
+def starts(free: Sequence[FreeParameter]) -> list[Array]:
+    """Coordinates to start the fit of an effect from: amplitudes a third of the way to their typical value; shapes at
+    their typical value and at the quarters of their range."""
+    bounds = np.array([one.bounds for one in free])
+    shapes = np.array([not one.amplitude for one in free], dtype=bool)
+    first = np.array(
+        [(1.0 / 3.0 if one.amplitude else 1.0) * one.coordinate(one.typical) for one in free], dtype=float
+    )
+    out = [first]
+    for share in (0.25, 0.75) if shapes.any() else ():
+        other = first.copy()
+        other[shapes] = (bounds[:, 0] + share * (bounds[:, 1] - bounds[:, 0]))[shapes]
+        out.append(other)
+    return out

@@ -1,0 +1,208 @@
+"""The inverse problem of one case: a declared cell, its records, and what hypotheses may move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from aesi.errors import AesiError
+from aesi.numerics.typing import Array
+from aesi.parameters import Parameter
+from aesi.physics import simulate
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect, Effect
+from aesi.records import Hold, Measurement, Run
+from aesi.tracer.case.free_parameter import (
+    STATE_OF_CHARGE,
+    FreeParameter,
+    of_effect,
+    own,
+    state_of_charge,
+)
+from aesi.tracer.case.records import PreparedRecord
+from aesi.tracer.stepping import stepping
+
+Trust = Literal["exact", "tight", "loose"]
+"""How far the declared parameters are believed: as fitted to this very cell by this very model, as a careful
+parametrisation of it, or as one of a cell of its make."""
+EXACT_SHARE = 0.1
+"""Of the tight spread of a declared parameter, where the file is believed exactly."""
+
+ValuesByOwner = Mapping[str, Mapping[str, float]]
+"""owner -> name -> value."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReductionError:
+    """What the declared porous electrode has beyond the reduced model, at a reference point: fitted as one column.
+
+    effect : takes the reduction back.  columns_v : one array a record, (n_fit,) V at full strength.
+    """
+
+    effect: Effect
+    columns_v: tuple[Array, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the effect's only parameter."""
+        return next(iter(self.effect.parameters))
+
+
+@dataclass(frozen=True, eq=False)
+class InverseProblem:
+    """One case.
+
+    effects : id -> Effect, all that may be tried or moved.  own : ids of the declared parameters that every hypothesis
+    may move within their spread, by trust.  fixed : effects in every simulation.  reduction : see ReductionError.
+    """
+
+    cell: Cell
+    records: tuple[PreparedRecord, ...]
+    effects: Mapping[str, Effect]
+    fixed: tuple[ActiveEffect, ...] = ()
+    trust: Trust = "tight"
+    reduction: ReductionError | None = None
+    known: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+    def competing(self) -> tuple[str, ...]:
+        """Ids of the effects that may be named: not those that only take back an approximation of the model."""
+        return tuple(name for name, effect in self.effects.items() if effect.refines is None)
+
+    def free(self, hypothesis: Sequence[str]) -> tuple[FreeParameter, ...]:
+        """What a hypothesis may move: states of charge, own parameters, then those of its effects."""
+        out = [state_of_charge(i, r.soc0, r.soc0_sd) for i, r in enumerate(self.records)]
+        for effect in self.effects.values():
+            if effect.id in hypothesis or effect.refines is not None:
+                continue
+            for name, p in effect.parameters.items():
+                sd = self._spread(effect, p)
+                if sd is not None:
+                    out.append(own(effect.id, name, p, sd))
+        if self.reduction is not None:
+            out.append(own(self.reduction.effect.id, self.reduction.name, self._strength, 1.0))
+        for effect_id in hypothesis:
+            out += of_effect(effect_id, self.effects[effect_id].parameters)
+        return tuple(out)
+
+    def _spread(self, effect: Effect, p: Parameter) -> float | None:
+        """Standard deviation of an own parameter at this trust, None where nothing is open."""
+        if p.spread is None:
+            return None
+        sd = p.spread.loose if self.trust == "loose" else p.spread.tight
+        if sd is None:
+            return None
+        if self.trust == "exact" and effect.kind == "parameter":
+            sd *= EXACT_SHARE
+        return sd / self.cell.nominal_capacity_ah if p.spread.ohmic else sd
+
+    @property
+    def _strength(self) -> Parameter:
+        assert self.reduction is not None
+        return self.reduction.effect.parameters[self.reduction.name]
+
+    def active(self, values: ValuesByOwner) -> tuple[ActiveEffect, ...]:
+        """The effects to simulate with.  One under test is in even at its neutral point: some say the same of a cell in
+        other words there (windows by voltages), and a fit must not see a step."""
+        owners = [owner for owner in values if owner != STATE_OF_CHARGE]
+        return (*self.fixed, *(self.effects[owner].activate(**values[owner]) for owner in owners))
+
+    def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
+        """(n,) V over the fit parts of all records, or of one; None where the model fails."""
+        strength = 0.0
+        if self.reduction is not None:
+            told = values.get(self.reduction.effect.id, {})
+            strength = told.get(self.reduction.name, 0.0)
+            values = {owner: v for owner, v in values.items() if owner != self.reduction.effect.id}
+        out = []
+        try:
+            effects = self.active(values)
+            for i in range(len(self.records)) if only is None else (only,):
+                voltage = self.run(
+                    self.seen[i], values[STATE_OF_CHARGE][str(i)], effects, self.records[i].thin_hold
+                ).voltage_v
+                if self.reduction is not None and strength:
+                    voltage = voltage + strength * self.reduction.columns_v[i]
+                out.append(voltage)
+        except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
+            return None
+        joined = np.concatenate(out)
+        return joined if np.isfinite(joined).all() else None
+
+    def run(
+        self,
+        data: Measurement,
+        soc0: float | None,
+        effects: tuple[ActiveEffect, ...],
+        hold: Hold,
+        rest_voltage_v: float | None = None,
+    ) -> Run:
+        """One simulation, at the measured temperature where there is one; stoichiometries that run out are clipped, so
+        that a search is not stopped by them."""
+        needed = [a for a in effects if a.effect.infers is None or data.temperature_degc is None]
+        return simulate(
+            self.cell,
+            data.time_s,
+            data.current_a,
+            soc0,
+            (*needed, *stepping(data)),
+            data.temperature_degc,
+            hold,
+            rest_voltage_v=rest_voltage_v,
+            on_depletion="clip",
+        )
+
+    def why_not(self, hypothesis: Sequence[str]) -> str:
+        """Why a hypothesis cannot be simulated at its typical values: one sentence."""
+        try:
+            effects = tuple(self.effects[name].activate() for name in hypothesis)
+            self.run(self.seen[0], self.records[0].soc0, effects, self.records[0].thin_hold)
+        except AesiError as error:
+            return str(error)
+        return "no start of the fit could be simulated."
+
+    @cached_property
+    def seen(self) -> tuple[Measurement, ...]:
+        """The fit part of each record, thinned."""
+        return tuple(r.thin.take(slice(0, r.n_fit)) for r in self.records)
+
+    @cached_property
+    def measured(self) -> Array:
+        """(n,) V: what fits see."""
+        return np.concatenate([m.voltage_v for m in self.seen])
+
+    @cached_property
+    def time_s(self) -> Array:
+        """(n,) s."""
+        return np.concatenate([m.time_s for m in self.seen])
+
+    @cached_property
+    def white_v(self) -> Array:
+        """(n,) V, standard deviation of the sensors' noise in each row."""
+        return np.concatenate([r.white_v[: r.n_fit] for r in self.records])
+
+    @cached_property
+    def slices(self) -> tuple[slice, ...]:
+        """Rows of each record."""
+        ends = np.cumsum([r.n_fit for r in self.records])
+        return tuple(slice(int(e - r.n_fit), int(e)) for e, r in zip(ends, self.records, strict=True))
+
+    @cached_property
+    def declared_soc(self) -> Array:
+        """(n,) state of charge by the declared cell's coulombs."""
+        out = []
+        for record, data in zip(self.records, self.seen, strict=True):
+            out.append(self.run(data, record.soc0, self.fixed, record.thin_hold).series["soc"])
+        return np.concatenate(out)
+
+    @cached_property
+    def steepness(self) -> Array:
+        """(n,) 1: slope of the declared open-circuit voltage over state of charge, over one volt."""
+        z = self.declared_soc
+        step = 5e-3
+        low, high = np.clip(z - step, -0.01, 1.01), np.clip(z + step, -0.01, 1.01)
+        rise = self.cell.rest_voltage_v(high) - self.cell.rest_voltage_v(low)
+        return np.asarray(np.abs(rise) / np.maximum(high - low, 1e-6))

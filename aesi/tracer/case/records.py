@@ -1,0 +1,311 @@
+"""Measured records made ready for fits: noise, initial state of charge, the part that may be looked at.
+
+Fits run on a thinned copy: averages over symmetric windows, of current and voltage alike, so that charge and the
+linear part of the response are kept; of tests at steady currents with pulses and rests, and of records with uneven
+times, rows that are dense after each step. Reported errors are always those of the record as measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.numerics.typing import Array, BoolArray
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.initial_state import Basis, initial_state
+from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
+
+THIN_STEP_S = 1.0
+"""Fits see at most one sample a second: nothing in the catalogue is faster than a sample and slower than
+noise."""
+FIT_SAMPLES = 12_000
+STEADY_SAMPLES = 600
+STEADY_C_RATE = 0.01
+STEADY_SHARE = 0.01
+UNEVEN_SHARE = 0.01
+"""Of the samples: averages over equal numbers of rows need equal times between them."""
+FIRST_STEP_S = 0.5
+STEP_GROWTH = 0.25
+"""Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
+CONTINUATION_STEPS = 3.0
+"""A file that starts within this many samples of another's end, on the same clock, continues it."""
+SMALLEST_NOISE_V = 5e-5
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedRecord:
+    """One measurement as the tracer uses it.
+
+    data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
+    fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of charge
+    and what it is uncertain by.  seen_rows : rows at the start that only lead to what is judged.
+    hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
+    the white noise in each row of `thin`.  noise_full_v : of that in `data`.
+    """
+
+    data: Measurement
+    thin: Measurement
+    n_fit: int
+    fit_until_s: float
+    soc0: float
+    soc0_sd: float
+    hold: Hold
+    thin_hold: Hold
+    white_v: Array
+    noise_full_v: float
+    rest_voltage_v: float | None = None
+    basis: Basis = "rest"
+    seen_rows: int = 0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The measurement's name."""
+        return self.data.name
+
+    @property
+    def soc0_given(self) -> bool:
+        """True where the user said at which state of charge the record starts."""
+        return self.basis == "given"
+
+    @property
+    def noise_v(self) -> float:
+        """Root mean square of the white noise of the rows that fits see, V."""
+        return float(np.sqrt(np.mean(self.white_v[: self.n_fit] ** 2)))
+
+    @property
+    def seen_rows_thin(self) -> int:
+        """Rows of `thin` that only serve to get to the part that is judged."""
+        if not self.seen_rows:
+            return 0
+        return int(np.searchsorted(self.thin.time_s, self.data.time_s[self.seen_rows]))
+
+    @property
+    def fit_rows_full(self) -> int:
+        """Rows of `data` that belong to the fit part."""
+        return int(np.searchsorted(self.data.time_s, self.fit_until_s))
+
+
+def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
+    """Deviation of the white noise, from second differences where the current is steady.
+
+    voltage_v, current_a : (n,).  The scale is robust to the steps that remain; half the smallest voltage
+    step is
+    the least it can be.
+    """
+    if len(voltage_v) < 8:
+        return SMALLEST_NOISE_V
+    second = voltage_v[2:] - 2.0 * voltage_v[1:-1] + voltage_v[:-2]
+    change = np.abs(np.diff(current_a))
+    change = np.maximum(change[1:], change[:-1])
+    calm = change <= np.quantile(change, 0.3)
+    kept = second[calm]
+    limit = 3.5 * max(np.median(np.abs(kept)) / 0.6745, 1e-9)
+    kept = kept[np.abs(kept) <= limit] if np.count_nonzero(np.abs(kept) <= limit) > 5 else kept
+    steps = np.diff(np.unique(np.round(voltage_v, 6)))
+    quantum = float(steps.min()) if len(steps) else 0.0
+    return max(float(np.sqrt(np.mean(kept**2) / 6.0)), quantum / np.sqrt(12.0), SMALLEST_NOISE_V)
+
+
+def prepare(
+    cell: Cell,
+    data: Measurement,
+    soc0: float | None,
+    holdout: float,
+    step_s: float = THIN_STEP_S,
+    *,
+    given: Sequence[ActiveEffect] = (),
+    shared: bool = False,
+) -> PreparedRecord:
+    """A record with its noise, its initial state of charge and its fit part.
+
+    holdout : share of the time, at the end, that fits may not see (0 for none).  given : effects that the declared
+    model has.  shared : True where `soc0` was given for several records.
+    Raises DataError where the record is too short or its initial state cannot be known.
+    """
+    gaps = np.diff(data.time_s)
+    hold: Hold = data.hold or assumed_hold(data.time_s)
+    duration = float(data.time_s[-1] - data.time_s[0])
+    steps = _current_steps(cell, data)
+    typical = float(np.median(gaps))
+    uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
+    if uneven or float(np.mean(steps)) < STEADY_SHARE:
+        thin, rows = condensed(data, steps, duration / STEADY_SAMPLES)
+    else:
+        thin, rows = thinned(data, step_s), None
+    thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
+    until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
+    n_fit = int(np.searchsorted(thin.time_s, until))
+    start = initial_state(cell, data, soc0, hold, given, shared=shared)
+    notes = () if start.basis == "given" and not start.contradicted else (start.sentence,)
+    notes = (*notes, hold_sentence(data.name, hold, data.hold is not None), *_temperature_noted(data))
+    noise_full = noise_floor_v(data.voltage_v, data.current_a)
+    if rows is None:
+        noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
+        white = np.full(len(thin), noise)
+    else:  # what lies between rows that far apart is no noise
+        white = np.maximum(noise_full / np.sqrt(rows), SMALLEST_NOISE_V)
+    return PreparedRecord(
+        data,
+        thin,
+        n_fit,
+        until,
+        start.soc,
+        start.sd,
+        hold,
+        thin_hold,
+        white,
+        noise_full,
+        start.rest_voltage_v,
+        start.basis,
+        notes=notes,
+    )
+
+
+def _temperature_noted(data: Measurement) -> tuple[str, ...]:
+    if data.temperature_degc is None:
+        return ()
+    low, high = float(np.min(data.temperature_degc)), float(np.max(data.temperature_degc))
+    return (
+        f"{data.name}: simulated at its measured temperature, {low:.1f} to {high:.1f} degC; effects that would infer "
+        "it (self_heating, ambient_temperature) do not compete for this record.",
+    )
+
+
+def _current_steps(cell: Cell, data: Measurement) -> BoolArray:
+    """(n - 1,) True where the current of a row is another than that of the row before."""
+    return np.abs(np.diff(data.current_a)) > STEADY_C_RATE * cell.nominal_capacity_ah
+
+
+def prepare_test(
+    cell: Cell,
+    data: Measurement,
+    seen: Sequence[Measurement],
+    soc0: float | None,
+    given: Sequence[ActiveEffect] = (),
+) -> PreparedRecord:
+    """A record that chooses nothing.
+
+    Where it is the continuation of a record that fits have seen, or has such a record as its beginning, the model
+    runs through that and only what comes after is judged.
+    """
+    for known in seen:
+        n = len(known)
+        same = len(data) > n and np.array_equal(data.time_s[:n], known.time_s)
+        if same and np.array_equal(data.voltage_v[:n], known.voltage_v):
+            return replace(prepare(cell, data, soc0, 0.0, given=given, shared=True), seen_rows=n)
+        gap = float(data.time_s[0] - known.time_s[-1])
+        if 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s))):
+            return replace(
+                prepare(cell, _joined(known, data), soc0, 0.0, given=given, shared=True), seen_rows=n
+            )
+    return prepare(cell, data, soc0, 0.0, given=given, shared=True)
+
+
+def _joined(first: Measurement, second: Measurement) -> Measurement:
+    temperatures = (first.temperature_degc, second.temperature_degc)
+    both = None not in temperatures
+    return replace(
+        second,
+        time_s=np.concatenate([first.time_s, second.time_s]),
+        current_a=np.concatenate([first.current_a, second.current_a]),
+        voltage_v=np.concatenate([first.voltage_v, second.voltage_v]),
+        temperature_degc=np.concatenate([t for t in temperatures if t is not None]) if both else None,
+    )
+
+
+def prepare_all(
+    cell: Cell,
+    measurements: Sequence[Measurement],
+    soc0: float | None,
+    holdout: float,
+    given: Sequence[ActiveEffect] = (),
+) -> tuple[PreparedRecord, ...]:
+    """`prepare` over several measurements, thinned until their sum is within what fits can afford."""
+    step = THIN_STEP_S
+    while True:
+        records = tuple(
+            prepare(cell, m, soc0, holdout, step, given=given, shared=len(measurements) > 1)
+            for m in measurements
+        )
+        if sum(len(r.thin) for r in records) <= FIT_SAMPLES or step > 30.0:
+            return records
+        step *= 2.0
+
+
+def thinned(data: Measurement, step_s: float) -> Measurement:
+    """At most one sample in `step_s`: centred averages of current, voltage and temperature.
+
+    Records sampled more slowly than 0.75 of `step_s` on average are returned as they are.
+    """
+    t = data.time_s
+    typical = float(np.median(np.diff(t)))
+    factor = round(step_s / typical)
+    if factor < 2:
+        return data
+    half = factor // 2
+    centres = np.arange(half, len(t) - half, factor)
+    width = 2 * half + 1
+    weights = np.ones(width)
+    weights[[0, -1]] = 0.5 if factor % 2 == 0 else 1.0
+    weights /= weights.sum()
+
+    def averaged(column: Array) -> Array:
+        return np.convolve(column, weights, mode="valid")[centres - half]
+
+    temperature = None if data.temperature_degc is None else averaged(data.temperature_degc)
+    first = data.take(slice(0, 1))
+    return replace(
+        data,
+        time_s=np.concatenate([first.time_s, t[centres]]),
+        current_a=np.concatenate([first.current_a, averaged(data.current_a)]),
+        voltage_v=np.concatenate([first.voltage_v, averaged(data.voltage_v)]),
+        temperature_degc=None
+        if temperature is None or first.temperature_degc is None
+        else np.concatenate([first.temperature_degc, temperature]),
+    )
+
+
+def condensed(data: Measurement, steps: BoolArray, longest_s: float) -> tuple[Measurement, Array]:
+    """A record of steady currents and rests with few rows where little happens, and how many each stands for.
+
+    steps : (n - 1,) True where the current changes.  longest_s : the most that a row may stand for.
+    Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
+    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for; the current is what
+    moves the charge of the record, as its logger held it ("backward").
+    """
+    t = data.time_s
+    n = len(t)
+    first = np.concatenate([[True], steps])
+    began = np.maximum.accumulate(np.where(first, np.arange(n), 0))
+    since = t - t[np.maximum(began - 1, 0)]
+    even = max(longest_s / STEP_GROWTH - FIRST_STEP_S, 0.0)
+    place = np.log1p(np.minimum(since, even) / FIRST_STEP_S) / STEP_GROWTH
+    place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
+    opens = first | np.concatenate([[True], np.diff(place) != 0.0])
+    opens[[1, -1]] = True
+    # The first row of a current by itself, and the last: between them the steps are exact.
+    opens[1:] |= first[:-1]
+    opens[:-1] |= first[1:]
+    starts = np.flatnonzero(opens)
+    rows = np.diff(np.append(starts, n)).astype(float)
+    if len(starts) == n:
+        return data, rows
+
+    def averaged(column: Array) -> Array:
+        return np.add.reduceat(column, starts) / rows
+
+    time = averaged(t)
+    charge = np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(t))])
+    current = np.diff(np.interp(time, t, charge)) / np.diff(time)
+    thin = replace(
+        data,
+        time_s=time,
+        current_a=np.concatenate([data.current_a[:1], current]),
+        voltage_v=averaged(data.voltage_v),
+        temperature_degc=None if data.temperature_degc is None else averaged(data.temperature_degc),
+    )
+    return thin, rows

@@ -1,0 +1,1 @@
+"""From scores to a verdict: forward search, admission, look-alikes, adequacy, carry-over."""

@@ -1,0 +1,91 @@
+"""Where fits ended, kept in a file, so that an interrupted search goes on where it was.
+
+The file is keyed on all that a fit depends on: cell, data, own parameters and what each effect *is* (its code, its
+parameters, its bounds), so that an edited effect is fitted again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import threading
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.physics.effect import Effect
+from aesi.tracer.case.problem import InverseProblem
+
+
+class Archive:
+    """Coordinates by name of a fit, appended one JSON line each; lines of another case are passed over."""
+
+    def __init__(self, path: Path | None, context: str) -> None:
+        self.path, self.context = path, context
+        self._lock = threading.Lock()
+        self._kept: dict[str, Array] = {}
+        if path is not None and path.exists():
+            for line in path.read_text(encoding="utf-8").splitlines():
+                try:
+                    entry = json.loads(line)
+                    if entry["context"] == context:
+                        self._kept[entry["fit"]] = np.array(entry["x"], dtype=float)
+                except (ValueError, KeyError, TypeError):
+                    continue  # cut off while it was written
+
+    def get(self, name: str, size: int) -> Array | None:
+        """(size,) coordinates where that fit ended, or None."""
+        kept = self._kept.get(name)
+        return kept if kept is not None and kept.shape == (size,) else None
+
+    def put(self, name: str, x: Array) -> None:
+        """Keep where a fit ended, unless it is there."""
+        with self._lock:
+            if name in self._kept:
+                return
+            self._kept[name] = x
+            if self.path is not None:
+                self.path.parent.mkdir(parents=True, exist_ok=True)
+                with self.path.open("a", encoding="utf-8") as file:
+                    entry = {"context": self.context, "fit": name, "x": [float(v) for v in x]}
+                    file.write(json.dumps(entry) + "\n")
+
+
+def fit_name(problem: InverseProblem, kind: str, hypothesis: Sequence[str]) -> str:
+    """Of a fit in the archive: its kind, what is believed of the own parameters, and its effects in order."""
+    reduced = "" if problem.reduction is None else " reduction"
+    return f"{kind} {problem.trust}{reduced}: {'+'.join(hypothesis)}"
+
+
+def context_of(problem: InverseProblem) -> str:
+    """Changes whenever a stored fit would no longer be the same fit."""
+    text = [repr(problem.cell), *(identity(e) for e in problem.effects.values())]
+    text += [f"fixed {active.values} {identity(active.effect)}" for active in problem.fixed]
+    text += [f"{r.data.digest} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}" for r in problem.records]
+    return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]
+
+
+def identity(effect: Effect) -> str:
+    """What an effect is: id, parameters with bounds and spreads, and the code of the file that defines it."""
+    places = (effect.on_model, effect.on_record, effect.on_voltage, effect.on_reading)
+    return f"{effect.id} {_parameters(effect.parameters)} {[_code(place) for place in places]}"
+
+
+def _parameters(parameters: Mapping[str, object]) -> str:
+    return repr(sorted((name, repr(p)) for name, p in parameters.items()))
+
+
+def _code(function: object) -> str:
+    if function is None:
+        return ""
+    while hasattr(function, "func"):  # functools.partial
+        function = function.func
+    try:
+        module = inspect.getmodule(function)
+        file = inspect.getsourcefile(function) if module is None else module.__file__  # type: ignore[arg-type]
+        return Path(file).read_text(encoding="utf-8") if file else repr(function)
+    except (OSError, TypeError):
+        return getattr(getattr(function, "__code__", None), "co_code", b"").hex()

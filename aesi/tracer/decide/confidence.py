@@ -1,0 +1,58 @@
+"""How often a verdict of this kind, with this margin, is right: measured on blind cases, read from a file.
+
+    p = 1 / (1 + exp(-(a + b m)))        m the margin of the verdict, a and b by kind of verdict
+
+`confidence.json` holds a and b with the number of cases behind them and the command that fits them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+
+FILE = "confidence.json"
+HIGHEST = 0.99
+"""What some hundred cases can vouch for."""
+
+
+@dataclass(frozen=True)
+class FrequencyMap:
+    """Intercept and slope of one kind of verdict; cases : behind them."""
+
+    intercept: float
+    slope: float
+    cases: int
+
+    def frequency(self, margin: float) -> float:
+        """How often a verdict with this margin is right."""
+        return min(float(1.0 / (1.0 + np.exp(-(self.intercept + self.slope * margin)))), HIGHEST)
+
+
+@lru_cache(maxsize=1)
+def frequency_maps() -> Mapping[str, FrequencyMap]:
+    """Kind of verdict -> map."""
+    content = json.loads(files("aesi.tracer.decide").joinpath(FILE).read_text(encoding="utf-8"))
+    return {word: FrequencyMap(**values) for word, values in content["maps"].items()}
+
+
+def fitted_map(margins: Sequence[float], right: Sequence[bool]) -> FrequencyMap:
+    """By maximum likelihood with a weak prior (one case right and one wrong in the middle), slope not below nought."""
+    m, y = np.array(margins, dtype=float), np.array(right, dtype=float)
+    middle = float(np.median(m)) if len(m) else 0.0
+    m, y = np.append(m, [middle, middle]), np.append(y, [1.0, 0.0])
+    design = np.column_stack([np.ones(len(m)), m])
+    weights: Array = np.zeros(2)
+    for _ in range(50):
+        p = 1.0 / (1.0 + np.exp(-np.clip(design @ weights, -30, 30)))
+        gradient = design.T @ (y - p) - np.array([0.0, 0.1]) * weights
+        hessian = (design * (p * (1 - p))[:, None]).T @ design + np.diag([1e-6, 0.1])
+        weights = weights + np.linalg.solve(hessian, gradient)
+        weights[1] = max(weights[1], 0.0)
+    return FrequencyMap(float(weights[0]), float(weights[1]), len(margins))

@@ -1,0 +1,184 @@
+"""All that a verdict rests on: the searches at each trust in the declared parameters, and what carries over."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from aesi.errors import DataError
+from aesi.tracer.case.problem import InverseProblem, Trust
+from aesi.tracer.decide.archive import Archive
+from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
+from aesi.tracer.decide.confidence import frequency_maps
+from aesi.tracer.decide.search import Path, Report, base_of, refitted, searched
+from aesi.tracer.decide.verdict import Thresholds, Verdict, judged, noise_v, structured_v, tolerance_v
+from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.growth import Explanation
+from aesi.tracer.states import ModelState
+
+AS_MUCH_NATS = 0.5
+"""Two hypotheses within this of each other say as much of unseen data."""
+
+
+@dataclass(frozen=True, eq=False)
+class Option:
+    """A model that `after` may be: where it is from, and what it leaves on parts that were left out."""
+
+    state: ModelState
+    left_out: LeftOut
+    explanation: Explanation | None
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """path : the search that the verdict is about.  paths : all of them, by trust.  recalibrated : the declared model
+    with all of its own parameters open.  after : the model that is written.  fault : why the chosen hypothesis was not
+    adopted, where it was not."""
+
+    path: Path
+    paths: dict[Trust, Path]
+    recalibrated: ModelState
+    after: ModelState
+    verdict: Verdict
+    fault: str | None = None
+    simulations: int = 0
+
+
+def gathered(
+    problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
+) -> Evidence:
+    """Search, judge, and check what carries over."""
+    paths: dict[Trust, Path] = {}
+
+    def path_of(trust: Trust) -> Path:
+        if trust not in paths:
+            found = searched(
+                replace(problem, trust=trust), max_effects, _enough(problem, thresholds), archive, report
+            )
+            if found is None:
+                raise DataError(
+                    f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the "
+                    "cell file."
+                )
+            paths[trust] = found
+        return paths[trust]
+
+    path = path_of("tight")
+    verdict = judged(path, thresholds)
+    if verdict.word == "found":
+        path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
+    elif verdict.word == "none":
+        exact = path_of("exact")
+        path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
+    verdict = _with_confidence(verdict)
+    recalibrated = _recalibrated(problem, archive)
+    if verdict.word != "unknown":
+        return _adopted(path, paths, verdict, recalibrated)
+    loose = path_of("loose") if len(problem.records) > 1 else None
+    return _best_carried(path, loose, paths, verdict, recalibrated)
+
+
+def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[..., bool]:
+    def enough(path_blocks: object, fit: FittedHypothesis) -> bool:
+        from aesi.tracer.decide.search import unseen_rmse_v
+
+        white = float((problem.white_v**2).mean())
+        left = max(unseen_rmse_v(path_blocks, fit) ** 2 - white, 0.0)  # type: ignore[arg-type]
+        return bool(left**0.5 <= tolerance_v(white**0.5, thresholds))
+
+    return enough
+
+
+def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tuple[Path, Verdict]:
+    """Which of two searches is to be believed: one that explains the data before one that does not, then the one that
+    says more; a named effect with all else as declared, where that says as much as own parameters that all moved."""
+    if (first.word == "unknown") != (second.word == "unknown"):
+        return (tight, second) if first.word == "unknown" else (exact, first)
+    ahead = exact.chosen.score.total - tight.chosen.score.total
+    return (exact, first) if ahead > -AS_MUCH_NATS else (tight, second)
+
+
+def _sharpened(
+    problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
+) -> tuple[Path, Verdict]:
+    """The same finding with the own parameters believed exactly, where that says more of unseen data."""
+    exact = replace(problem, trust="exact")
+    found = refitted(exact, path, archive)
+    if found is None or found.chosen.score.total < path.chosen.score.total:
+        return path, verdict
+    left, allowed = structured_v(found, found.chosen), tolerance_v(noise_v(found), thresholds)
+    return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
+
+
+def _with_confidence(verdict: Verdict) -> Verdict:
+    return replace(verdict, confidence=frequency_maps()[verdict.word].frequency(verdict.margin))
+
+
+def _recalibrated(
+    problem: InverseProblem, archive: Archive
+) -> tuple[InverseProblem, FittedHypothesis] | None:
+    based = base_of(replace(problem, trust="loose"), archive)
+    return None if based is None else (based[0], based[2])
+
+
+def _adopted(
+    path: Path,
+    paths: dict[Trust, Path],
+    verdict: Verdict,
+    recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
+) -> Evidence:
+    """What was found, or the bare model; not where it cannot be simulated over the declared range."""
+    chosen = ModelState.of(path.problem, path.chosen)
+    other = ModelState(path.problem) if recalibrated is None else ModelState.of(*recalibrated)
+    fault = range_fault(chosen)
+    after = chosen if fault is None else ModelState(path.problem)
+    return Evidence(path, paths, other, after, verdict, fault)
+
+
+def _best_carried(
+    path: Path,
+    loose: Path | None,
+    paths: dict[Trust, Path],
+    verdict: Verdict,
+    recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
+) -> Evidence:
+    """Nothing explains the data: the model that leaves least on parts left out, and that can be simulated over the
+    declared range, no worse on any of them than the declared and the recalibrated one."""
+    declared = Option(ModelState(path.problem), left_out_errors(path.problem, None), None)
+    basic = [declared]
+    other = declared.state
+    if recalibrated is not None:
+        problem, fit = recalibrated
+        other = ModelState.of(problem, fit)
+        basic.append(Option(other, left_out_errors(problem, fit), fit))
+    tried: list[tuple[InverseProblem, FittedHypothesis]] = [
+        (path.problem, path.base),
+        (path.problem, path.chosen),
+    ]
+    if loose is not None:
+        tried.append((loose.problem, loose.chosen))
+    more = [
+        Option(ModelState.of(problem, fit), left_out_errors(problem, fit), fit)
+        for problem, fit in dict.fromkeys(tried)
+        if recalibrated is None or fit is not recalibrated[1]
+    ]
+    fit_options = [o for o in more if o.left_out.no_worse_than([b.left_out for b in basic])]
+    ranked = sorted([*basic, *fit_options], key=lambda o: o.left_out.pooled_v)
+    fault = None
+    for option in ranked:
+        fault = range_fault(option.state) if option.explanation is not None else None
+        if fault is None:
+            return Evidence(path, paths, other, option.state, verdict, _why(path, option, more, fit_options))
+    return Evidence(path, paths, other, declared.state, verdict, fault)
+
+
+def _why(path: Path, taken: Option, more: list[Option], fitting: list[Option]) -> str | None:
+    chosen = next((o for o in more if o.explanation is path.chosen), None)
+    if chosen is None or chosen is taken or not path.chosen.hypothesis:
+        return None
+    names = " + ".join(path.chosen.hypothesis)
+    if chosen not in fitting:
+        return (
+            f"{names} does worse than the declared or the recalibrated model on a part of the data left out"
+        )
+    return f"another model leaves less than {names} on parts of the data left out"

@@ -1,0 +1,148 @@
+"""Found, none or unknown: a pure function of what the searches left.
+
+Thresholds are in one place, `Thresholds`, each with the command that measured it, and are passed in by the caller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from aesi.tracer.decide.search import Path, unseen_rmse_v
+from aesi.tracer.likelihood.growth import Explanation
+
+Word = Literal["found", "none", "unknown"]
+GROUP_SIZE = 3
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """What decides a verdict.
+
+    noise_share, solver_v : what a right hypothesis may leave on unseen data beyond the noise: this share of the noise
+    (which is itself estimated) and this much (V), added as squares.
+    alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
+    fewer nats, are not told apart.
+    """
+
+    noise_share: float = 0.45
+    solver_v: float = 4e-4
+    alike_sds: float = 1.64
+    alike_nats: float = 3.0
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What may be said.
+
+    effects : ids in the order in which they were added.  groups : look-alikes, each group begins with a member of
+    `effects`.  structured_v, tolerance_v : what is left on unseen data beyond noise, and how much may be.
+    margin : standard score behind the confidence, see `decide.confidence`.
+    """
+
+    word: Word
+    effects: tuple[str, ...]
+    groups: tuple[tuple[str, ...], ...]
+    confidence: float
+    structured_v: float
+    tolerance_v: float
+    reason: str
+    margin: float = 0.0
+
+
+def beyond(rmse_v: float, noise_v: float) -> float:
+    """Root mean square of what is left beyond white noise, V."""
+    return float(np.sqrt(max(rmse_v**2 - noise_v**2, 0.0)))
+
+
+def noise_v(path: Path) -> float:
+    """Root mean square of the white noise of the fitted rows, V."""
+    return float(np.sqrt(np.mean(path.problem.white_v**2)))
+
+
+def structured_v(path: Path, one: Explanation) -> float:
+    """What a hypothesis leaves beyond noise on blocks that it has not seen, V."""
+    return beyond(unseen_rmse_v(path.blocks, one), noise_v(path))
+
+
+def tolerance_v(noise: float, thresholds: Thresholds) -> float:
+    """What a right hypothesis may leave on unseen data beyond the noise, V."""
+    return float(np.hypot(thresholds.noise_share * noise, thresholds.solver_v))
+
+
+def judged(path: Path, thresholds: Thresholds) -> Verdict:
+    """The verdict on a search with the declared parameters believed as of a careful parametrisation; its confidence is
+    still to be read off the margin."""
+    allowed = tolerance_v(noise_v(path), thresholds)
+    left = structured_v(path, path.chosen)
+    before = structured_v(path, path.base)
+    if left > allowed:
+        margin = float(np.log(left / allowed))
+        reason = (
+            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, whichever effects of "
+            f"the catalogue are added ({1e3 * allowed:.2f} mV would be within what a right model leaves)"
+        )
+        return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
+    if not path.chosen.hypothesis:
+        reason = (
+            f"{1e3 * left:.2f} mV beyond the noise on data that the fit has not seen, {1e3 * allowed:.2f} mV are "
+            "within what a right model leaves"
+        )
+        return Verdict("none", (), (), 0.0, left, allowed, reason, -_best_gain(path))
+    groups, margin = look_alikes(path, thresholds)
+    reason = f"{1e3 * before:.2f} mV beyond the noise on unseen data before, {1e3 * left:.2f} mV after"
+    return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
+
+
+def _best_gain(path: Path) -> float:
+    return max((step.best_gain for step in path.steps), default=0.0)
+
+
+def lag(better: Explanation, other: Explanation) -> tuple[float, float]:
+    """Nats by which `other` says less of unseen data, and the standard deviation of that over blocks."""
+    difference = better.score.log_density["block"] - other.score.log_density["block"]
+    deviation = float(np.std(difference, ddof=1) * np.sqrt(len(difference))) if len(difference) > 1 else 0.0
+    return better.score.total - other.score.total, deviation
+
+
+def look_alikes(path: Path, thresholds: Thresholds) -> tuple[tuple[tuple[str, ...], ...], float]:
+    """Groups of effects that these data do not tell apart (a model confidence set, Hansen, Lunde & Nason, Econometrica
+    79 (2011) 453, over paired block differences), and how many standard deviations the closest other one lags."""
+    chosen = path.chosen
+    allowed = tolerance_v(noise_v(path), thresholds)
+    groups, margin = [], np.inf
+    for name in chosen.hypothesis:
+        rest = set(chosen.hypothesis) - {name}
+        alike = []
+        for other in path.explanations():
+            added = set(other.hypothesis) - rest
+            if len(other.hypothesis) != len(chosen.hypothesis) or len(added) != 1 or name in other.hypothesis:
+                continue
+            nats, deviation = lag(chosen, other)
+            close = nats < max(thresholds.alike_nats, thresholds.alike_sds * deviation)
+            if close and structured_v(path, other) <= 1.2 * allowed:
+                alike.append((nats, next(iter(added))))
+            else:
+                margin = min(margin, nats / max(deviation, thresholds.alike_nats))
+        alike.sort()
+        if alike:
+            groups.append((name, *(other for _, other in alike[: GROUP_SIZE - 1])))
+    return tuple(groups), float(min(margin, 50.0))
+
+
+def all_needed(path: Path, fit: Explanation, least_nats: float) -> bool:
+    """Does every effect say more than the hypothesis without it, as far as that was tried?"""
+    tried: dict[frozenset[str], Explanation] = {frozenset(e.hypothesis): e for e in path.explanations()}
+    for name in fit.hypothesis:
+        without = tried.get(frozenset(set(fit.hypothesis) - {name}))
+        if without is not None and fit.score.total - without.score.total < least_nats:
+            return False
+    return True
+
+
+def ranked(explanations: Sequence[Explanation]) -> list[Explanation]:
+    """Best first."""
+    return sorted(explanations, key=lambda e: -e.score.total)

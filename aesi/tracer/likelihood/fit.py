@@ -1,0 +1,180 @@
+"""Maximum a posteriori fits: Gauss-Newton with the whole model, or in the parameters of one effect alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from aesi.numerics.bounded import descend
+from aesi.numerics.typing import Array
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
+from aesi.tracer.likelihood.gaussian import (
+    Linearised,
+    PredictiveScore,
+    best_over_sizes,
+    block_sums,
+    score_at,
+    whitened,
+)
+from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
+
+OWN_STEP = 0.1
+EFFECT_STEP = 4e-3
+"""Of finite differences, in standard deviations of the prior."""
+GAIN_NATS = 0.05
+"""A descent stops when a step gains less than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedHypothesis:
+    """A hypothesis where the data put it.
+
+    free : what moves.  point : the linear form there.  score : on unseen data.  simulations : spent.
+    """
+
+    hypothesis: tuple[str, ...]
+    free: tuple[FreeParameter, ...]
+    point: Linearised
+    score: PredictiveScore
+    simulations: int = 0
+    reference: ValuesByOwner = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict[str, dict[str, float]]:
+        """owner -> name -> value."""
+        return values_of(self.free, self.point.x)
+
+    @property
+    def placed(self) -> dict[tuple[str, str], float]:
+        """(owner, name) -> value."""
+        return {f.key: f.value(float(x)) for f, x in zip(self.free, self.point.x, strict=True)}
+
+    @property
+    def rmse_v(self) -> float:
+        """Root mean square of the residual on what was seen, V."""
+        return float(np.sqrt(np.mean(self.point.residual_v**2)))
+
+    @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Parameters of effects that ended on a bound, as effect.parameter."""
+        return tuple(
+            f"{f.owner}.{f.name}"
+            for f, x in zip(self.free, self.point.x, strict=True)
+            if f.on_bound(float(x))
+        )
+
+
+class HypothesisFitter:
+    """Simulations, slopes and descents of one hypothesis."""
+
+    def __init__(self, problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> None:
+        self.problem, self.blocks, self.hypothesis = problem, blocks, tuple(hypothesis)
+        self.free = problem.free(self.hypothesis)
+        bounds = np.array([f.bounds for f in self.free])
+        self.low, self.high = bounds[:, 0], bounds[:, 1]
+        self.simulations = 0
+        self._last: tuple[bytes, Array | None] = (b"", None)
+
+    def residual(self, x: Array) -> Array | None:
+        """(n,) V, or None where the model fails."""
+        key = x.tobytes()
+        if self._last[0] != key:
+            self.simulations += 1
+            predicted = self.problem.predict(values_of(self.free, x))
+            self._last = (key, None if predicted is None else self.problem.measured - predicted)
+        return self._last[1]
+
+    def jacobian(self, x: Array, residual: Array, columns: Sequence[int] | None = None) -> Array | None:
+        """(n, k) V per standard deviation of the prior, by one-sided differences within the bounds."""
+        wanted = range(len(x)) if columns is None else columns
+        out = np.zeros((len(residual), len(wanted)))
+        for place, j in enumerate(wanted):
+            column = self._slope(x, j, residual)
+            if column is None:
+                return None
+            out[:, place] = column
+        return out
+
+    def _slope(self, x: Array, j: int, residual: Array) -> Array | None:
+        one = self.free[j]
+        size = OWN_STEP if one.own else EFFECT_STEP
+        size = min(size, 0.25 * (self.high[j] - self.low[j]))
+        only = int(one.name) if one.owner == STATE_OF_CHARGE else None
+        rows = slice(None) if only is None else self.problem.slices[only]
+        if self.problem.reduction is not None and one.owner == self.problem.reduction.effect.id:
+            return one.sd * np.concatenate(self.problem.reduction.columns_v)
+        for h in (size, -size) if x[j] + size <= self.high[j] else (-size, size):
+            moved = x.copy()
+            moved[j] = x[j] + h
+            self.simulations += 1
+            predicted = self.problem.predict(values_of(self.free, moved), only)
+            if predicted is not None:
+                column = np.zeros(len(residual))
+                column[rows] = (residual[rows] - (self.problem.measured[rows] - predicted)) / h
+                return column
+        return None
+
+    def descend(self, x: Array, delta_v: float, steps: int) -> Array:
+        """Coordinates after a descent at one size of the model error."""
+
+        def cost(at: Array) -> float:
+            e = self.residual(at)
+            if e is None:
+                return np.inf
+            r = whitened(self.problem, self.blocks, e[:, None], delta_v)[0]
+            return 0.5 * float(np.sum(r**2) + at @ at)
+
+        def linearise(at: Array) -> tuple[Array, Array] | None:
+            e = self.residual(at)
+            jacobian = None if e is None else self.jacobian(at, e)
+            if e is None or jacobian is None:
+                return None
+            table = whitened(self.problem, self.blocks, np.column_stack([e, -jacobian]), delta_v)[0]
+            return np.concatenate([table[:, 0], at]), np.vstack([table[:, 1:], np.eye(len(at))])
+
+        return descend(
+            linearise, cost, np.clip(x, self.low, self.high), self.low, self.high, steps, GAIN_NATS
+        ).x
+
+    def finished(self, x: Array) -> FittedHypothesis | None:
+        """The fit at a point, scored."""
+        e = self.residual(x)
+        jacobian = None if e is None else self.jacobian(x, e)
+        if e is None or jacobian is None:
+            return None
+        point = Linearised(x, e, jacobian)
+        return FittedHypothesis(self.hypothesis, self.free, point, self.scored(point), self.simulations)
+
+    def scored(self, point: Linearised) -> PredictiveScore:
+        """The predictive score, over sizes of the model error."""
+        return scored(self.problem, self.blocks, point)
+
+
+def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
+    """The predictive score of a linear form, over sizes of the model error."""
+    prior, table, out = PRIORS[problem.trust], point.table(), []
+    for delta_v in SIZES_V:
+        white, log_det = whitened(problem, blocks, table, delta_v)
+        sums = block_sums(blocks, white, log_det)
+        out.append(score_at(problem, blocks, sums, point.x, delta_v, prior.log_density(delta_v)))
+    return best_over_sizes(out)
+
+
+class LinearForm(Protocol):
+    """A hypothesis about a point, with its score."""
+
+    @property
+    def point(self) -> Linearised: ...
+    @property
+    def score(self) -> PredictiveScore: ...
+
+
+def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
+    """(n,) V: the residual of each block at the parameters that the other blocks give, linearly."""
+    shifts = fit.score.shifts[blocks.of_row]
+    return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)

@@ -1,0 +1,192 @@
+"""The linear-Gaussian form of a hypothesis about a point, by blocks, and what it predicts of blocks left out.
+
+    y = f(x) + J z + e,   x + z ~ N(0, 1),   e ~ N(0, C), independent between blocks    (1)
+
+With whitened residual r and sensitivities J, a set S of blocks has the marginal density
+
+    -2 log p(y_S) = r'r + x'x - b'A^-1 b + log|A| + log|C| + n log 2 pi,   A = 1 + J'J,   b = J'r - x     (2)
+
+and what is said of blocks F by those outside is log p(y_F | y_-F) = log p(y) - log p(y_-F).
+Bishop, Pattern Recognition and Machine Learning (2006), section 3.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from aesi.numerics.discrepancy import whiten
+from aesi.numerics.typing import Array, IntArray
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.likelihood.model_error import amplitude_v
+
+LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+@dataclass(frozen=True, eq=False)
+class BlockSums:
+    """Sums over the rows of each block, whitened.
+
+    square : (b,) r'r.  moment : (b, m) J'r.  gram : (b, m, m) J'J.  log_det : (b,) log|C|.  rows : (b,).
+    """
+
+    square: Array
+    moment: Array
+    gram: Array
+    log_det: Array
+    rows: Array
+
+    def take(self, columns: IntArray) -> BlockSums:
+        """The same with some of the parameters."""
+        return BlockSums(
+            self.square,
+            self.moment[:, columns],
+            self.gram[:, columns[:, None], columns[None, :]],
+            self.log_det,
+            self.rows,
+        )
+
+
+def whitened(problem: InverseProblem, blocks: Blocks, table: Array, delta_v: float) -> tuple[Array, Array]:
+    """Columns (n, m) in V, whitened at a size of the model error, and log|C| by rows (n,)."""
+    amplitude = amplitude_v(problem.steepness, delta_v)
+    return whiten(table, problem.time_s, blocks.starts[:-1], amplitude, problem.white_v)
+
+
+def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
+    """table : (n, 1 + m), whitened residual and sensitivities.  log_det : (n,)."""
+    m = table.shape[1]
+    count = len(blocks)
+    products = np.empty((count, m, m))
+    for k in range(count):
+        part = table[blocks.starts[k] : blocks.starts[k + 1]]
+        products[k] = part.T @ part
+    return BlockSums(
+        products[:, 0, 0],
+        products[:, 1:, 0],
+        products[:, 1:, 1:],
+        np.add.reduceat(log_det, blocks.starts[:-1]),
+        np.diff(blocks.starts).astype(float),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Of (1), over all blocks and without each fold.
+
+    sums : of the hypothesis.  x : (m,) the point.  folds : sets of blocks left out in turn.
+    """
+
+    sums: BlockSums
+    x: Array
+    folds: tuple[tuple[int, ...], ...]
+
+    @cached_property
+    def _left_out(self) -> Array:
+        out = np.zeros((len(self.folds) + 1, len(self.sums.square)))
+        for k, fold in enumerate(self.folds):
+            out[k, list(fold)] = 1.0
+        return out
+
+    @cached_property
+    def _solved(self) -> tuple[Array, Array, Array]:
+        """(f + 1,) log|A| and b'A^-1 b, (f + 1, m) A^-1 b, the last without any fold left out."""
+        kept = 1.0 - self._left_out
+        m = len(self.x)
+        gram = np.tensordot(kept, self.sums.gram, axes=(1, 0)) + np.eye(m)
+        b = kept @ self.sums.moment - self.x
+        root = np.linalg.cholesky(gram)
+        half = np.linalg.solve(root, b[..., None])[..., 0]
+        shift = np.linalg.solve(np.swapaxes(root, 1, 2), half[..., None])[..., 0]
+        log_det = 2.0 * np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
+        return log_det, np.sum(half**2, axis=1), shift
+
+    @cached_property
+    def log_density(self) -> Array:
+        """(f,) log p(y_F | y_-F) of each fold, nats."""
+        log_det, explained, _ = self._solved
+        out = self._left_out[:-1]
+        own = out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
+        return -0.5 * (own + log_det[-1] - log_det[:-1] - explained[-1] + explained[:-1])
+
+    @cached_property
+    def evidence(self) -> float:
+        """log p(y) of all blocks, nats."""
+        log_det, explained, _ = self._solved
+        own = float(np.sum(self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows))
+        return -0.5 * (own + float(self.x @ self.x) + float(log_det[-1] - explained[-1]))
+
+    @cached_property
+    def shifts(self) -> Array:
+        """(f, m) change of the parameters where a fold is left out."""
+        return self._solved[2][:-1]
+
+    @cached_property
+    def shift(self) -> Array:
+        """(m,) change of the parameters to where all data put them."""
+        return self._solved[2][-1]
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(m, m) of the parameters given all data."""
+        return np.asarray(np.linalg.inv(self.sums.gram.sum(axis=0) + np.eye(len(self.x))))
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """A hypothesis about a point: coordinates (m,), residual (n,) V and sensitivities of the model (n, m) V."""
+
+    x: Array
+    residual_v: Array
+    jacobian_v: Array
+
+    def table(self) -> Array:
+        """(n, 1 + m)."""
+        return np.column_stack([self.residual_v, self.jacobian_v])
+
+
+PARTITIONS_OF_CONDITIONS = ("record", "rate", "charge")
+
+
+@dataclass(frozen=True, eq=False)
+class PredictiveScore:
+    """What a hypothesis says of data that it has not seen, at the size of the model error at which it says most.
+
+    delta_v : that size.  log_density : by partition, (f,) nats of each fold.  total : half over blocks, half over the
+    mean of the conditions, and the log prior of the size.  evidence : log marginal likelihood at that size.
+    shifts : (b, m) change of the parameters without each block.
+    """
+
+    delta_v: float
+    log_density: Mapping[str, Array]
+    total: float
+    evidence: float
+    shifts: Array
+    shift: Array
+    covariance: Array
+
+
+def score_at(
+    problem: InverseProblem, blocks: Blocks, sums: BlockSums, x: Array, delta_v: float, log_prior: float
+) -> PredictiveScore:
+    """The score of a hypothesis at one size of the model error."""
+    names = list(blocks.folds)
+    folds = tuple(fold for name in names for fold in blocks.folds[name])
+    posterior = Posterior(sums, x, folds)
+    ends = np.cumsum([len(blocks.folds[name]) for name in names])[:-1]
+    parts = dict(zip(names, np.split(posterior.log_density, ends), strict=True))
+    conditions = [float(parts[name].sum()) for name in PARTITIONS_OF_CONDITIONS if name in parts]
+    total = 0.5 * float(parts["block"].sum()) + 0.5 * float(np.mean(conditions)) + log_prior
+    return PredictiveScore(
+        delta_v, parts, total, posterior.evidence, posterior.shifts[: len(blocks)], posterior.shift,
+        posterior.covariance,
+    )  # fmt: skip
+
+
+def best_over_sizes(scores: Sequence[PredictiveScore]) -> PredictiveScore:
+    """The size of the model error at which most is said."""
+    return max(scores, key=lambda s: s.total)

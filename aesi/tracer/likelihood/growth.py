@@ -1,0 +1,208 @@
+"""A hypothesis and one effect more: the effect's parameters by Gauss-Newton, all others to first order.
+
+    min over u of  min over z  |W (e(u) - J z)|^2 + |x + z|^2 + |u|^2        u of the effect, x + z of the parent   (1)
+
+The inner minimum is a projection (variable projection, Golub & Pereyra, SIAM J. Numer. Anal. 10 (1973) 413), so that
+a step costs as many simulations as the effect has parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from aesi.numerics.bounded import Minimum, descend
+from aesi.numerics.typing import Array, IntArray
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.free_parameter import FURTHEST_SDS, FreeParameter, of_effect, starts, values_of
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
+from aesi.tracer.likelihood.fit import EFFECT_STEP, GAIN_NATS, FittedHypothesis
+from aesi.tracer.likelihood.gaussian import (
+    Linearised,
+    PredictiveScore,
+    best_over_sizes,
+    block_sums,
+    score_at,
+    whitened,
+)
+from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
+
+FIRST_STEPS = 2
+FURTHER_STEPS = 5
+"""Of a descent: from each start, and on from the best."""
+
+
+@dataclass(frozen=True, eq=False)
+class Parent:
+    """A fitted hypothesis as what grows from it needs it: whitened once at each size of the model error."""
+
+    problem: InverseProblem
+    blocks: Blocks
+    fit: FittedHypothesis
+
+    @cached_property
+    def white(self) -> dict[float, tuple[Array, Array]]:
+        """Size -> whitened sensitivities (n, m) and log|C| (n,)."""
+        return {
+            delta: whitened(self.problem, self.blocks, self.fit.point.jacobian_v, delta) for delta in SIZES_V
+        }
+
+    @cached_property
+    def movable(self) -> IntArray:
+        """Parameters but those on a bound of what they can mean at all, which a linear form cannot see.  The bounds of
+        the others are where their prior has long taken over."""
+        x = self.fit.point.x
+        bounds = np.array([f.bounds for f in self.fit.free])
+        near = np.abs(x[:, None] - bounds) < 1e-9
+        hard = np.abs(bounds) < FURTHEST_SDS - 1e-6
+        return np.flatnonzero(~(near & hard).any(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """A parent and one effect: its parameters fitted, the rest to first order.
+
+    free, point : of what may move, on no bound.  on_bounds : value of what is.  u : coordinates of the effect alone.
+    """
+
+    hypothesis: tuple[str, ...]
+    free: tuple[FreeParameter, ...]
+    point: Linearised
+    score: PredictiveScore
+    simulations: int
+    on_bounds: Mapping[tuple[str, str], float]
+    u: Array
+
+    @property
+    def placed(self) -> dict[tuple[str, str], float]:
+        """(owner, name) -> value, with the first-order change of the rest."""
+        x = self.point.x + self.score.shift
+        moved = {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
+        return {**self.on_bounds, **moved}
+
+
+class _Growth:
+    def __init__(self, parent: Parent, effect: str, delta_v: float) -> None:
+        self.parent, self.effect, self.delta_v = parent, effect, delta_v
+        self.problem, fit = parent.problem, parent.fit
+        self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
+        self.added = tuple(of_effect(effect, self.problem.effects[effect].parameters))
+        bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
+        self.low, self.high = bounds[:, 0], bounds[:, 1]
+        self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
+        self.simulations = 0
+        basis = np.vstack([parent.white[delta_v][0][:, self.rest], np.eye(len(self.rest))])
+        self.q = np.linalg.qr(basis)[0]
+        self._last: tuple[bytes, Array | None] = (b"", None)
+
+    def residual(self, u: Array) -> Array | None:
+        key = u.tobytes()
+        if self._last[0] != key:
+            self.simulations += 1
+            values = {**self.held, **values_of(self.added, u)}
+            predicted = self.problem.predict(values)
+            self._last = (key, None if predicted is None else self.problem.measured - predicted)
+        return self._last[1]
+
+    def jacobian(self, u: Array, e: Array) -> Array | None:
+        out = np.zeros((len(e), len(u)))
+        for j in range(len(u)):
+            size = min(EFFECT_STEP, 0.25 * (self.high[j] - self.low[j]))
+            for h in (size, -size) if u[j] + size <= self.high[j] else (-size, size):
+                moved = u.copy()
+                moved[j] += h
+                if not self.low[j] <= moved[j] <= self.high[j]:
+                    continue
+                self.simulations += 1
+                predicted = self.problem.predict({**self.held, **values_of(self.added, moved)})
+                if predicted is not None:
+                    out[:, j] = (e - (self.problem.measured - predicted)) / h
+                    break
+            else:
+                return None
+        return out
+
+    def projected(self, columns: Array, tail: Array) -> Array:
+        white = whitened(self.problem, self.parent.blocks, columns, self.delta_v)[0]
+        stacked = np.vstack([white, tail])
+        return stacked - self.q @ (self.q.T @ stacked)
+
+    def cost(self, u: Array) -> float:
+        e = self.residual(u)
+        if e is None:
+            return np.inf
+        tail = -self.parent.fit.point.x[self.rest][:, None]
+        return 0.5 * float(np.sum(self.projected(e[:, None], tail) ** 2) + u @ u)
+
+    def descended(self, u: Array, steps: int) -> Minimum:
+        """Where a descent from `u` ends, within the bounds."""
+        start = np.clip(u, self.low, self.high)
+        return descend(self.linearise, self.cost, start, self.low, self.high, steps, GAIN_NATS)
+
+    def linearise(self, u: Array) -> tuple[Array, Array] | None:
+        e = self.residual(u)
+        jacobian = None if e is None else self.jacobian(u, e)
+        if e is None or jacobian is None:
+            return None
+        x = self.parent.fit.point.x[self.rest]
+        tail = np.column_stack([-x, np.zeros((len(x), len(u)))])
+        table = self.projected(np.column_stack([e, -jacobian]), tail)
+        return np.concatenate([table[:, 0], u]), np.vstack([table[:, 1:], np.eye(len(u))])
+
+
+def grow(parent: Parent, effect: str, delta_v: float, known: Array | None = None) -> Grown | None:
+    """The parent and one effect more, from several starts; None where it cannot be simulated.
+
+    delta_v : one of the tried sizes, at which the effect's parameters are fitted.
+    known : coordinates of the effect's parameters where an earlier descent ended.
+    """
+    growth = _Growth(parent, effect, delta_v)
+    if known is not None:
+        u = known
+    else:
+        ends = [growth.descended(start, FIRST_STEPS) for start in starts(growth.added)]
+        best = min(ends, key=lambda end: end.cost)
+        if not np.isfinite(best.cost):
+            return None
+        u = growth.descended(best.x, FURTHER_STEPS).x if best.steps == FIRST_STEPS else best.x
+    e = growth.residual(u)
+    jacobian = None if e is None else growth.jacobian(u, e)
+    if e is None or jacobian is None:
+        return None
+    return _scored(growth, u, e, jacobian)
+
+
+def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
+    parent, fit = growth.parent, growth.parent.fit
+    inside = (u > growth.low + 1e-9) & (u < growth.high - 1e-9)  # a linear form cannot see a bound
+    x = np.concatenate([fit.point.x[growth.rest], u[inside]])
+    prior, out = PRIORS[growth.problem.trust], []
+    own_columns = np.column_stack([e, jacobian[:, inside]])
+    for delta in SIZES_V:
+        known, _ = parent.white[delta]
+        new, log_det = whitened(growth.problem, parent.blocks, own_columns, delta)
+        table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
+        sums = block_sums(parent.blocks, table, log_det)
+        out.append(score_at(growth.problem, parent.blocks, sums, x, delta, prior.log_density(delta)))
+    hypothesis = (*fit.hypothesis, growth.effect)
+    free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
+    point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]]))
+    on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
+    return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations, on_bounds, u)
+
+
+Explanation = FittedHypothesis | Grown
+"""A hypothesis as it was tried: fitted with the whole model, or to first order but for its last effect."""
+
+
+def linear_values(one: Explanation) -> dict[str, dict[str, float]]:
+    """owner -> name -> value, where all data put them."""
+    if isinstance(one, FittedHypothesis):
+        return one.values
+    out: dict[str, dict[str, float]] = {}
+    for (owner, name), value in one.placed.items():
+        out.setdefault(owner, {})[name] = value
+    return out

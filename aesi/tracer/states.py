@@ -1,0 +1,89 @@
+"""The model in each state that a report compares: as declared, recalibrated, and with what was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from aesi.errors import AesiError
+from aesi.physics.balance import same_rest
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.model import EspmModel
+from aesi.physics.simulation import model_with
+from aesi.records import Run
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
+from aesi.tracer.case.records import PreparedRecord
+from aesi.tracer.likelihood.growth import Explanation, linear_values
+
+
+@dataclass(frozen=True, eq=False)
+class ModelState:
+    """A model that can be simulated: a problem and the values of what moved in it (none: as declared).
+
+    hypothesis : the effects on top of the declared model.
+    """
+
+    problem: InverseProblem
+    values: ValuesByOwner | None = None
+    hypothesis: tuple[str, ...] = ()
+
+    @classmethod
+    def of(cls, problem: InverseProblem, one: Explanation) -> ModelState:
+        """Where a fit ended."""
+        return cls(problem, linear_values(one), tuple(one.hypothesis))
+
+    def effects(self) -> tuple[ActiveEffect, ...]:
+        """What is simulated on top of the declared cell."""
+        if self.values is None:
+            return self.problem.fixed
+        return replace(self.problem, reduction=None).active(self.values)
+
+    def simulated(self, record: PreparedRecord, index: int | None, thin: bool) -> Run:
+        """One record.
+
+        index : place among the fitted records, None for one that was not; its state of charge is then the one given,
+        or the one at which this model rests at its first voltage.
+        """
+        data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
+        effects, run = self.effects(), self.problem.run
+        if self.values is not None and index is not None:
+            return run(data, self.values[STATE_OF_CHARGE][str(index)], effects, hold)
+        if self.values is not None and record.basis == "full charge":
+            return run(data, self._full(record.soc0), effects, hold)
+        if self.values is None or record.soc0_given or record.rest_voltage_v is None:
+            return run(data, record.soc0, effects, hold)
+        try:
+            return run(data, None, effects, hold, record.rest_voltage_v)
+        except AesiError:
+            return run(data, record.soc0, effects, hold)
+
+    def _full(self, otherwise: float) -> float:
+        """State of charge of a full charge, as the fitted records that start from one put it."""
+        assert self.values is not None
+        known = self.values[STATE_OF_CHARGE]
+        full = [known[str(i)] for i, r in enumerate(self.problem.records) if r.basis == "full charge"]
+        return sum(full) / len(full) if full else otherwise
+
+    def settled(self) -> tuple[Cell, tuple[ActiveEffect, ...], float]:
+        """The cell with all that a cell file can hold, the effects that it cannot, and the state of charge at the first
+        sample in the windows of that cell."""
+        declared = self.problem.cell
+        cell, beside = declared, []
+        for active in self.effects():
+            changed = _cell_of(cell, active) if active not in self.problem.fixed else None
+            if changed is None:
+                beside.append(active)
+            else:
+                cell = changed
+        soc0 = self.problem.records[0].soc0 if self.values is None else self.values[STATE_OF_CHARGE]["0"]
+        return cell, tuple(beside), same_rest(declared, cell, soc0)
+
+
+def _cell_of(cell: Cell, active: ActiveEffect) -> Cell | None:
+    """The cell that says by itself what the effect does, or None where the effect does more than change a cell."""
+    effect = active.effect
+    if effect.on_model is None or effect.infers or effect.on_record or effect.on_voltage or effect.on_reading:
+        return None
+    changed = model_with(cell, (active,))
+    return changed.cell if replace(changed, cell=cell) == EspmModel(cell) else None

@@ -1,0 +1,96 @@
+"""Verdicts as pure functions of frozen evidence, the archive, and the map from margin to frequency."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.physics.effects import CATALOGUE
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.records import prepare_all
+from aesi.tracer.decide.archive import Archive, context_of, identity
+from aesi.tracer.decide.carry_over import left_out_errors, range_fault
+from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
+from aesi.tracer.decide.search import searched
+from aesi.tracer.decide.verdict import Thresholds, judged, structured_v
+from aesi.tracer.states import ModelState
+
+NEVER = Archive(None, "")
+
+
+@pytest.fixture
+def path(cell, few, make):
+    data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
+    problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
+    return searched(problem, 2, lambda blocks, fit: True, NEVER)
+
+
+def test_a_search_leaves_what_a_verdict_needs(path):
+    assert path.chosen.hypothesis == ("ocv_hysteresis",)
+    verdict = judged(path, Thresholds())
+    assert verdict == judged(path, Thresholds())
+    assert verdict.word == "found"
+    assert verdict.margin > 0
+    assert path.gain(path.chosen) > 50
+    assert {frozenset(e.hypothesis) for e in path.explanations()} >= {
+        frozenset(),
+        frozenset({"ocv_hysteresis"}),
+    }
+
+
+def test_what_is_left_beyond_the_tolerance_is_unknown_and_names_nothing(path):
+    bare = replace(path, chosen=path.base)
+    verdict = judged(bare, Thresholds())
+    assert (verdict.word, verdict.effects) == ("unknown", ())
+    assert verdict.structured_v == structured_v(path, path.base) > verdict.tolerance_v
+    generous = judged(bare, Thresholds(solver_v=0.1))
+    assert generous.word == "none"
+
+
+def test_data_that_order_nothing_give_look_alikes(path):
+    (group,) = judged(path, Thresholds(alike_sds=1e6, solver_v=0.1)).groups
+    assert group[0] == "ocv_hysteresis"
+    assert len(group) == 3
+
+
+def test_what_was_fitted_carries_to_a_part_left_out(path):
+    error = left_out_errors(path.problem, path.chosen)
+    assert error.pooled_v < 1.3e-3 < left_out_errors(path.problem, None).pooled_v
+    assert range_fault(ModelState.of(path.problem, path.chosen)) is None
+
+
+def test_a_model_that_runs_empty_where_the_declared_one_does_not_is_refused(path):
+    cell = path.problem.cell
+    poor = cell.with_positive(theta_max=cell.positive.theta_max + 0.3)
+    state = ModelState(path.problem)
+    gutted = CATALOGUE["active_material_loss_positive"].activate(loss=0.45)
+    problem = replace(path.problem, cell=poor)
+    assert range_fault(ModelState(problem)) is None  # it compares with itself
+    values = {"soc0": {"0": 0.9}, "active_material_loss_positive": gutted.parameters}
+    widened = replace(path.problem, effects={**path.problem.effects, gutted.id: gutted.effect})
+    sentence = range_fault(ModelState(widened, values))
+    assert sentence is None or "before it reaches" in sentence
+    assert state.settled()[0] == cell
+
+
+def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):
+    effect = CATALOGUE["series_resistance"]
+    wider = {k: replace(p, bounds=(0.0, 0.2)) for k, p in effect.parameters.items()}
+    assert identity(effect) == identity(effect)
+    assert identity(replace(effect, parameters=wider)) != identity(effect)
+    one, two = Archive(tmp_path / "a.jsonl", context_of(path.problem)), None
+    one.put("fit", np.array([1.0, 2.0]))
+    two = Archive(tmp_path / "a.jsonl", context_of(path.problem))
+    assert two.get("fit", 2).tolist() == [1.0, 2.0]
+    assert two.get("fit", 3) is None
+    assert Archive(tmp_path / "a.jsonl", "another case").get("fit", 2) is None
+
+
+def test_the_map_gives_the_frequency_that_it_was_fitted_to():
+    rng = np.random.default_rng(1)
+    margins = rng.normal(0.0, 2.0, 3000)
+    right = rng.random(3000) < 1.0 / (1.0 + np.exp(-(0.5 + 0.8 * margins)))
+    found = fitted_map(margins.tolist(), right.tolist())
+    truth = FrequencyMap(0.5, 0.8, 0)
+    for margin in (-2.0, 0.0, 2.0):
+        assert found.frequency(margin) == pytest.approx(truth.frequency(margin), abs=0.04)

@@ -1,0 +1,68 @@
+"""The likelihood against brute force: dense covariances, refits without a block, draws of its own noise."""
+
+import numpy as np
+import pytest
+
+from aesi.numerics.discrepancy import CORRELATION_LENGTHS_S, draw, whiten
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums
+
+RNG = np.random.default_rng(4)
+N, M = 60, 3
+TIME = np.cumsum(RNG.uniform(0.5, 20.0, N))
+STARTS = np.array([0, 15, 30, 45, N])
+AMPLITUDE = RNG.uniform(0.5, 2.0, N)
+WHITE = RNG.uniform(0.3, 0.6, N)
+BLOCKS = Blocks(STARTS, np.zeros(4, dtype=int), {"block": ((0,), (1,), (2,), (3,))})
+
+
+def covariance():
+    gap = np.abs(TIME[:, None] - TIME[None, :])
+    slow = sum(np.exp(-gap / tau) for tau in CORRELATION_LENGTHS_S) / len(CORRELATION_LENGTHS_S)
+    same = BLOCKS.of_row[:, None] == BLOCKS.of_row[None, :]
+    return np.where(same, AMPLITUDE[:, None] * AMPLITUDE[None, :] * slow, 0.0) + np.diag(WHITE**2)
+
+
+def test_whitening_is_that_of_the_dense_covariance():
+    columns = RNG.normal(size=(N, 2))
+    white, log_det = whiten(columns, TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    inverse = np.linalg.inv(covariance())
+    assert white.T @ white == pytest.approx(columns.T @ inverse @ columns, rel=1e-9)
+    assert log_det.sum() == pytest.approx(np.linalg.slogdet(covariance())[1], rel=1e-9)
+
+
+def density(rows, residual, jacobian, x):
+    """log p(y) of some rows with everything marginalised, dense."""
+    c = covariance()[np.ix_(rows, rows)] + jacobian[rows] @ jacobian[rows].T
+    e = residual[rows] + jacobian[rows] @ x  # the prior's mean is at x = 0
+    return -0.5 * (e @ np.linalg.solve(c, e) + np.linalg.slogdet(c)[1] + len(rows) * LOG_2PI)
+
+
+def test_what_is_said_of_blocks_left_out_is_the_ratio_of_dense_marginals():
+    residual, jacobian, x = RNG.normal(size=N), RNG.normal(size=(N, M)), RNG.normal(size=M)
+    table, log_det = whiten(np.column_stack([residual, jacobian]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    folds = ((0,), (1, 3), (2,))
+    posterior = Posterior(block_sums(BLOCKS, table, log_det), x, folds)
+    every = np.arange(N)
+    whole = density(every, residual, jacobian, x)
+    assert posterior.evidence == pytest.approx(whole, rel=1e-9)
+    for fold, said in zip(folds, posterior.log_density, strict=True):
+        kept = every[~np.isin(BLOCKS.of_row, fold)]
+        assert said == pytest.approx(whole - density(kept, residual, jacobian, x), rel=1e-8)
+
+
+def test_the_shift_without_a_block_is_that_of_a_refit():
+    residual, jacobian, x = RNG.normal(size=N), RNG.normal(size=(N, M)), RNG.normal(size=M)
+    table, log_det = whiten(np.column_stack([residual, jacobian]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    posterior = Posterior(block_sums(BLOCKS, table, log_det), x, ((1,),))
+    kept = BLOCKS.of_row != 1
+    design = np.vstack([table[kept, 1:], np.eye(M)])
+    target = np.concatenate([table[kept, 0], -x])
+    assert posterior.shifts[0] == pytest.approx(np.linalg.lstsq(design, target, rcond=None)[0], rel=1e-8)
+
+
+def test_draws_have_the_variance_that_is_whitened():
+    rng = np.random.default_rng(0)
+    draws = np.column_stack([draw(TIME, STARTS[:-1], AMPLITUDE, WHITE, rng) for _ in range(400)])
+    white, _ = whiten(draws, TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    assert np.mean(white**2) == pytest.approx(1.0, abs=0.03)
