@@ -6,6 +6,8 @@ import numpy as np
 
 from aesi.conformal.online.method import EnbPI, Method, SplitConformal
 from aesi.conformal.online.spci import SPCI
+from aesi.conformal.refitted import NAME as REFITTED
+from aesi.conformal.refitted import RefittedForest
 from aesi.conformal.regressors.boosted import BoostedQuantiles
 from aesi.conformal.regressors.forest import ForestQuantiles
 from aesi.conformal.regressors.linear import LinearQuantiles
@@ -64,3 +66,6 @@ METHODS: dict[str, Method] = {
         SPCI(name="spci_boosted", rate=RATE, fitter=boosted, n_betas=1),
     )
 }
+
+COMPARED: dict[str, Method | RefittedForest] = {**METHODS, REFITTED: RefittedForest()}
+"""What the tables of a run may show: the methods, and the paper's forest refitted as it goes, replayed only."""

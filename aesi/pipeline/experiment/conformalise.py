@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import overload
 
 import numpy as np
 
-from aesi.conformal import METHODS, Calibrated, Method
+from aesi.conformal import COMPARED, Calibrated, Method, RefittedForest, RefittedIntervals
 from aesi.errors import FitError
 from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.pipeline.experiment.candidate import method
@@ -58,13 +59,16 @@ def _conformalised(
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []
-    compared: dict[str, Calibrated] = {}
+    compared: dict[str, Calibrated | RefittedIntervals] = {}
     try:
         intervals = _intervals(pairs, config, method(config))
-        if one.model.name in SEARCHED:
-            compared = {name: _intervals(pairs, config, METHODS[name]) for name in config.conformal.compare}
     except FitError as error:
         notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
+    for name in config.conformal.compare if one.model.name in SEARCHED else ():
+        try:
+            compared[name] = _intervals(pairs, config, COMPARED[name])
+        except FitError as error:
+            notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
     try:
         errors = HonestErrors.of(pairs, problem.split.train, config.conformal.horizons_s)
         bands = errors.bands(config.conformal.alpha)
@@ -78,7 +82,19 @@ def _conformalised(
     return replace(one, intervals=intervals, bands=bands, compared=compared, notes=tuple(notes))
 
 
-def _intervals(pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method) -> Calibrated:
+@overload
+def _intervals(pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method) -> Calibrated: ...
+
+
+@overload
+def _intervals(
+    pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method | RefittedForest
+) -> Calibrated | RefittedIntervals: ...
+
+
+def _intervals(
+    pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method | RefittedForest
+) -> Calibrated | RefittedIntervals:
     conformal = config.conformal
     return chosen.fit(
         [(series.error_v - model.one_step(series))[rows] for model, series, rows in pairs],
