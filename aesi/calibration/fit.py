@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
+from aesi.calibration.heat import with_heat
 from aesi.calibration.model import AGEING_SD, Model
 from aesi.calibration.parameters import SPAN_K, Shapes, free_parameters
 from aesi.calibration.records import Prepared, prepared, with_temperatures
@@ -114,7 +115,7 @@ def calibrate(
     covariance = np.linalg.inv(scaled.T @ scaled)
     declared = _declared_errors(cell, model)
     rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
-    found = rewound(model, x)
+    found, warmth = with_heat(rewound(model, x), model.records)
     return Calibration(
         cell=found,
         declared=cell,
@@ -127,7 +128,7 @@ def calibrate(
         capacities={
             r.name: float(np.exp(AGEING_SD * x[model.layout.age(i)])) for i, r in enumerate(model.records)
         },
-        notes=(*notes, *_told(model, x)),
+        notes=(*notes, *_told(model, x), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
