@@ -8,6 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Constant
 
@@ -96,3 +99,22 @@ class EspmModel:
             and self.heat is None
             and all(isinstance(d, Constant) for d in solids)
         )
+
+
+def activation_energies(cell: Cell) -> Array:
+    """(6,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
+    n, p, e = cell.negative, cell.positive, cell.electrolyte
+    return np.array(
+        [
+            n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
+        ]
+    )  # fmt: skip
+
+
+def heat_numbers(model: EspmModel) -> Array:
+    """(3,) heat capacity J/K (0 for none), conductance W/K, surroundings K."""
+    if model.heat is None:
+        return np.zeros(3)
+    balance = model.heat
+    return np.array([balance.heat_capacity_j_k, balance.conductance_w_k, model.cell.ambient_temperature_k])

@@ -52,6 +52,7 @@ def _stages(
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.load import load
     from aesi.pipeline.experiment.outputs import Result, write_outputs
+    from aesi.pipeline.experiment.validation import validation_mser
     from aesi.pipeline.notes import together
     from flows.base.stage_cache import Cache
     from flows.search.study import run_study
@@ -72,8 +73,9 @@ def _stages(
         "final models",
         lambda: cache.get("final models", key, lambda: final_models(problem, found.chosen, config)),
     )
-    fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config))
-    evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split))
+    fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config, loaded.left_out))
+    validation = validation_mser(loaded, problem, found.candidates())
+    evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split, validation))
     seconds = time.monotonic() - started
     rows = found.rows()
     result = Result(

@@ -38,6 +38,10 @@ class Found:
     key: str
     scored: dict[int, ScoredCandidate | Failed]
 
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All that came to something."""
+        return tuple(one.candidate for one in self.scored.values() if not isinstance(one, Failed))
+
     def rows(self) -> list[dict[str, Any]]:
         """The candidates that were evaluated, as the report draws them."""
         front = {trial.number for trial in self.result.front()}

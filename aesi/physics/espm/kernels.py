@@ -73,26 +73,20 @@ def kinetic_ratio(density, exchange, theta):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
 def run_linear(  # type: ignore[no-untyped-def]
-    time, current, backward,
-    theta0, rates, gains, lump,
-    e_rates, e_gains, to_nodes, project, gauss, mean, psi, psi_scale, nonlinear, substep, most,
-    ocp_n, ocp_p, kappa, scalars,
-    out,
-):  # fmt: skip
-    """Step all samples; see `aesi.physics.simulation` for the meaning of the rows of `out`, (7, n).
+    time, current, backward, theta0, solid, salt, cell, out
+):
+    """Step all samples; the rows of `out`, (7, n), are those of `plain.run_plain`.
 
-    theta0 : (2,) stoichiometries at rest.  rates, gains : (2, modes) 1/s and stoichiometry/(A s), mean
-    excluded.
-    lump : (2,) stoichiometry/(A s) of the means.  scalars : see `aesi.physics.simulation`.
+    theta0 : (2,) stoichiometries at rest.  solid, salt, cell : see `PlainSolid`, `PlainSalt`, `PlainCell`.
     Returns the first sample at which a surface (1 negative, 2 positive) or the electrolyte (3) left its
     range.
     """
+    rates, gains, lump = solid
+    e_rates, e_gains, to_nodes, project, gauss, mean, psi, psi_scale, nonlinear, substep, most = salt
+    ocp_n, ocp_p, kappa, area, c0, top, a_l_n, a_l_p, exchange_n, exchange_p, thermal_v, salt_v = cell[:12]
+    path, solid_r, contact = cell[12:]
     n_samples, n_modes = time.shape[0], rates.shape[1]
     m_e, n_e = to_nodes.shape
-    area, c0, top = scalars[0], scalars[1], scalars[2]
-    a_l_n, a_l_p, exchange_n, exchange_p = scalars[3], scalars[4], scalars[5], scalars[6]
-    thermal_v, salt_v = scalars[7], scalars[8]
-    path, solid_r, contact = scalars[9], scalars[10], scalars[11]
 
     z_n, z_p = np.zeros(n_modes), np.zeros(n_modes)
     q, c, forcing, rest = np.zeros(n_e), np.full(m_e, c0), np.zeros(n_e), np.zeros(m_e)

@@ -124,7 +124,13 @@ def genome_space(problem: Problem, config: ExperimentConfig) -> GenomeSpace:
     """The ranges of the genes that the experiment names."""
     search, library = config.search, config.library
     return GenomeSpace(
-        len(problem.library), search.lambda1, search.lambda2, search.tau, library.p_c, library.d
+        len(problem.library),
+        search.lambda1,
+        search.lambda2,
+        search.tau,
+        library.p_c,
+        library.d,
+        library.feedback,
     )
 
 

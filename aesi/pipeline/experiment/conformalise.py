@@ -16,6 +16,7 @@ from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.records import LeftOut
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -24,28 +25,36 @@ SEARCHED = ("AESI I", "AESI II")
 
 
 def conformalise(
-    models: Sequence[Fitted], problem: Problem, chosen: Candidate, config: ExperimentConfig
+    models: Sequence[Fitted],
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    left_out: Sequence[LeftOut] = (),
 ) -> tuple[Fitted, ...]:
     """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
-    All: the validation records. The ensembles also each training piece, by a model fitted without it. Models
-    that were fitted to nothing also the training records.
+    All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
+    also the training records.
+    left_out : training drives under physics fitted without a part of them; by default the drives as they are.
     """
-    unseen: list[Unseen] = list(fold_models(problem, chosen))
-    lambda1 = chosen.genome.lambda1
-    return tuple(_conformalised(one, unseen, problem, config, lambda1) for one in models)
+    return tuple(_conformalised(one, problem, chosen, config, left_out) for one in models)
 
 
 def _conformalised(
-    one: Fitted, unseen: Sequence[Unseen], problem: Problem, config: ExperimentConfig, lambda1: float
+    one: Fitted,
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    left_out: Sequence[LeftOut],
 ) -> Fitted:
-    if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
-        one = replace(one, model=with_leverage(one.model, problem, lambda1))
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
-    if one.model.name in SEARCHED:
-        pairs += unseen
+    if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
+        pairs += fold_models(problem, chosen, one.model, left_out)
+        one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
     elif isinstance(one.model, Bare | Persistence):
-        pairs += [(one.model, series, WHOLE) for series in problem.split.train]
+        pairs += [(one.model, each.series, each.rows) for each in left_out]
+        if not left_out:
+            pairs += [(one.model, series, WHOLE) for series in problem.split.train]
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []
