@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import floor, log10
 from typing import Any
 
 from aesi.parameters import Parameter
 from aesi.physics.effects import CATALOGUE
 
+SAME_SHARE = 0.98
+"""An error after that is not below this share of the recalibrated one is no better than a refit."""
 MOST_PARAMETERS = 3
 ADDED = "added to what"
 """How a parameter's description says that it comes on top of the declared value."""
@@ -21,12 +24,14 @@ def sized(effect: str, discovery: Mapping[str, Any], title: str | None = None) -
     name = title or effect.replace("_", " ")
     row = next((c for c in discovery["candidates"] if c["effect"] == effect), None)
     known = CATALOGUE[effect].parameters if effect in CATALOGUE else {}
-    fitted = dict(row["parameters"]) if row else {}
+    fitted = dict(row.get("parameters", {})) if row else {}
     told = {key: value for key, value in fitted.items() if _tells(value, known.get(key))} or fitted
     if not told:
         return name
-    if len(fitted) == 1 and next(iter(told.values()))["unit"] != "dimensionless":
-        ((key, value),) = told.items()
+    ((key, value), *others) = told.items()
+    if not others and value["unit"] != "dimensionless":
+        if row and row["kind"] != "physics":  # what is off, or lies, is not had more or less of
+            return f"{name} ({quantity(value)})"
         parameter = known.get(key)
         more = " more" if parameter is not None and ADDED in parameter.description else " of"
         return f"{quantity(value)}{more} {name}"
@@ -56,6 +61,9 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
     if verdict == "unknown":
         left = "something real is left that no effect of the catalogue explains"
         return f"unknown: {left}" + (f"; so far {', '.join(effects)}" if effects else "")
+    own, after = (discovery[state]["test"].get("rmse_mv") for state in ("recalibrated", "after"))
+    if own is not None and after is not None and after > SAME_SHARE * own:
+        return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit does as well"
     return f"found: {', '.join(effects)}"
 
 
@@ -81,9 +89,7 @@ def _part(key: str, value: Mapping[str, Any], parameter: Parameter | None) -> st
 
 def _digits(width: float, value: float) -> int:
     """Decimals that show the interval's width to two digits, or the value to three where it has none."""
-    from math import floor, log10
-
     scale = width if width > 0 else abs(value) / 10.0
     if scale <= 0:
         return 1
-    return max(0, min(6, 1 - floor(log10(scale)) - (1 if scale >= 0.1 * abs(value) else 0)))
+    return max(0, min(6, 1 - floor(log10(scale))))
