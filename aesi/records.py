@@ -242,7 +242,7 @@ ROLES: tuple[Role, ...] = ("train", "valid", "test")
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class HeldOutDrive:
     """A training record under physics that was fitted without some of its samples.
 
     rows : these samples.

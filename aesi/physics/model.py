@@ -34,8 +34,7 @@ class Plating:
 class Interface:
     """What happens at the particles of one electrode, beyond what the cell file says.
 
-    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per
-    reactive area.
+    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per reactive area.
     bins : (share of the reactive area, radius over the declared radius), one pair a particle size.
     """
 

@@ -53,8 +53,7 @@ def simulate(
     effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
     temperature_degc : (n,) or one value: the cell's measured temperature; None leaves it to the cell file's
     initial temperature, or to the heat balance where an effect brings one.
-    hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row
-    before.
+    hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row before.
     on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
     "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
     at 10 V per unit of stoichiometry, every value stays finite, and `series["depleted"]` is 1 from the first

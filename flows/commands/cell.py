@@ -130,19 +130,20 @@ def discover(
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="key=value laid over the experiment file.")
     ] = None,
+    prefect: options.PrefectOption = True,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
     if experiment is not None:
         options.say_reading([experiment])
-        from flows.jobs.discovery import discover_experiment
+        from flows.jobs.start import discover_experiment
 
-        discover_experiment(str(experiment), list(overrides or []), out)
+        discover_experiment(str(experiment), list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
     options.say_reading([*data, *(test or [])])
     from aesi.pipeline.discovery.cases import case_of_files
-    from flows.jobs.discovery import discover as flow
+    from flows.jobs.start import discover as flow
 
     case = case_of_files(
         cell,
@@ -159,7 +160,7 @@ def discover(
         without or [],
     )
     options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
-    flow(case, out)
+    flow(case, out, prefect)
 
 
 def export(

@@ -43,6 +43,11 @@ ModelOption = Annotated[
     ),
 ]
 
+PrefectOption = Annotated[
+    bool,
+    typer.Option("--prefect/--no-prefect", envvar="AESI_PREFECT", help="Run the stages as a Prefect flow."),
+]
+
 _LIST = list[str] | None
 READING: dict[str, Any] = {
     "column": Annotated[

@@ -78,8 +78,7 @@ def run_linear(  # type: ignore[no-untyped-def]
     """Step all samples; the rows of `out`, (7, n), are those of `plain.run_plain`.
 
     theta0 : (2,) stoichiometries at rest.  solid, salt, cell : see `PlainSolid`, `PlainSalt`, `PlainCell`.
-    Returns the first sample at which a surface (1 negative, 2 positive) or the electrolyte (3) left its
-    range.
+    Returns the first sample at which a surface (1 negative, 2 positive) or the electrolyte (3) left its range.
     """
     rates, gains, lump = solid
     e_rates, e_gains, to_nodes, project, gauss, mean, psi, psi_scale, nonlinear, substep, most = salt
