@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import Array, BoolArray, ComplexArray
 from aesi.over_time import over_time, time_unit
 
 if TYPE_CHECKING:
@@ -134,6 +134,23 @@ class Measurement:
         """The rows with start_s <= time_s < stop_s."""
         low, high = np.searchsorted(self.time_s, [start_s, stop_s])
         return self.take(slice(int(low), int(high)))
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One impedance spectrum of a cell at rest.
+
+    frequency_hz : (n,) Hz.  z_ohm : (n,) ohm, the imaginary part negative where capacitive.
+    soc or discharged_ah (since full) : the state.  temperature_degc, voltage_v : None where not measured.
+    """
+
+    name: str
+    frequency_hz: Array
+    z_ohm: ComplexArray
+    soc: float | None = None
+    discharged_ah: float | None = None
+    voltage_v: float | None = None
+    temperature_degc: float | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -101,12 +101,12 @@ class EspmModel:
 
 
 def activation_energies(cell: Cell) -> Array:
-    """(6,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
+    """(7,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, films."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     return np.array(
         [
             n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, cell.film_ea_j_mol,
         ]
     )  # fmt: skip
 
