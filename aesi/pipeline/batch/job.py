@@ -12,7 +12,7 @@ from aesi.data.reading import Reading
 from aesi.errors import AesiError
 from aesi.physics import Cell
 from aesi.pipeline.batch.plan import Job
-from aesi.pipeline.calibrate import calibrate_files
+from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
 from aesi.pipeline.report.sizes import finding_line
@@ -133,6 +133,6 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         "report": f"{job.name}/report.html",
     }
     if job.specimen:
-        calibrate_files(job.cell, case.measurements, folder / "calibrated.bpx.json", job.soc0, settings.seed)
+        calibrate_files(job.cell, case.measurements, folder / "calibrated.bpx.json", Request(soc0=job.soc0))
         row |= asdict(health_of(Cell.from_bpx(folder / "calibrated.bpx.json")))
     return row | {"seconds": round(time.monotonic() - started, 1)}
