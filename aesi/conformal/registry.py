@@ -19,7 +19,7 @@ RATE = 0.05
 """Of the adaptive step: fast enough to hold 85 % in every bin of current and charge on a measured drive, slow
 enough to stay within 5 % of the best score possible where that is known; `tests/statistical/` asserts both."""
 FOREST_ROWS = 10_000
-"""Rows that each tree of a forest sees: more widen the fit, not the forecast."""
+"""Rows that each tree of a forest sees: more take longer to fit and do not change the intervals."""
 
 
 def published_forest(task: FitTask) -> QuantileModel:

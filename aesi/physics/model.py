@@ -34,8 +34,7 @@ class Plating:
 class Interface:
     """What happens at the particles of one electrode, beyond what the cell file says.
 
-    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per
-    reactive area.
+    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per reactive area.
     bins : (share of the reactive area, radius over the declared radius), one pair a particle size.
     """
 
@@ -102,12 +101,12 @@ class EspmModel:
 
 
 def activation_energies(cell: Cell) -> Array:
-    """(6,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
+    """(7,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, films."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     return np.array(
         [
             n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, cell.film_ea_j_mol,
         ]
     )  # fmt: skip
 

@@ -104,7 +104,7 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert (named.parameter, named.unit) == ("resistance_ohm", "ohm")
     assert named.low <= 1e-3 <= named.high
     assert {trace.name for trace in found.plot("test").data} >= {"measured", "after", "as declared"}
-    assert "series_resistance" in {effect.id for effect in found.model.effects}
+    assert found.model.cell.contact_resistance_ohm == pytest.approx(1e-3, rel=0.01), "a cell file can hold it"
     folder = found.save(tmp_path / "found")
     assert {path.name for path in folder.iterdir()} == {"discovery.json", "report.html", "model"}
 

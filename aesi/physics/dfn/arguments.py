@@ -140,6 +140,7 @@ def _electrodes(model: EspmModel) -> Electrodes:
         heat=heat_numbers(model),
         area=cell.total_area_m2,
         contact=cell.contact_resistance_ohm,
+        film=cell.film_resistance_ohm,
         transference=e.transference,
         reference_k=cell.reference_temperature_k,
     )

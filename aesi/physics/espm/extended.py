@@ -13,17 +13,15 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
-from aesi.physics.cell import Electrode
 from aesi.physics.espm.layout import Drive, Salt, Surfaces, Units, Whole
 from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
-    DiffusionTable,
     conductivity_table,
     electrolyte_diffusion,
     ocp_table,
     solid_diffusion,
 )
-from aesi.physics.model import EspmModel, Interface, Plating, activation_energies, heat_numbers
+from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
 from aesi.records import Hold
 
 NO_PLATING = Plating(0.0, 0.5)
@@ -53,16 +51,16 @@ def run_extended(
 def general_arguments(model: EspmModel) -> tuple[Units, Salt, Surfaces, Whole]:
     """What `extended_kernels.run_general` knows of the cell."""
     cell = model.cell
-    solids = [solid_diffusion(x.diffusivity) for x in (cell.negative, cell.positive)]
     whole = Whole(
         energies=activation_energies(cell),
         heat=heat_numbers(model),
         area=cell.total_area_m2,
         separator=cell.separator.thickness_m / cell.separator.transport_efficiency,
         contact=cell.contact_resistance_ohm,
+        film=cell.film_resistance_ohm,
         reference_k=cell.reference_temperature_k,
     )
-    return _units(model, solids), _salt(model), _surfaces(model), whole
+    return particle_units(model), _salt(model), _surfaces(model), whole
 
 
 def _salt(model: EspmModel) -> Salt:
@@ -85,8 +83,9 @@ def _salt(model: EspmModel) -> Salt:
     )
 
 
-def _units(model: EspmModel, solids: list[DiffusionTable]) -> Units:
+def particle_units(model: EspmModel) -> Units:
     """Particles, region by region from each collector, size by size."""
+    solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
     sides = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))
@@ -131,12 +130,12 @@ def _surfaces(model: EspmModel) -> Surfaces:
     n, p = model.cell.negative, model.cell.positive
     plating = model.negative.plating or NO_PLATING
     area_n = n.area_per_volume_1_m * n.thickness_m / model.regions
-    solid, salt = _ohmic(model)
+    solid, salt = ohmic_drops(model)
     return Surfaces(
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
         alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),
-        capacity=np.array([_capacity(model, n, model.negative), _capacity(model, p, model.positive)]),
+        capacity=np.array([interface_capacity(model, side) for side in range(2)]),
         plating=np.array([area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient]),
         plating_to_c=model.regions / (FARADAY_C_MOL * n.thickness_m),
         solid=solid,
@@ -144,12 +143,15 @@ def _surfaces(model: EspmModel) -> Surfaces:
     )
 
 
-def _capacity(model: EspmModel, electrode: Electrode, interface: Interface) -> float:
+def interface_capacity(model: EspmModel, side: int) -> float:
+    """F/m2 of cell: double layer of one region of an electrode (0 negative, 1 positive)."""
+    cell = model.cell
+    electrode, interface = ((cell.negative, model.negative), (cell.positive, model.positive))[side]
     area = electrode.area_per_volume_1_m * electrode.thickness_m / model.regions
     return interface.double_layer_f_m2 * area
 
 
-def _ohmic(model: EspmModel) -> tuple[Array, Array]:
+def ohmic_drops(model: EspmModel) -> tuple[Array, Array]:
     """Ohm m2 of the solid (2, regions, regions), and of the electrolyte times its conductivity, by region crossed."""
     n, p = model.cell.negative, model.cell.positive
     solid, salt = ohmic_shares(model.regions)

@@ -44,7 +44,7 @@ def run_general(  # type: ignore[no-untyped-def]
     time, current, temperature, given, backward, substep, most = drive
     units, rates, gains, lump, share, volume = particles[:6]
     ocp, entropic, plating_active = surfaces.ocp, surfaces.entropic, surfaces.plating[0] > 0.0
-    energies, heat, area, separator, contact, reference_k = cell
+    energies, heat, area, separator, contact, film, reference_k = cell
     mean, kappa_table = electrolyte.mean, electrolyte.kappa
     c0, top, contrast = electrolyte.c0, electrolyte.top, electrolyte.contrast
     n_units, n_modes = rates.shape
@@ -81,7 +81,7 @@ def run_general(  # type: ignore[no-untyped-def]
     t_weights, faster = -1.0, np.ones(3)
     watts, last_j = 0.0, current[0] / area
     last_step = 0.0
-    fault_at, fault = -1, 0
+    fault_at, fault, driest = -1, 0, 1.0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
         parts = min(max(1, math.ceil(whole / substep)), most) if k > 0 else 1
@@ -128,7 +128,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 pred[u] = means[u]
                 for j in range(n_modes):
                     pred[u] += z[u, j]
-            observe_salt(c, c0, electrolyte.gauss, contrast, salt, log_salt, region_salt)
+            driest = observe_salt(c, c0, electrolyte.gauss, contrast, salt, log_salt, region_salt)
             start_k = t_k
             if given and k > 0:
                 t_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
@@ -175,7 +175,8 @@ def run_general(  # type: ignore[no-untyped-def]
             if plating_active:
                 for r in range(regions):
                     plated[r] = max(plated[r] - surfaces.plating_to_c * plating_current[r] * dt, 0.0)
-            voltage = phi_p - phi_n - j1 * separator / kappa[2 * regions] - i1 * contact
+            voltage = phi_p - phi_n - j1 * separator / kappa[2 * regions]
+            voltage -= i1 * (contact + film / arrhenius(energies[6], t_k, reference_k))
             if heat[0] > 0.0:
                 power = -i1 * voltage
                 for u in range(n_units):
@@ -198,6 +199,6 @@ def run_general(  # type: ignore[no-untyped-def]
         out[3, k], out[4, k] = c[0], c[m_e - 1]
         out[7, k] = t_k
         out[8, k] = np.mean(plated)
-        if fault_at < 0 and not np.min(c) >= 0.0:
+        if fault_at < 0 and not driest > 0.0:
             fault_at, fault = k, 3
     return fault_at, fault

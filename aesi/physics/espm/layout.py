@@ -153,8 +153,9 @@ class Surfaces(NamedTuple):
 class Whole(NamedTuple):
     """Numbers of the whole cell.
 
-    energies : (6,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
-    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact : ohm.  reference_k : K.
+    energies : (7,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
+    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact, film : ohm.
+    reference_k : K.
     """
 
     energies: Array
@@ -162,6 +163,7 @@ class Whole(NamedTuple):
     area: float
     separator: float
     contact: float
+    film: float
     reference_k: float
 
 

@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.kernels import FASTMATH, SMALLEST_SALT, lookup, step_weights
+from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights, wet
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -119,13 +119,22 @@ def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: 
     """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
 
     contrast : factor of what differs between the regions of an electrode in the logarithm.
+    Returns the mean over rest of the electrode that has less.
     """
     for i in range(gauss.shape[0]):
         g = 0.0
         for j in range(c.shape[0]):
             g += gauss[i, j] * c[j]
-        salt[i] = max(g / c0, SMALLEST_SALT)
+        salt[i] = g / c0
     regions = log_salt.shape[0] // 2
+    driest = 1.0
+    for side in range(2):
+        whole = 0.0
+        for r in range(side * regions, (side + 1) * regions):
+            whole += (5.0 * (salt[3 * r] + salt[3 * r + 2]) + 8.0 * salt[3 * r + 1]) / 18.0 / regions
+        driest = min(driest, whole)
+    for i in range(gauss.shape[0]):
+        salt[i] = wet(salt[i])
     for side in range(2):
         middle = 0.0
         for r in range(side * regions, (side + 1) * regions):
@@ -135,6 +144,7 @@ def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: 
             middle += log_salt[r] / regions
         for r in range(side * regions, (side + 1) * regions):
             log_salt[r] = middle + contrast * (log_salt[r] - middle)
+    return driest
 
 
 @njit(inline="always", fastmath=FASTMATH)

@@ -17,7 +17,7 @@ from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
-from aesi.records import LeftOut
+from aesi.records import HeldOutDrive
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -30,7 +30,7 @@ def conformalise(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[LeftOut] = (),
+    left_out: Sequence[HeldOutDrive] = (),
 ) -> tuple[Fitted, ...]:
     """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
@@ -46,7 +46,7 @@ def _conformalised(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[LeftOut],
+    left_out: Sequence[HeldOutDrive],
 ) -> Fitted:
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
     if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:

@@ -44,7 +44,7 @@ SOC0, CONTACT = "soc0", "contact"
 
 
 @dataclass(frozen=True)
-class Knob:
+class FileParameter:
     """owner : an effect of the catalogue, or SOC0 or CONTACT.  deviation : of its value, of its logarithm where `log`;
     of the contact resistance in V at a current of 1C."""
 
@@ -57,14 +57,18 @@ class Knob:
 RATES = ("solid_diffusivity", "charge_transfer_kinetics")
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
 KNOBS = (
-    Knob(SOC0, "shift", 0.001),
-    Knob(CONTACT, "resistance_ohm", 0.03),
-    *(Knob(owner, f"{side}_factor", 0.3, log=True) for owner in RATES for side in ("negative", "positive")),
+    FileParameter(SOC0, "shift", 0.001),
+    FileParameter(CONTACT, "resistance_ohm", 0.03),
     *(
-        Knob("electrolyte_transport", f"{what}_factor", 0.3, log=True)
+        FileParameter(owner, f"{side}_factor", 0.3, log=True)
+        for owner in RATES
+        for side in ("negative", "positive")
+    ),
+    *(
+        FileParameter("electrolyte_transport", f"{what}_factor", 0.3, log=True)
         for what in ("conductivity", "diffusivity")
     ),
-    *(Knob(owner, "loss", 0.0003) for owner in BALANCE),
+    *(FileParameter(owner, "loss", 0.0003) for owner in BALANCE),
 )
 ALL = tuple(range(len(KNOBS)))
 INITIAL_STATE = (0,)
