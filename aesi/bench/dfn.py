@@ -57,7 +57,7 @@ class Load:
 
 
 def run(
-    samples: int = 88_200, repeats: int = 3, cell: str = "", seed: int = 0, seconds: int = 600
+    samples: int = 88_200, repeats: int = 3, cell: str = "", seed: int = 0, seconds: int = 200
 ) -> Iterator[CaseRow]:
     """Lines of every load and numbers, then the timing, then the summary.
 

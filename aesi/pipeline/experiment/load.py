@@ -19,7 +19,7 @@ from aesi.data.read import read
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError
-from aesi.physics import ActiveEffect, Cell, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
@@ -51,6 +51,7 @@ class Loaded:
     notes: tuple[str, ...]
     config: ExperimentConfig
     fallback: str = ""
+    model: ModelName = "espm"
 
     @property
     def setting(self) -> str:
@@ -126,6 +127,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
     given = declared_model(path)
     cell, effects = given.cell, (*given.effects, *_effects(config))
+    model = config.cell.model or given.model
     sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
     series: dict[str, ErrorSeries] = {}
     soc0: dict[str, float] = {}
@@ -139,7 +141,14 @@ def _load(config: ExperimentConfig) -> Loaded:
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         run = simulate(
-            cell, even.time_s, even.current_a, soc0[name], effects, even.temperature_degc, config.data.hold
+            cell,
+            even.time_s,
+            even.current_a,
+            soc0[name],
+            effects,
+            even.temperature_degc,
+            config.data.hold,
+            model=model,
         )
         whole = error_series(even, run, config.data.dt_s)
         # Before the record is cut: a filtered current has to know what came before a piece.
@@ -153,6 +162,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
+        model=model,
     )
 
 
