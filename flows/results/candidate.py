@@ -20,8 +20,8 @@ from typing import Any
 from aesi.errors import AesiError, FitError, InputError
 from aesi.pipeline.experiment.candidate import weights
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
-from aesi.pipeline.experiment.conformalise import conformalise
 from aesi.pipeline.experiment.fit import build_problem, final_models
+from aesi.pipeline.experiment.intervals.conformalise import conformalise
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Failed
