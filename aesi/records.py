@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import Array, BoolArray, ComplexArray
 from aesi.over_time import over_time, time_unit
 
 if TYPE_CHECKING:
@@ -137,6 +137,23 @@ class Measurement:
 
 
 @dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One impedance spectrum of a cell at rest.
+
+    frequency_hz : (n,) Hz.  z_ohm : (n,) ohm, the imaginary part negative where capacitive.
+    soc or discharged_ah (since full) : the state.  temperature_degc, voltage_v : None where not measured.
+    """
+
+    name: str
+    frequency_hz: Array
+    z_ohm: ComplexArray
+    soc: float | None = None
+    discharged_ah: float | None = None
+    voltage_v: float | None = None
+    temperature_degc: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Run:
     """One simulation: voltage and the internal states, a value a sample.
 
@@ -242,7 +259,7 @@ ROLES: tuple[Role, ...] = ("train", "valid", "test")
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class HeldOutDrive:
     """A training record under physics that was fitted without some of its samples.
 
     rows : these samples.

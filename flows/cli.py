@@ -29,6 +29,7 @@ app.command("run", short_help="A whole experiment, to its tables and report.")(e
 app.command("discover", short_help="Find what physics a model lacks, and add it.")(cell.discover)
 app.command("calibrate", short_help="Fit the physics model's own parameters.")(cell.calibrate)
 app.command("simulate")(cell.simulate)
+app.command("impedance", short_help="The model's impedance at rest.")(cell.impedance)
 app.command("predict")(cell.predict)
 app.command("export", short_help="A cell and what was found, as BPX or for PyBaMM.")(cell.export)
 app.command("tables", short_help="The paper's tables, from tracked runs alone.")(experiment.tables)

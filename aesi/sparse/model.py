@@ -1,13 +1,12 @@
 """The sparse model of the voltage error, e[k + 1] = Theta(e[k], U[k]) xi, the paper's equation (8).
 
-A model none of whose terms holds the error gives it by the inputs alone, g(U[k]). What it leaves dies away
-slowly, so a measured error still tells something about the next ones; `memory` is the share that is left
-after one step, and then
+A model without terms in the error predicts it from the inputs alone, g(U[k]). Its residual is autocorrelated, so a
+measured error improves the prediction of the next ones; `memory` is the lag-one autoregression coefficient of that
+residual, and then
 
     e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
 
-which is a feedback of gain `memory` < 1 over the whole range. (At the start of a record g(U[0]) stands for
-what came before.)
+which is stable, as memory < 1. (At the start of a record g(U[0]) stands for what came before.)
 
 It lives in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged
 in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. What the model

@@ -59,7 +59,7 @@ def evaluate(
     rows, outside = [], {}
     for one in fitted:
         started = time.monotonic()
-        judged = {role: [_judge(one, series) for series in getattr(split, role)] for role in ROLES}
+        judged = {role: [_judge(one, series, role) for series in getattr(split, role)] for role in ROLES}
         seconds = one.seconds + time.monotonic() - started
         row = _row(one, judged, seconds)
         if validation and one.model.name in validation:
@@ -81,7 +81,7 @@ def evaluate(
     )
 
 
-def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
+def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
     free = one.model.free_run(series)
     prediction = one.model.one_step(series)
     residual = series.error_v - prediction
@@ -92,7 +92,9 @@ def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
         one_step=prediction,
         intervals=None if one.intervals is None else one.intervals.intervals(residual, series.current_a),
         bands=None if one.bands is None else one.bands.intervals(series, free, reach(one.model, series)),
-        compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()},
+        compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()}
+        if role == "test"  # the tables show no other
+        else {},
     )
 
 

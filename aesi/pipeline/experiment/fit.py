@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from aesi.conformal import Calibrated, FreeRunBands
+from aesi.conformal import Calibrated, FreeRunBands, RefittedIntervals
 from aesi.pipeline.experiment.candidate import genome_space, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.load import Loaded, cuts
@@ -36,7 +36,7 @@ class Fitted:
     seconds: float
     intervals: Calibrated | None = None
     bands: FreeRunBands | None = None
-    compared: Mapping[str, Calibrated] = field(default_factory=dict)
+    compared: Mapping[str, Calibrated | RefittedIntervals] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     trials: tuple[Mapping[str, Any], ...] = ()
 

@@ -28,7 +28,7 @@ from aesi.pipeline.experiment.physics_models import DECLARED, PhysicsModels, no_
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import ROLES, ErrorSeries, Hold, LeftOut, Measurement, Role, Split
+from aesi.records import ROLES, ErrorSeries, HeldOutDrive, Hold, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class Loaded:
     cell_name: str
     effects: tuple[ActiveEffect, ...]
     split: Split
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[HeldOutDrive, ...]
     soc0: dict[str, float]
     digests: dict[str, str]
     notes: tuple[str, ...]
@@ -159,7 +159,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     split = _split(config.data, series, sources.roles)
     refitted = config.cell.start == "recalibrated" and len(drives) > 1
     left_out = tuple(
-        LeftOut(_without(config, physics, records, drive, rows, piece.name) if refitted else piece, rows)
+        HeldOutDrive(_without(config, physics, records, drive, rows, piece.name) if refitted else piece, rows)
         for drive, piece in zip(drives, split.train, strict=True)
         for rows in _parts(len(piece), cuts(config.data))
     )

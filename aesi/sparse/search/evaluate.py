@@ -34,7 +34,7 @@ class FitnessWeights:
 
 @dataclass(frozen=True, eq=False)
 class HonestResiduals:
-    """Errors that a model left which had not seen them, for calibration.
+    """Out-of-fold prediction errors, for the calibration of intervals: each by models that were not fitted to its row.
 
     one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
     by models fitted on all rows but the piece around each.  stable_v : the same by fits of the stable terms.

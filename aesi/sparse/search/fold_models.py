@@ -14,7 +14,7 @@ import numpy as np
 from aesi.numerics.blocks import leave_out_weights, pieces
 from aesi.numerics.typing import IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
-from aesi.records import ErrorSeries, LeftOut
+from aesi.records import ErrorSeries, HeldOutDrive
 from aesi.sparse.fade import Fade
 from aesi.sparse.leverage import Leverage
 from aesi.sparse.model import SparseModel
@@ -30,7 +30,7 @@ def fold_models(
     problem: Problem,
     candidate: Candidate,
     judged: SparseModel | None = None,
-    left_out: Sequence[LeftOut] = (),
+    left_out: Sequence[HeldOutDrive] = (),
 ) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
     """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
 

@@ -142,7 +142,7 @@ def _without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
 
 
 def memory_of(problem: Problem, given: Sequence[Array]) -> float:
-    """The share of an honest residual that is left one step later: its lag-one regression, within [0, 1)."""
+    """Lag-one autoregression coefficient of a residual that the fit has not seen, within [0, 1)."""
     product, square = 0.0, 0.0
     for (a, b), prediction in zip(problem.folds, given, strict=True):
         left = problem.target[a:b] - prediction

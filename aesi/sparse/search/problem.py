@@ -9,8 +9,8 @@ can be computed once for the whole library and sliced. Three kinds of row weight
 - all rows, for the refit after stability selection.
 
 Out-of-bag and validation losses are taken in free run inside pieces of `horizon` rows, each started from its
-measured error (`regime="one_step"` for the loss as the paper prints it). One-step losses cannot tell a good
-simulator from a good echo.
+measured error (`regime="one_step"` for the loss as the paper prints it). One-step losses
+cannot tell a good simulator from one that repeats the last measured error.
 """
 
 from __future__ import annotations
@@ -87,13 +87,12 @@ class Problem:
 
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
     error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
-    error, target : (n,) scaled e[k] and
-    e[k + 1].
+    error, target : (n,) scaled e[k] and e[k + 1].
     counts : (resamples, n) how often each resample holds a row.
     fade : (n,) what is left of a correction at each row by a model that has not seen its fold (fade.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
-    factors : (resamples, m + 1, m + 1), fold_factors likewise, and
-    full_factor (m + 1, m + 1): F with F' F = [Theta y]' W [Theta y], W the row weights times the counts.
+    factors : (resamples, m + 1, m + 1), fold_factors likewise, and full_factor (m + 1, m + 1): F with
+    F' F = [Theta y]' W [Theta y], W the row weights times the counts.
     notes : what was left out of the library, and why, one sentence each.
     """
 
