@@ -45,7 +45,7 @@ SOC0, CONTACT = "soc0", "contact"
 
 
 @dataclass(frozen=True)
-class FreeParameter:
+class FileParameter:
     """owner : an effect of the catalogue, or SOC0 or CONTACT.  deviation : of its value, of its logarithm where `log`;
     of the contact resistance in V at a current of 1C."""
 
@@ -58,18 +58,18 @@ class FreeParameter:
 RATES = ("solid_diffusivity", "charge_transfer_kinetics")
 BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
 KNOBS = (
-    FreeParameter(SOC0, "shift", 0.001),
-    FreeParameter(CONTACT, "resistance_ohm", 0.03),
+    FileParameter(SOC0, "shift", 0.001),
+    FileParameter(CONTACT, "resistance_ohm", 0.03),
     *(
-        FreeParameter(owner, f"{side}_factor", 0.3, log=True)
+        FileParameter(owner, f"{side}_factor", 0.3, log=True)
         for owner in RATES
         for side in ("negative", "positive")
     ),
     *(
-        FreeParameter("electrolyte_transport", f"{what}_factor", 0.3, log=True)
+        FileParameter("electrolyte_transport", f"{what}_factor", 0.3, log=True)
         for what in ("conductivity", "diffusivity")
     ),
-    *(FreeParameter(owner, "loss", 0.0003) for owner in BALANCE),
+    *(FileParameter(owner, "loss", 0.0003) for owner in BALANCE),
 )
 ALL = tuple(range(len(KNOBS)))
 INITIAL_STATE = (0,)
