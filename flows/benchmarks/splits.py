@@ -19,6 +19,8 @@ from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
 BLOCK_S = 100.0
+CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
+"""Intervals one step ahead are not judged here."""
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")
 
 
@@ -71,6 +73,7 @@ def _config(
     ]
     if settings.get("dt_s") is not None:
         laid += [f"data.dt_s={settings['dt_s']}", f"search.block={round(BLOCK_S / settings['dt_s'])}"]
+    laid += CHEAP
     return read_experiment(folder / case.experiment, [*laid, *overrides])
 
 
