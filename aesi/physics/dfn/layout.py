@@ -66,7 +66,7 @@ class Electrodes(NamedTuple):
     before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.  ocp, entropic : (2, table).
     alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.  node_share : (places,) weights.
     plating : rate A/m2 of cell at c0, transfer coefficient, c0.
-    plating_to_c : mol/m3 per C/m2.  energies : (6,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
+    plating_to_c : mol/m3 per C/m2.  energies : (7,) J/mol.  heat : (3,).  area : m2.  contact, film : ohm.
     transference : cation transference number.
     """
 
@@ -86,6 +86,7 @@ class Electrodes(NamedTuple):
     heat: Array
     area: float
     contact: float
+    film: float
     transference: float
     reference_k: float
 
@@ -124,7 +125,7 @@ class DfnTrial(NamedTuple):
     ohm : (places, points of an electrode) ohm m2.  layer_c A/(V m2), layer_old A/m2 : (places,) double layers.
     total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
     between.  faster : (3,) factors of diffusion, negative, positive, salt.
-    no_spread : zeros, for an instant.  rates : (6,) Arrhenius factors, by `Electrodes.energies`.
+    no_spread : zeros, for an instant.  rates : (7,) Arrhenius factors, by `Electrodes.energies`.
     """
 
     calm_z: Array

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
-from aesi.pipeline.experiment.conformalise import conformalise
 from aesi.pipeline.experiment.fit import build_problem, final_models
+from aesi.pipeline.experiment.intervals.conformalise import conformalise
 from aesi.pipeline.experiment.load import Loaded, load
 from aesi.sparse import Candidate, Genome, evaluate
 
@@ -53,8 +53,14 @@ def experiment(record: Path, **changes: object) -> ExperimentConfig:
             "record": str(record),
             "repeats": {"period_s": PERIOD_S, "train": [1, 3, 5], "test": [2, 4]},
         },
-        "cell": {"bpx": str(BPX), "soc0": SOC0},
-        "library": {"inputs": ["I", "I_next", "c_sp", "c_sn", "c_e0", "c_eL"], "p_c": [0, 1], "d": [1, 1]},
+        "cell": {"bpx": str(BPX), "soc0": SOC0, "start": "declared"},
+        "library": {
+            "inputs": ["I", "I_next", "c_sp", "c_sn", "c_e0", "c_eL"],
+            "p_c": [0, 1],
+            "d": [1, 1],
+            "special": True,
+            "fade": False,
+        },
         "search": {"resamples": 10, "block": 60},
         "conformal": {"window": 20},
         "models": ["ESPM", "AESI I", "AESI II"],

@@ -1,0 +1,122 @@
+"""What a calibration starts from: the cell scaled to the data, and the part of each record that it can follow."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from aesi.constants import SECONDS_PER_HOUR
+from aesi.numerics.typing import Array, BoolArray
+from aesi.physics.cell import Cell
+from aesi.records import Measurement
+
+TYPICAL_SOLID_EA_J_MOL = 30e3
+TYPICAL_RATE_EA_J_MOL = 35e3
+TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
+"""Where the file declares none: a cell answers to temperature, and data at one temperature cannot say how much. Records
+of several temperatures move them from there, see `aesi.calibration.parameters`.
+Diffusion and rates as in the parametrisation of O'Regan et al., Electrochim. Acta 425 (2022) 140700, rounded; the
+electrolyte as in the BPX example cell."""
+OPEN_SHARE = 1e-3
+"""Of the largest current of a record: below this a cycler has its relay open, whatever it reads."""
+FULL_WINDOW_V = 0.15
+LONG_CHARGE = 0.3
+"""Of the capacity: a charge that changes the branch of the hysteresis, where there is one."""
+
+
+def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[str, ...]]:
+    """The cell with its area scaled to the charge of a full discharge among the measurements, if there is one."""
+    charges = [_full_discharge_ah(cell, m) for m in measurements]
+    known = max((q for q in charges if q is not None), default=None)
+    if known is None:
+        return cell, (
+            f"no full discharge among the data: the capacity of {cell.capacity_ah:.3g} Ah is believed.",
+        )
+    factor = known / cell.capacity_ah
+    note = f"capacity {known:.3f} Ah by a full discharge, {cell.capacity_ah:.3f} Ah declared"
+    scaled = replace(cell, electrode_area_m2=cell.electrode_area_m2 * factor, nominal_capacity_ah=known)
+    return scaled, (f"{note}; the electrode area is scaled by {factor:.3f}.",)
+
+
+def with_activation(cell: Cell) -> tuple[Cell, tuple[str, ...]]:
+    """The cell with typical activation energies where it declares none, and a sentence that names them."""
+    filled = []
+    changed = cell
+    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+        changes = {}
+        if not electrode.diffusivity_ea_j_mol:
+            changes["diffusivity_ea_j_mol"] = TYPICAL_SOLID_EA_J_MOL
+        if not electrode.rate_ea_j_mol:
+            changes["rate_ea_j_mol"] = TYPICAL_RATE_EA_J_MOL
+        if changes:
+            with_side = changed.with_negative if side == "negative" else changed.with_positive
+            changed = with_side(**changes)
+            filled += [
+                f"{side} {name.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for name, v in changes.items()
+            ]
+    electrolyte = {
+        name: TYPICAL_ELECTROLYTE_EA_J_MOL
+        for name in ("conductivity_ea_j_mol", "diffusivity_ea_j_mol")
+        if not getattr(cell.electrolyte, name)
+    }
+    if electrolyte:
+        changed = changed.with_electrolyte(**electrolyte)
+        filled += [
+            f"electrolyte {n.removesuffix('_ea_j_mol')} {v / 1e3:g} kJ/mol" for n, v in electrolyte.items()
+        ]
+    if not filled:
+        return cell, ()
+    return changed, (
+        f"no activation energy is declared for these, typical ones are taken: {', '.join(filled)}.",
+    )
+
+
+def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, ...]]:
+    """The record without long charges before or after its discharge, and a sentence that says so.
+
+    A model without hysteresis has one open-circuit potential: that of the discharge, where the data show both.
+    """
+    step_ah = np.diff(data.time_s, prepend=data.time_s[0]) * data.current_a / SECONDS_PER_HOUR
+    flows = flowing(data.current_a)
+    before = np.maximum.accumulate(np.where(flows, np.arange(len(data)), 0))
+    charges = (step_ah < 0.0)[before]  # a rest belongs to what came before it
+    runs = _numbered(charges)
+    moved_ah = np.bincount(runs, weights=step_ah)
+    long = moved_ah < -LONG_CHARGE * cell.capacity_ah
+    pieces = _numbered(long)
+    discharged_ah = np.bincount(pieces, weights=np.where(long, 0.0, moved_ah))
+    best = int(np.argmax(discharged_ah))
+    if not long.any() or discharged_ah[best] < LONG_CHARGE * cell.capacity_ah:
+        return data, ()
+    rows = np.flatnonzero(pieces[runs] == best)
+    first = int(before[rows[0] - 1]) + 1 if rows[0] else 0  # the rest before it shows where it starts from
+    kept = data.take(slice(min(first, max(int(rows[0]) - 1, 0)), int(rows[-1]) + 1))
+    note = (
+        f"{data.name}: only {kept.time_s[0]:g} to {kept.time_s[-1]:g} s are fitted; the charge beside it runs on the "
+        "other branch of a hysteresis that this model does not have."
+    )
+    return kept, (note,)
+
+
+def flowing(current_a: Array) -> BoolArray:
+    """(n,) True where a current flows."""
+    size = np.abs(current_a)
+    return size > OPEN_SHARE * size.max()
+
+
+def _numbered(flags: BoolArray) -> Array:
+    """(n,) the number of the run of equal flags that each element is in."""
+    return np.cumsum(np.diff(flags.astype(int), prepend=int(flags[0])) != 0)
+
+
+def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
+    """Charge from full to empty, or None where the record does not go from one to the other."""
+    if data.voltage_v[0] < cell.upper_voltage_v - FULL_WINDOW_V:
+        return None
+    end = int(np.argmin(data.voltage_v))
+    if data.voltage_v[end] > cell.lower_voltage_v + 2 * FULL_WINDOW_V:
+        return None
+    steps = data.current_a[1 : end + 1] * np.diff(data.time_s[: end + 1])
+    return float(steps.sum()) / SECONDS_PER_HOUR

@@ -1,0 +1,282 @@
+"""Which column of a file is which quantity, in what unit and with what sign.
+
+Four conventions are known: names given by the user, this project's names, the makers' (`readers.formats`), and the
+battery data format (BDF).
+BDF: https://github.com/battery-data-alliance/battery-data-format, table of required quantities; its
+current is positive on charge.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+from aesi.data import units
+from aesi.data.channels import headers
+from aesi.data.readers.formats.format import Sign
+from aesi.data.readers.table import TableFile
+from aesi.errors import DataError
+
+REQUIRED = ("time_s", "current_a", "voltage_v")
+QUANTITIES = (*REQUIRED, "temperature_degc")
+SELECTORS = ("state", "cycle", "step")
+"""Columns that tell rows apart; they are no part of a measurement."""
+
+BDF = {
+    "time_s": ("Test Time / s", "test_time_second"),
+    "current_a": ("Current / A", "current_ampere"),
+    "voltage_v": ("Voltage / V", "voltage_volt"),
+    "temperature_degc": (
+        "Surface Temperature T1 / degC",
+        "temperature_t1_celsius",
+        "surface_temperature_t1_celsius",
+        "Surface Temperature / degC",
+        "surface_temperature_celsius",
+    ),
+    "cycle": ("Cycle Count / 1", "cycle_count"),
+    "step": ("Step Index / 1", "step_index", "Step Count / 1", "step_count"),
+}
+STRANGE_UNITS = {
+    "time_s": ("weeks",),
+    "current_a": ("c",),
+    "voltage_v": ("kv",),
+    "temperature_degc": (),
+}
+"""Units in names that no option converts."""
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """Position, name and unit of each quantity (and selector) that is there.
+
+    bdf_current : the current came from a BDF column, so it is positive on charge by definition.
+    maker, maker_sign : of a known export; its sign holds where the user gives none.
+    """
+
+    position: dict[str, int]
+    header: dict[str, str]
+    unit: dict[str, str]
+    bdf_current: bool
+    notes: tuple[str, ...]
+    maker: str = ""
+    maker_sign: Sign | None = None
+
+
+def map_columns(
+    table: TableFile,
+    columns: Mapping[str, str | None] | None,
+    declared: Mapping[str, str] | None = None,
+    required: tuple[str, ...] = REQUIRED,
+    selectors: tuple[str, ...] = (),
+) -> Mapped:
+    """Find the quantities among the names of a table's columns.
+
+    columns : quantity or selector -> name, or None to leave it out; goes before the known names.
+    declared : quantity -> unit, as the user says; goes before what names and formats say.
+    required : what has to be there; the rest is found where it is.
+    selectors : of `state`, `cycle`, `step`, those that rows are told apart by; a maker's `state` is always found.
+    Raises DataError for an unknown quantity, a name that is missing or there twice, and a unit that is not SI and
+    was neither declared nor is a maker's.
+    """
+    finder = _Finder(
+        table, dict(columns or {}), {q: units.declared(q, u) for q, u in (declared or {}).items()}
+    )
+    missing = [q for q in QUANTITIES if not finder.take(q) and q in required]
+    if missing:
+        raise finder.missing(missing)
+    for selector in SELECTORS:
+        if selector in selectors or selector in finder.given:
+            if not finder.take(selector):
+                raise finder.missing([selector])
+        elif selector == "state":
+            finder.of_maker(selector)
+    finder.check()
+    return finder.mapped()
+
+
+class _Finder:
+    """Looks quantities up in one table and keeps what it found."""
+
+    def __init__(self, table: TableFile, given: dict[str, str | None], declared: dict[str, str]) -> None:
+        self._table, self.given, self._declared = table, given, declared
+        self._file = table.path.name
+        for quantity in given:
+            if quantity not in (*QUANTITIES, *SELECTORS):
+                raise DataError(
+                    f"{quantity!r} is not a quantity to map; there are {', '.join((*QUANTITIES, *SELECTORS))}."
+                )
+        self.position: dict[str, int] = {}
+        self.unit: dict[str, str] = {}
+        self.notes: list[str] = []
+        self.bdf_current = False
+        self._of_export: list[str] = []
+
+    def take(self, quantity: str) -> bool:
+        """Whether the quantity is there; it is taken then. True also where it is left out as asked."""
+        if quantity in self.given:
+            name = self.given[quantity]
+            if name is None:
+                if quantity in REQUIRED:
+                    raise DataError(f"{self._file}: {quantity} cannot be left out.")
+                self.notes.append(f"{quantity} was left out as asked.")
+                return True
+            self.position[quantity] = self._named(name, quantity)
+            if name != quantity:
+                self.notes.append(f"{quantity} was taken from column {name!r} as asked.")
+            self._set_unit(quantity, "")
+            return True
+        found = self._own(quantity)
+        if found is not None:
+            self.position[quantity] = found
+            self._set_unit(quantity, "")
+            return True
+        return self.of_maker(quantity) or self._of_bdf(quantity)
+
+    def missing(self, quantities: list[str]) -> DataError:
+        """The sentence that says what is not there, and the options that would map it."""
+        header = self._table.header
+        likely = [name for name in (headers.nearest(q, header) for q in quantities) if name]
+        found = f"; the nearest: {', '.join(repr(name) for name in likely)}" if likely else ""
+        if set(quantities) <= set(SELECTORS):
+            options = " ".join(f"--column {q}=NAME" for q in quantities)
+            return DataError(
+                f"{self._file} has no column {' and no column '.join(quantities)}; say which is meant: {options}. "
+                f"It has: {_listed(header)}."
+            )
+        sign = (
+            ", and --sign charge-positive if charging is positive there" if "current_a" in quantities else ""
+        )
+        state = headers.nearest("state", header)
+        words = f', or --state "{state}" if the current is a magnitude' if sign and state else ""
+        return DataError(
+            f"{self._file} has no column {' and no column '.join(quantities)}{found}. "
+            f"Say which is meant: {headers.options(quantities, header)}{sign}{words}. It has: {_listed(header)}."
+        )
+
+    def check(self) -> None:
+        """Every column is one quantity's, and a temperature that is not used is told of."""
+        seen: dict[int, str] = {}
+        for quantity, place in self.position.items():
+            if place in seen and not {quantity, seen[place]} & set(SELECTORS):
+                raise DataError(
+                    f"{self._file}: column {self._table.header[place]!r} cannot be both {seen[place]} and {quantity}."
+                )
+            seen[place] = quantity
+        if "temperature_degc" not in self.position and "temperature_degc" not in self.given:
+            name = headers.nearest("temperature_degc", self._table.header, doubtful=True)
+            if name is not None:
+                self.notes.append(
+                    f"Column {name!r} looks like a temperature and is not used; "
+                    f"{headers.of_column('temperature_degc', name)} takes it, --column temperature_degc= leaves it out."
+                )
+
+    def mapped(self) -> Mapped:
+        """What was found."""
+        form = self._table.format
+        names = {quantity: self._table.header[place] for quantity, place in self.position.items()}
+        if form is not None and self._of_export:
+            self.notes.insert(0, f"Recognised as an export of {form.name}: {', '.join(self._of_export)}.")
+        return Mapped(
+            self.position,
+            names,
+            self.unit,
+            self.bdf_current,
+            tuple(self.notes),
+            form.name if form else "",
+            form.sign if form else None,
+        )
+
+    def _named(self, name: str, quantity: str) -> int:
+        header = self._table.header
+        found = self._only([i for i, there in enumerate(header) if there == name.strip()], name)
+        if found is None:
+            near = get_close_matches(name, header, n=1, cutoff=0.4)
+            hint = f"; the nearest is {near[0]!r}" if near else ""
+            raise DataError(
+                f"{self._file} has no column {name!r} for {quantity}{hint}. It has: {_listed(header)}."
+            )
+        return found
+
+    def _own(self, quantity: str) -> int | None:
+        return self._only(
+            [i for i, name in enumerate(self._table.header) if name.lower() == quantity], quantity
+        )
+
+    def of_maker(self, quantity: str) -> bool:
+        """Whether a known export has the quantity; it is taken then."""
+        form = self._table.format
+        found = form.find(quantity, self._table.header) if form else None
+        if found is None:
+            return False
+        self.position[quantity], unit = found
+        self._set_unit(quantity, unit)
+        if quantity in QUANTITIES:
+            told = self.unit[quantity]
+            converted = "" if told == units.SI[quantity] else f" (converted from {told})"
+            self._of_export.append(f"{quantity} from {self._table.header[found[0]]!r}{converted}")
+        return True
+
+    def _of_bdf(self, quantity: str) -> bool:
+        for label in BDF.get(quantity, ()):
+            places = [i for i, name in enumerate(self._table.header) if _plain(name) == _plain(label)]
+            found = self._only(places, label)
+            if found is not None:
+                self.position[quantity] = found
+                self._set_unit(quantity, units.SI.get(quantity, ""))
+                if quantity in QUANTITIES:
+                    self.notes.append(
+                        f"{quantity} was taken from the BDF column {self._table.header[found]!r}."
+                    )
+                self.bdf_current |= quantity == "current_a"
+                return True
+        return False
+
+    def _set_unit(self, quantity: str, known: str) -> None:
+        """The user's unit, that of the line of units, the maker's, or SI; a name that says another is refused."""
+        if quantity not in units.SI:
+            return
+        name = self._table.header[self.position[quantity]]
+        below = self._table.units[self.position[quantity]] if self._table.units else ""
+        if quantity in self._declared:
+            unit = self._declared[quantity]
+            self.notes.append(f"{quantity} was converted from {unit} as declared.")
+        elif units.spelt(quantity, below):
+            unit = units.spelt(quantity, below) or ""
+        elif known:
+            unit = known
+        else:
+            unit = units.SI[quantity]
+            self._refuse_other_unit(quantity, name)
+        self.unit[quantity] = unit
+
+    def _refuse_other_unit(self, quantity: str, name: str) -> None:
+        said = headers.unit_of(quantity, name)
+        if said is not None and said != units.SI[quantity]:
+            raise DataError(
+                f"{self._file}: column {name!r} is in {said.lower()} by its name, and {quantity} is needed in "
+                f"{units.SI[quantity]}; declare it: --unit {quantity}={said}."
+            )
+        if headers.unit_in(name).lower() in STRANGE_UNITS[quantity]:
+            raise DataError(
+                f"{self._file}: column {name!r} is in {headers.unit_in(name)} by its name, and {quantity} is needed "
+                f"in {units.SI[quantity]}; convert the column."
+            )
+
+    def _only(self, places: list[int], name: str) -> int | None:
+        if len(places) > 1:
+            raise DataError(
+                f"{self._file} has {len(places)} columns named {self._table.header[places[0]]!r} (numbers "
+                f"{', '.join(str(p + 1) for p in places)}); rename all but one of them."
+            )
+        return places[0] if places else None
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"\s+", "", name).lower()
+
+
+def _listed(header: tuple[str, ...]) -> str:
+    shown = ", ".join(repr(name[:40]) for name in header[:12])
+    return shown + (f" and {len(header) - 12} more" if len(header) > 12 else "")

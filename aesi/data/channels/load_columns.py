@@ -1,0 +1,153 @@
+"""From a table to columns in SI, discharge positive, of the rows that were asked for; nothing is checked yet."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from aesi.data import units
+from aesi.data.channels.checks import Columns, Context
+from aesi.data.channels.columns import QUANTITIES, Mapped, map_columns
+from aesi.data.readers.table import TableFile
+from aesi.data.reading import Duplicates, Reading, bounds
+from aesi.data.state import signs
+from aesi.errors import DataError
+from aesi.numerics.typing import AnyArray, Array
+
+ZERO_SHARE = 0.01
+"""Of the largest current: less below nought is a cycler's zero, no direction."""
+
+
+def load_columns(
+    table: TableFile, reading: Reading, required: tuple[str, ...]
+) -> tuple[Columns, Context, Mapped, list[str]]:
+    """The quantities of a table, where their rows are, how they were found, and what was done to them."""
+    mapped = map_columns(table, reading.columns, reading.units, required, reading.selectors)
+    data = _numbers(table, mapped)
+    if len(data["time_s"]) < 2:
+        raise DataError(
+            f"{table.path.name} has {len(data['time_s'])} rows below its header; a measurement needs at least two."
+        )
+    context = Context(table.path.name, mapped.header, table.where)
+    notes = [*table.notes, *mapped.notes]
+    _orient(table, data, mapped, reading, notes)
+    for name in reading.selectors:
+        data, context = _of_number(data, context, name, getattr(reading, name), notes)
+    data = {quantity: column for quantity, column in data.items() if quantity in QUANTITIES}
+    data, context = _window(data, context, reading, notes)
+    duplicates: Duplicates = reading.duplicates or ("first" if mapped.maker else "refuse")
+    data, context = _without_duplicates(data, context, duplicates, notes)
+    return data, context, mapped, notes
+
+
+def _numbers(table: TableFile, mapped: Mapped) -> Columns:
+    """All mapped columns but the state, in SI."""
+    wanted = [name for name in mapped.position if name != "state"]
+    as_text = [name for name in wanted if units.is_text(mapped.unit.get(name, ""))]
+    plain = [name for name in wanted if name not in as_text]
+    data = dict(zip(plain, table.read(tuple(mapped.position[name] for name in plain)), strict=True))
+    for name in as_text:
+        data[name] = _times(table, mapped, name)
+    return {
+        name: units.to_si(name, data[name], mapped.unit[name])
+        if name in plain and name in mapped.unit
+        else data[name]
+        for name in wanted
+    }
+
+
+def _times(table: TableFile, mapped: Mapped, name: str) -> Array:
+    unit = mapped.unit[name]
+    (cells,) = table.read_text((mapped.position[name],))
+    seconds = units.clock_to_s(cells) if unit == units.CLOCK else units.dates_to_s(cells, unit)
+    wrong = np.flatnonzero(np.isnan(seconds) & np.array([bool(cell) for cell in cells], dtype=bool))
+    if len(wrong):
+        row = int(wrong[0])
+        raise DataError(
+            f"{table.path.name}, {table.where(row)}: column {mapped.header[name]!r} holds {cells[row][:40]!r}, which "
+            f"is no time as {unit}; declare what it is: --unit {name}=s (or h, h:m:s, date, or a pattern such as "
+            "'%d.%m.%Y %H:%M:%S')."
+        )
+    return seconds
+
+
+def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
+    """Turn the current of `data` discharge-positive, in place, and say where that took a turn."""
+    current = data["current_a"]
+    asked = "state" in reading.columns
+    signed = np.nanmin(current, initial=0.0) < -ZERO_SHARE * np.nanmax(np.abs(current), initial=0.0)
+    if "state" in mapped.position and (asked or not signed):
+        (words,) = table.read_text((mapped.position["state"],))
+        way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
+        if asked or np.any(way != 0):
+            data["current_a"] = np.where(way == 0, 0.0, way * np.abs(current))
+            notes.append(note)
+            return
+    if mapped.bdf_current:
+        notes.append("BDF current is positive on charge; its sign was turned.")
+    elif (reading.sign or mapped.maker_sign) != "charge-positive":
+        return
+    elif reading.sign:
+        notes.append("The current was declared positive on charge; its sign was turned.")
+    else:
+        notes.append(f"{mapped.maker} writes the current positive on charge; its sign was turned.")
+    data["current_a"] = 0.0 - current  # no negative zeros
+
+
+def keep_rows(columns: Columns, context: Context, keep: AnyArray) -> tuple[Columns, Context]:
+    """The rows of an index array, with the file's own row numbers kept for later sentences."""
+    where = partial(_where_kept, context, keep)
+    return {q: v[keep] for q, v in columns.items()}, Context(context.file, context.header, where)
+
+
+def _where_kept(context: Context, kept: AnyArray, row: int) -> str:
+    return context.where(int(kept[row]))
+
+
+def _of_number(
+    data: Columns, context: Context, name: str, text: str, notes: list[str]
+) -> tuple[Columns, Context]:
+    """The rows of a cycle or a step."""
+    low, high = bounds(name, text) or (-np.inf, np.inf)
+    numbers = data[name]
+    keep = np.flatnonzero((numbers >= low) & (numbers <= high))
+    if len(keep) < 2:
+        raise DataError(
+            f"{context.file}: {len(keep)} rows are of {name} {text}; column {context.header[name]!r} runs from "
+            f"{np.nanmin(numbers):g} to {np.nanmax(numbers):g}."
+        )
+    notes.append(f"{name} {text}: {len(keep):,} of {len(numbers):,} rows were taken as asked.")
+    return keep_rows(data, context, keep)
+
+
+def _window(data: Columns, context: Context, reading: Reading, notes: list[str]) -> tuple[Columns, Context]:
+    if reading.start_s is None and reading.stop_s is None:
+        return data, context
+    low = -np.inf if reading.start_s is None else reading.start_s
+    high = np.inf if reading.stop_s is None else reading.stop_s
+    time = data["time_s"]
+    keep = np.flatnonzero((time >= low) & (time <= high))
+    if len(keep) < 2:
+        raise DataError(
+            f"{context.file}: {len(keep)} rows lie between {low:g} s and {high:g} s; its times run from "
+            f"{np.nanmin(time):g} s to {np.nanmax(time):g} s."
+        )
+    if len(keep) < len(time):
+        ends = [f"before {low:g} s"] * (reading.start_s is not None)
+        ends += [f"after {high:g} s"] * (reading.stop_s is not None)
+        notes.append(f"{len(time) - len(keep)} rows {' and '.join(ends)} were left out as asked.")
+    return keep_rows(data, context, keep)
+
+
+def _without_duplicates(
+    data: Columns, context: Context, duplicates: Duplicates, notes: list[str]
+) -> tuple[Columns, Context]:
+    same = np.diff(data["time_s"]) == 0
+    if duplicates == "refuse" or not np.any(same):
+        return data, context
+    dropped = np.append(same, False) if duplicates == "last" else np.insert(same, 0, False)
+    notes.append(
+        f"{int(np.sum(same))} rows of a stamp that is there twice were dropped, the {duplicates} kept."
+    )
+    return keep_rows(data, context, np.flatnonzero(~dropped))

@@ -1,0 +1,129 @@
+"""Free-run bands of a model, from records that it was not fitted to.
+
+Nothing here looks at `Split.test`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.conformal import WHOLE_DRIVE, FreeRunBands
+from aesi.numerics.typing import Array, BoolArray
+from aesi.records import ErrorModel, ErrorSeries, FreeRun
+from aesi.sparse import SparseModel
+from aesi.sparse.yardsticks import Bare, Persistence
+
+Unseen = tuple[ErrorModel, ErrorSeries, slice]
+"""A model, a record, and the samples of it that the model was not fitted to."""
+WHOLE = slice(1, None)
+"""All but the first sample, which is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class HonestErrors:
+    """What predictions left of the error on samples their models had not seen, one (n_i,) array a record.
+
+    by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
+    current_a, soc : A and 1.  inside : True where the model had been trained on such inputs.
+    excess : `FreeRun.excess` of each model.  reach : as by_horizon, `reach` of each prediction, V.
+    """
+
+    dt_s: float
+    by_horizon: dict[float, list[Array]]
+    current_a: list[Array]
+    soc: list[Array]
+    inside: list[BoolArray]
+    excess: list[Array | None]
+    reach: dict[float, list[Array]]
+
+    @classmethod
+    def of(
+        cls, pairs: Sequence[Unseen], train: Sequence[ErrorSeries], horizons_s: Sequence[float]
+    ) -> HonestErrors:
+        """train : the training records of all the models of the pairs, pieces left out included."""
+        runs = [model.free_run(series) for model, series, _ in pairs]
+        by_horizon = {h: [error_ahead(model, series, h) for model, series, _ in pairs] for h in horizons_s}
+        by_horizon[WHOLE_DRIVE] = [
+            error_of_free_run(series, run) for (_, series, _), run in zip(pairs, runs, strict=True)
+        ]
+        for errors in by_horizon.values():
+            for left, (_, _, rows) in zip(errors, pairs, strict=True):
+                left[_others(len(left), rows)] = np.nan
+        return cls(
+            dt_s=pairs[0][1].dt_s,
+            by_horizon=by_horizon,
+            current_a=[series.current_a for _, series, _ in pairs],
+            soc=[series.soc for _, series, _ in pairs],
+            inside=[_inside(model, series, rows, train) for model, series, rows in pairs],
+            excess=[run.excess for run in runs],
+            reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
+        )
+
+    def bands(self, alpha: float) -> FreeRunBands:
+        """Calibrated on these. Raises FitError where they are too few, or zero."""
+        return FreeRunBands.fit(
+            self.by_horizon,
+            self.dt_s,
+            self.current_a,
+            self.soc,
+            alpha=alpha,
+            inside=self.inside,
+            excess=self.excess,
+        )
+
+
+def error_ahead(model: ErrorModel, series: ErrorSeries, horizon_s: float) -> Array:
+    """(n,) V left by predictions from a measurement `horizon_s` earlier; NaN where there is none so early."""
+    steps = _steps(series, horizon_s)
+    left = series.error_v - model.k_step(series, steps)
+    left[:steps] = np.nan
+    return left
+
+
+def reach(model: ErrorModel, series: ErrorSeries, horizon_s: float = WHOLE_DRIVE) -> Array:
+    """(n,) V, how far predictions that far ahead would move if the model went on beyond its trained range; zero for
+    models that hold nothing at an edge."""
+    if not isinstance(model, SparseModel):
+        return np.zeros(len(series))
+    return model.reach(series, None if horizon_s == WHOLE_DRIVE else _steps(series, horizon_s))
+
+
+def error_of_free_run(series: ErrorSeries, run: FreeRun) -> Array:
+    """(n,) V left by a free run from the first sample; NaN from a divergence on."""
+    left = series.error_v - run.error_v
+    if run.diverged_at is not None:
+        left[run.diverged_at :] = np.nan
+    return left
+
+
+def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence[ErrorSeries]) -> BoolArray:
+    """(n,) True where the model had been trained on such inputs.
+
+    The models behind left-out pieces share the scaling of the whole training set and cannot tell by themselves:
+    for a piece of a training record, the range is that of the training rows outside it. Physics extrapolates as it
+    does in use, and so does a correction that fades into it: all of their rows count.
+    """
+    faded = isinstance(model, SparseModel) and model.fade is not None
+    if faded or isinstance(model, Bare | Persistence):
+        return np.ones(len(series), dtype=bool)
+    seen = [
+        record.inputs[_others(len(record), rows)] if record.name == series.name else record.inputs
+        for record in train
+    ]
+    low = np.min([rows.min(axis=0) for rows in seen if len(rows)], axis=0)
+    high = np.max([rows.max(axis=0) for rows in seen if len(rows)], axis=0)
+    return np.asarray(((series.inputs >= low) & (series.inputs <= high)).all(axis=1))
+
+
+def _steps(series: ErrorSeries, horizon_s: float) -> int:
+    return max(1, round(horizon_s / series.dt_s))
+
+
+def _others(n: int, rows: slice) -> BoolArray:
+    """(n,) True outside of `rows`."""
+    other = np.ones(n, dtype=bool)
+    other[rows] = False
+    return other

@@ -1,0 +1,105 @@
+"""Intervals for the models that will be judged, calibrated on records that they were not fitted to.
+
+Nothing here looks at `Split.test`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import overload
+
+import numpy as np
+
+from aesi.conformal import COMPARED, Calibrated, Method, RefittedForest, RefittedIntervals
+from aesi.errors import FitError
+from aesi.pipeline.experiment.candidate import method
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors, Unseen
+from aesi.records import HeldOutDrive
+from aesi.sparse import Candidate, Problem, SparseModel
+from aesi.sparse.search.fold_models import fold_models, with_leverage
+from aesi.sparse.yardsticks import Bare, Persistence
+
+SEARCHED = ("AESI I", "AESI II")
+
+
+def conformalise(
+    models: Sequence[Fitted],
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    left_out: Sequence[HeldOutDrive] = (),
+) -> tuple[Fitted, ...]:
+    """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
+
+    All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
+    also the training records.
+    left_out : training drives under physics fitted without a part of them; by default the drives as they are.
+    """
+    return tuple(_conformalised(one, problem, chosen, config, left_out) for one in models)
+
+
+def _conformalised(
+    one: Fitted,
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    left_out: Sequence[HeldOutDrive],
+) -> Fitted:
+    pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
+    if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
+        pairs += fold_models(problem, chosen, one.model, left_out)
+        one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
+    elif isinstance(one.model, Bare | Persistence):
+        pairs += [(one.model, each.series, each.rows) for each in left_out]
+        if not left_out:
+            pairs += [(one.model, series, WHOLE) for series in problem.split.train]
+    if not pairs:
+        return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
+    intervals, bands, notes = None, None, []
+    compared: dict[str, Calibrated | RefittedIntervals] = {}
+    try:
+        intervals = _intervals(pairs, config, method(config))
+    except FitError as error:
+        notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
+    for name in config.conformal.compare if one.model.name in SEARCHED else ():
+        try:
+            compared[name] = _intervals(pairs, config, COMPARED[name])
+        except FitError as error:
+            notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
+    try:
+        errors = HonestErrors.of(pairs, problem.split.train, config.conformal.horizons_s)
+        bands = errors.bands(config.conformal.alpha)
+        if any(band.extrapolated for band in bands.horizons):
+            notes.append(
+                f"The bands of {one.model.name} in free run are calibrated on too few pieces inside the trained "
+                "range, so rows outside of it were counted too; they are wide."
+            )
+    except FitError as error:
+        notes.append(f"{one.model.name} has no bands in free run: {error}")
+    return replace(one, intervals=intervals, bands=bands, compared=compared, notes=tuple(notes))
+
+
+@overload
+def _intervals(pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method) -> Calibrated: ...
+
+
+@overload
+def _intervals(
+    pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method | RefittedForest
+) -> Calibrated | RefittedIntervals: ...
+
+
+def _intervals(
+    pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method | RefittedForest
+) -> Calibrated | RefittedIntervals:
+    conformal = config.conformal
+    return chosen.fit(
+        [(series.error_v - model.one_step(series))[rows] for model, series, rows in pairs],
+        conformal.alpha,
+        conformal.window,
+        np.random.default_rng(config.seed),
+        current_a=[series.current_a[rows] for _, series, rows in pairs],
+    )
