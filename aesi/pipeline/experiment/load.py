@@ -24,7 +24,7 @@ from aesi.physics import ActiveEffect, Cell, initial_state, simulate
 from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
-from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models, without
+from aesi.pipeline.experiment.physics_models import DECLARED, PhysicsModels, no_rows, physics_models, without
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
@@ -159,9 +159,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     split = _split(config.data, series, sources.roles)
     refitted = config.cell.start == "recalibrated" and len(drives) > 1
     left_out = tuple(
-        HeldOutDrive(
-            _without(config, cell, effects, records, drive, rows, piece.name) if refitted else piece, rows
-        )
+        HeldOutDrive(_without(config, physics, records, drive, rows, piece.name) if refitted else piece, rows)
         for drive, piece in zip(drives, split.train, strict=True)
         for rows in _parts(len(piece), cuts(config.data))
     )
@@ -241,18 +239,20 @@ def _parts(n: int, count: int) -> list[slice]:
 
 def _without(
     config: ExperimentConfig,
-    cell: Cell,
-    effects: tuple[ActiveEffect, ...],
+    fitted: PhysicsModels,
     records: Mapping[str, FitRecord],
     drive: tuple[str, slice],
     part: slice,
     called: str,
 ) -> ErrorSeries:
-    """A training drive under physics that was fitted to all but a part of it."""
+    """A training drive under physics that was fitted to all but a part of it; `fitted` was fitted to that as well."""
     name, rows = drive
     unseen = slice(rows.start + part.start, rows.start + part.stop)
     others = without(records, name, unseen)
-    physics = physics_models(cell, effects, others, config.data.hold, config.cell.start)
+    declared = fitted.by_name[DECLARED]
+    physics = physics_models(
+        declared.cell, declared.effects, others, config.data.hold, config.cell.start, fitted
+    )
     series, _ = _series(physics, {name: records[name]}, config)
     return series[name].take(rows, called)
 

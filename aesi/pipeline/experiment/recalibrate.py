@@ -34,6 +34,7 @@ MEMORY_S = 100.0
 EVERY_S = 5.0
 """Rows closer than this say the same to the fit."""
 ROUNDS = 8
+ROUNDS_AGAIN = 3
 GAIN = 0.05
 STEP = 0.05
 """Of a difference quotient, in deviations."""
@@ -86,12 +87,16 @@ class FitRecord:
 
 @dataclass(frozen=True)
 class PhysicsStart:
-    """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell."""
+    """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
+
+    deviations : of the knobs that were free, where the fit ended.
+    """
 
     declared: Cell
     cell: Cell
     effects: tuple[ActiveEffect, ...] = ()
     shift: float = 0.0
+    deviations: tuple[float, ...] = ()
 
     def soc0(self, soc0: float) -> float:
         """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""
@@ -117,9 +122,11 @@ def recalibrate(
     records: Mapping[str, FitRecord],
     hold: Hold,
     free: Sequence[int] = ALL,
+    begin: PhysicsStart | None = None,
 ) -> PhysicsStart:
     """The declared physics with the free knobs where the rows of the records, and what was known of them, want them.
 
+    begin : a fit of the same knobs to nearly the same rows, from which few rounds are enough.
     Where no row may be looked at, or nothing can be simulated, it is the declared one.
     """
     fit = _Fit(
@@ -128,7 +135,9 @@ def recalibrate(
     if not fit.records:
         return fit.physics(np.zeros(len(free)))
     low, high = fit.bounds()
-    found = descend(fit.linearised, fit.cost, np.zeros(len(free)), low, high, ROUNDS, GAIN)
+    first = np.array(begin.deviations) if begin and begin.deviations else np.zeros(len(free))
+    rounds = ROUNDS if begin is None else ROUNDS_AGAIN
+    found = descend(fit.linearised, fit.cost, first, low, high, rounds, GAIN)
     return fit.physics(found.x if np.isfinite(found.cost) else np.zeros(len(free)))
 
 
@@ -159,7 +168,8 @@ class _Fit:
         volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
         cell = model_with(self.declared, _activated(values)).cell
         ohm = self.declared.contact_resistance_ohm + volts_at_1c / self.declared.nominal_capacity_ah
-        return PhysicsStart(self.declared, replace(cell, contact_resistance_ohm=ohm), self.effects, shift)
+        cell = replace(cell, contact_resistance_ohm=ohm)
+        return PhysicsStart(self.declared, cell, self.effects, shift, tuple(z.tolist()))
 
     def cost(self, z: Array) -> float:
         left = self._left(z)
