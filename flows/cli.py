@@ -14,7 +14,7 @@ import typer
 from aesi.errors import AesiError
 from flows.base import environment
 from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt
-from flows.commands import bench, cell, data, effects, experiment
+from flows.commands import batch, bench, cell, data, effects, experiment
 
 app = typer.Typer(
     name="aesi",
@@ -31,6 +31,7 @@ app.command("calibrate", short_help="Fit the physics model's own parameters.")(c
 app.command("simulate")(cell.simulate)
 app.command("impedance", short_help="The model's impedance at rest.")(cell.impedance)
 app.command("predict")(cell.predict)
+app.command("batch", short_help="One discovery a cell, for many cells.")(batch.batch)
 app.command("export", short_help="A cell and what was found, as BPX or for PyBaMM.")(cell.export)
 app.command("tables", short_help="The paper's tables, from tracked runs alone.")(experiment.tables)
 app.command("effects", short_help="The catalogue of effects.")(effects.effects)
@@ -38,7 +39,7 @@ app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")
 app.command("worker", short_help="One more process on a shared study.")(experiment.worker)
 app.command("compare", short_help="Tracked runs side by side on one page.")(experiment.compare)
 app.command("candidate", short_help="A tracked candidate made again, with its model.")(experiment.candidate)
-app.command("ui")(experiment.ui)
+app.command("ui", short_help="MLflow, Optuna or Prefect in a browser.")(experiment.ui)
 app.command("bench", short_help="Time the project against its peers.")(bench.bench)
 
 

@@ -22,7 +22,7 @@ def simulate(
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
-    model: options.ModelOption = "espm",
+    model: options.ModelOption = None,
     self_heating: options.SelfHeating = False,
 ) -> None:
     """The physics model alone, under a current profile."""
@@ -181,6 +181,15 @@ def discover(
     seed: Annotated[int, typer.Option(min=0)] = 0,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only", help="Try this effect alone; may be repeated. What else it stands for is held."
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None, typer.Option("--without", help="Leave this effect out; may be repeated.")
+    ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="key=value laid over the experiment file.")
     ] = None,
@@ -210,6 +219,8 @@ def discover(
         seed,
         effect_file or [],
         hold,
+        only or [],
+        without or [],
     )
     options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
     flow(case, out, prefect)

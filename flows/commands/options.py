@@ -45,10 +45,8 @@ SelfHeating = Annotated[
 ]
 
 ModelOption = Annotated[
-    Literal["espm", "dfn"],
-    typer.Option(
-        "--model", help="Single particle with electrolyte, or porous electrode (Doyle-Fuller-Newman)."
-    ),
+    Literal["espm", "dfn"] | None,
+    typer.Option("--model", help="Single particle (espm, the default) or porous electrode (dfn)."),
 ]
 
 PrefectOption = Annotated[

@@ -6,11 +6,10 @@ cell and data -> hypotheses -> verdict -> discovery.json, report, model
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.physics.effects import known_effects
 from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, run_case, write_discovery
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
@@ -29,7 +28,7 @@ EXPERIMENT = "discover"
 def check(case: Case) -> None:
     """Raise AesiError, one sentence, for a cell or an effect file that cannot be used."""
     declared_model(case.cell)
-    known_effects(case.effect_files)
+    case.tried()
 
 
 def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, str]:
@@ -135,6 +134,8 @@ def _track_result(
 ) -> None:
     if tracker is None:
         return
+    from aesi.pipeline.report.sizes import finding_line
+
     tracker.parameters(
         {
             "cell": found.cell.name,
@@ -146,7 +147,11 @@ def _track_result(
             "max_effects": case.max_effects,
             "seed": case.seed,
         },
-        {"verdict": content["verdict"], "effects": ", ".join(content["effects"])},
+        {
+            "verdict": content["verdict"],
+            "effects": ", ".join(content["effects"]),
+            "finding": finding_line(content),
+        },
     )
     states = ("before", "recalibrated", "after")
     errors = {
@@ -164,22 +169,25 @@ def _track_result(
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
-    from aesi.pipeline.report.words import confidence, reason_finding
+    from aesi.pipeline.report.sizes import finding_line
+    from aesi.pipeline.report.words import name_confidence, reason_finding
 
-    rest = {"none": "nothing to add", "unknown": "something that no effect of the catalogue explains"}
-    said = [*content["effects"], *([rest[content["verdict"]]] if content["verdict"] in rest else [])]
-    console.say(f"{content['verdict']} ({confidence(content)}): {', '.join(said)}")
+    console.say(finding_line(content) + name_confidence(content))
+    for warning in content["warnings"]:
+        console.say(f"  WARNING: {warning}")
     console.say(f"  {reason_finding(content)}")
-    for note in together(notes):
-        console.say(f"  {note}")
     for group in content["indistinguishable"]:
         console.say(f"  these data cannot tell apart: {', '.join(group)}")
-    rmse: Callable[[str, str], float] = lambda state, part: content[state][part]["rmse_mv"]  # noqa: E731
     for part in ("fit", "test"):
-        if content["after"].get(part):
-            values = [rmse(state, part) for state in ("before", "recalibrated", "after")]
-            before, own, after = values
-            console.say(
-                f"  {part}: {before:.2f} mV as declared, {own:.2f} mV recalibrated, {after:.2f} mV after"
-            )
+        if content["before"].get(part):
+            console.say(f"  {part}: {_errors_of(content, part)}")
+    for note in together(notes):
+        console.say(f"  {note}")
     console.say(f"Finished in {duration(time.monotonic() - started)}. Report: {out / 'report.html'}")
+
+
+def _errors_of(content: dict[str, Any], part: str) -> str:
+    """The errors of one part; that of `after` only where something was added."""
+    words = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding added"}
+    shown = list(words) if content["effects"] else ["before", "recalibrated"]
+    return ", ".join(f"{content[state][part]['rmse_mv']:.2f} mV {words[state]}" for state in shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
@@ -92,6 +93,8 @@ def discover_experiment(
 def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], use_prefect: bool) -> T:
     """Under Prefect where it is wanted, and its own temporary server starts."""
     if use_prefect:
+        if not os.environ.get("PREFECT_API_URL"):  # said at once: on a busy machine it takes half a minute
+            Console().say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
         environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
         try:
             with server_in_reach():
