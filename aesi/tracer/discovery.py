@@ -171,7 +171,6 @@ def _told(
     declared = ModelState(problem)
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
-    kinds = {name: str(effect.kind) for name, effect in problem.effects.items()}
     cell, model_effects, soc0 = evidence.after.settled()
 
     def test_error(one: Explanation) -> float:
@@ -189,7 +188,7 @@ def _told(
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,
-        experiments=tuple((g, experiment(g, kinds)) for g in verdict.groups),
+        experiments=tuple((g, experiment(g, problem.effects)) for g in verdict.groups),
         notes=_notes(evidence, tested),
         warnings=_warnings(files),
         seconds=seconds,
