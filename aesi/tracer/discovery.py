@@ -204,6 +204,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, .
             "the declared porous electrode moves the voltage by more than a tenth of the noise against the single "
             "particle, and every hypothesis could use it."
         )
+    notes += evidence.limits
     if evidence.fault is not None:
         notes.append(f"not adopted: {evidence.fault}.")
     return tuple(dict.fromkeys(notes))

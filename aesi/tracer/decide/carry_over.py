@@ -24,8 +24,9 @@ SEEN_SHARE = 2.0 / 3.0
 """Of a single record, in time: what is fitted where no other record can be left out."""
 WORSE = 1.05
 """A hypothesis may leave so much more than the better of the declared and the recalibrated model on a part left out."""
-RATES_C = (1.0, 2.0, 3.0)
-CHARGE_C = -0.5
+ORDINARY_C = (1.0, -0.5)
+FAST_C = (2.0, 3.0)
+"""Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
 STEP_S = 10.0
 
 
@@ -93,12 +94,12 @@ def _refitted(part: InverseProblem, one: Explanation) -> ModelState | None:
     return None if fit is None else ModelState.of(part, fit)
 
 
-def range_fault(state: ModelState) -> str | None:
-    """Why the model cannot be simulated over the range that the cell declares, although the declared model can: a full
-    discharge at several rates and a charge, at the temperatures of the records; None where it can."""
+def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAST_C)) -> str | None:
+    """Why the model cannot be simulated over the range that the cell declares, although the declared model can: full
+    discharges and charges at these rates, at the temperatures of the records; None where it can."""
     declared = ModelState(state.problem)
     for temperature in _temperatures(state.problem):
-        for rate in (*RATES_C, CHARGE_C):
+        for rate in rates_c:
             fault = _fault(state, rate, temperature)
             if fault is not None and _fault(declared, rate, temperature) is None:
                 return fault
