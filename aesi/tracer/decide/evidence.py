@@ -159,13 +159,13 @@ def _best_carried(
 ) -> Evidence:
     """Nothing explains the data: the model that leaves least on parts left out, and that can be simulated over the
     declared range, no worse on any of them than the declared and the recalibrated one."""
-    declared = Option(ModelState(path.problem), left_out_errors(path.problem, None), None)
+    declared = Option(ModelState(path.problem), left_out_errors(path.problem, path.blocks, None), None)
     basic = [declared]
     other = declared.state
     if recalibrated is not None:
         problem, fit = recalibrated
         other = ModelState.of(problem, fit)
-        basic.append(Option(other, left_out_errors(problem, fit), fit))
+        basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
     tried: list[tuple[InverseProblem, FittedHypothesis]] = [
         (path.problem, path.base),
         (path.problem, path.chosen),
@@ -173,7 +173,7 @@ def _best_carried(
     if loose is not None:
         tried.append((loose.problem, loose.chosen))
     more = [
-        Option(ModelState.of(problem, fit), left_out_errors(problem, fit), fit)
+        Option(ModelState.of(problem, fit), left_out_errors(problem, path.blocks, fit), fit)
         for problem, fit in dict.fromkeys(tried)
         if recalibrated is None or fit is not recalibrated[1]
     ]
