@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from aesi.data import read_measurement
-    from aesi.physics import Cell, simulate
+    from aesi.physics import Cell, impedance, simulate
     from aesi.pipeline.api import calibrate, discover
     from aesi.pipeline.cross_check import cross_check
     from aesi.pipeline.product.hybrid import HybridModel
@@ -30,6 +30,7 @@ __version__ = "0.1.0"
 _HOME = {
     "Cell": "aesi.physics",
     "simulate": "aesi.physics",
+    "impedance": "aesi.physics",
     "read_measurement": "aesi.data",
     "Measurement": "aesi.records",
     "HybridModel": "aesi.pipeline.product.hybrid",
@@ -45,6 +46,7 @@ __all__ = [
     "calibrate",
     "cross_check",
     "discover",
+    "impedance",
     "read_measurement",
     "simulate",
 ]

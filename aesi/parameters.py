@@ -11,7 +11,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.errors import ParameterError
-from aesi.numerics.typing import Array
 
 
 @dataclass(frozen=True)
@@ -108,13 +107,3 @@ def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) ->
                 f"unknown parameter {name!r}{hint} Known: {', '.join(parameters) or 'none'}."
             )
     return {name: p.check(name, float(values.get(name, p.default))) for name, p in parameters.items()}
-
-
-def to_vector(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> Array:
-    """Values as a vector in [0, 1]^n, in declaration order."""
-    return np.array([p.to_unit_interval(values[name]) for name, p in parameters.items()])
-
-
-def from_vector(parameters: Mapping[str, Parameter], vector: Array) -> dict[str, float]:
-    """Inverse of `to_vector`."""
-    return {n: p.from_unit_interval(float(u)) for (n, p), u in zip(parameters.items(), vector, strict=True)}

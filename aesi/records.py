@@ -6,13 +6,14 @@ SI units and seconds; current is positive on discharge; voltage error e = V_meas
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, Protocol
 
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import Array, BoolArray, ComplexArray
 from aesi.over_time import over_time, time_unit
 
 if TYPE_CHECKING:
@@ -136,6 +137,23 @@ class Measurement:
 
 
 @dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One impedance spectrum of a cell at rest.
+
+    frequency_hz : (n,) Hz.  z_ohm : (n,) ohm, the imaginary part negative where capacitive.
+    soc or discharged_ah (since full) : the state.  temperature_degc, voltage_v : None where not measured.
+    """
+
+    name: str
+    frequency_hz: Array
+    z_ohm: ComplexArray
+    soc: float | None = None
+    discharged_ah: float | None = None
+    voltage_v: float | None = None
+    temperature_degc: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class Run:
     """One simulation: voltage and the internal states, a value a sample.
 
@@ -187,6 +205,7 @@ class ErrorSeries:
 
     error_v : (n,) V, V_measured - V_model.  inputs : (n, n_inputs) SI, columns `input_names`.
     soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
+    physics : name -> (n,) V, what other physics models say of the same record, for comparison.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -198,6 +217,7 @@ class ErrorSeries:
     soc: Array
     model_v: Array
     input_names: tuple[str, ...] = INPUT_NAMES
+    physics: Mapping[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.error_v)
@@ -225,11 +245,28 @@ class ErrorSeries:
             inputs=self.inputs[rows],
             soc=self.soc[rows],
             model_v=self.model_v[rows],
+            physics={name: voltage[rows] for name, voltage in self.physics.items()},
         )
+
+    def left_by(self, name: str) -> Array:
+        """(n,) V: measured minus what the named physics model says; of the model itself where nothing else is known."""
+        other = self.physics.get(name)
+        return self.error_v if other is None else self.error_v + self.model_v - other
 
 
 Role = Literal["train", "valid", "test"]
 ROLES: tuple[Role, ...] = ("train", "valid", "test")
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutDrive:
+    """A training record under physics that was fitted without some of its samples.
+
+    rows : these samples.
+    """
+
+    series: ErrorSeries
+    rows: slice
 
 
 @dataclass(frozen=True)

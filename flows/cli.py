@@ -14,7 +14,7 @@ import typer
 from aesi.errors import AesiError
 from flows.base import environment
 from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt
-from flows.commands import bench, cell, data, effects, experiment
+from flows.commands import batch, bench, cell, data, effects, experiment
 
 app = typer.Typer(
     name="aesi",
@@ -29,7 +29,9 @@ app.command("run", short_help="A whole experiment, to its tables and report.")(e
 app.command("discover", short_help="Find what physics a model lacks, and add it.")(cell.discover)
 app.command("calibrate", short_help="Fit the physics model's own parameters.")(cell.calibrate)
 app.command("simulate")(cell.simulate)
+app.command("impedance", short_help="The model's impedance at rest.")(cell.impedance)
 app.command("predict")(cell.predict)
+app.command("batch", short_help="One discovery a cell, for many cells.")(batch.batch)
 app.command("export", short_help="A cell and what was found, as BPX or for PyBaMM.")(cell.export)
 app.command("tables", short_help="The paper's tables, from tracked runs alone.")(experiment.tables)
 app.command("effects", short_help="The catalogue of effects.")(effects.effects)

@@ -4,9 +4,8 @@
 
 Given the past, e[k] is normal, so the oracle's band is phi e[k-1] -+ 1.645 s[k] at alpha = 0.1. Ours is
 calibration and replay of all test steps, compiled code loaded before. Times are processor seconds of one
-thread, so that a busy machine does not show in them. SPCI as published refits
-its forest at every step, so some steps are timed and scaled to all; so are MAPIE's, which is asked step by
-step as an online method is.
+thread, so that a busy machine does not show in them. SPCI as published refits its forest at every step, so
+some steps are timed and scaled to all; so are MAPIE's, which is asked step by step as an online method is.
 """
 
 from __future__ import annotations

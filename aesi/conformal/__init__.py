@@ -4,10 +4,12 @@ from aesi.conformal.free_run import WHOLE_DRIVE, FreeRunBands
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.calibrated import Calibrated, Stream
 from aesi.conformal.online.method import Method
-from aesi.conformal.registry import DEFAULT_METHOD, METHODS
+from aesi.conformal.refitted import RefittedForest, RefittedIntervals
+from aesi.conformal.registry import COMPARED, DEFAULT_METHOD, METHODS
 from aesi.conformal.saved import calibrated_from_dict
 
 __all__ = [
+    "COMPARED",
     "DEFAULT_METHOD",
     "METHODS",
     "WHOLE_DRIVE",
@@ -15,6 +17,8 @@ __all__ = [
     "FreeRunBands",
     "Intervals",
     "Method",
+    "RefittedForest",
+    "RefittedIntervals",
     "Stream",
     "calibrated_from_dict",
 ]

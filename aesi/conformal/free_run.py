@@ -1,28 +1,27 @@
-"""Bands for predictions without measured voltage, by how long ago the last measurement was.
+"""Prediction bands of a free run by horizon, the time since the last measured voltage: CV+ over pieces of drives.
 
-Errors of such predictions depend on each other for minutes, so samples are not what is counted: pieces are.
-Each piece i is scored by |error| / s_i, where the scale s_i follows current, state of charge and the distance from
-the fitted rows (`local_scale`) and is fitted to the other pieces. The half-width k h at a sample answers to all of
-them (CV+):
+Errors of a free run are autocorrelated over minutes, so the exchangeable unit is a piece of a drive and not a sample.
+The errors of piece i are normalised, |error| / s_i, by a scale that depends on current, state of charge and leverage
+(`local_scale`) and is fitted to the other pieces. The half-width k h at a sample solves
 
-    sum_i n_i [share of the scores of piece i with s_i score <= h]   =   (1 - alpha) sum_i n_i            (1)
-    k = t(1 - alpha / 2; m - 1) / z(1 - alpha / 2),     m the number of independent pieces                (2)
+    sum_i n_i [share of the normalised errors r of piece i with s_i r <= h]   =   (1 - alpha) sum_i n_i        (1)
+    k = t(1 - alpha / 2; m - 1) / z(1 - alpha / 2),     m the number of independent pieces                 (2)
 
-With one scale for all this is the quantile of |error|. Where the scales differ, a piece that its fellows had not
-foreseen counts with the scale that they gave it, not with one that it has widened itself.
+where s_i is taken at that sample: with one scale for all pieces, h is the 1 - alpha quantile of |error|. An atypical
+piece counts with the scale that the other pieces predict for it, so it cannot widen the band that it is judged by.
 Barber, Candès, Ramdas & Tibshirani, Ann. Statist. 49 (2021) 486, doi:10.1214/20-AOS1965.
 
-A quantile of few pieces is a quantile of those pieces; the next one is missed more often. (2) widens the band as
-Student's t does for a normal error whose size is known from m pieces. Errors a short time ahead forget each other
-within a piece: every FORGOTTEN horizons of it count as one.
+A quantile estimated from few pieces is exceeded too often by the next one. (2) widens the band as Student's t does for
+a normal error of unknown variance. At short horizons the errors within a piece are independent over much shorter times:
+every FORGOTTEN horizons of a piece count as one.
 
-Only rows inside the range that their model was trained on are counted. A model fitted without the first piece
-of a drive extrapolates there; the final model, asked inside its range, does not. Outside of it its inputs are held at
-the edge, and the band reaches as much farther as the prediction would move if the model went on from there.
+Only rows inside the range that their model was trained on are counted: a model fitted without the first piece of a
+drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
+band is wider by as much as the prediction would move if the model were extrapolated (`SparseModel.reach`).
 
-What this promises: about 1 - alpha on average over pieces that are exchangeable with those of the calibration.
-With few pieces the share covered on one drive scatters by many points about that average; the coverage of each
-left-out piece (`HorizonBand.by_piece`) shows by how many. Outside the trained range there is no promise.
+Coverage is about 1 - alpha on average over pieces exchangeable with those of the calibration. With few pieces the
+coverage of a single drive scatters by many points about that; `HorizonBand.by_piece`, the coverage of each left-out
+piece, shows by how many. Outside the trained range nothing is guaranteed.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@
 
 The error of a cell model grows with the current and towards the steep end of its discharge, and that of any
 regression with the excess x of its leverage, how far a sample lies from the fitted rows. Few terms on
-purpose: a free function of the state of charge follows the calibration drive and fails on the next one.
+purpose: a flexible function of the state of charge overfits the calibration drive and fails on the next one.
 s is the 1 - alpha quantile of |error|, by linear quantile regression; a term whose weight would be negative is
 left out, so that s does not turn negative where it extrapolates, and a floor keeps it positive.
 """
@@ -23,7 +23,7 @@ from aesi.numerics.typing import Array, SavedState
 LOW_SOC = 0.25
 MEMORY_S = 60.0
 RELATIVE_FLOOR = 0.1
-"""s stays above this share of the mean |error|: a scale near zero would promise a perfect model."""
+"""s stays above this share of the mean |error|: a scale near zero would claim a perfect model."""
 MOST_ROWS = 6000
 """Rows the regression looks at, evenly spread: neighbouring errors of a free run say nearly the same."""
 

@@ -6,6 +6,8 @@ import numpy as np
 
 from aesi.conformal.online.method import EnbPI, Method, SplitConformal
 from aesi.conformal.online.spci import SPCI
+from aesi.conformal.refitted import NAME as REFITTED
+from aesi.conformal.refitted import RefittedForest
 from aesi.conformal.regressors.boosted import BoostedQuantiles
 from aesi.conformal.regressors.forest import ForestQuantiles
 from aesi.conformal.regressors.linear import LinearQuantiles
@@ -17,7 +19,7 @@ RATE = 0.05
 """Of the adaptive step: fast enough to hold 85 % in every bin of current and charge on a measured drive, slow
 enough to stay within 5 % of the best score possible where that is known; `tests/statistical/` asserts both."""
 FOREST_ROWS = 10_000
-"""Rows that each tree of a forest sees: more widen the fit, not the forecast."""
+"""Rows that each tree of a forest sees: more take longer to fit and do not change the intervals."""
 
 
 def published_forest(task: FitTask) -> QuantileModel:
@@ -64,3 +66,6 @@ METHODS: dict[str, Method] = {
         SPCI(name="spci_boosted", rate=RATE, fitter=boosted, n_betas=1),
     )
 }
+
+COMPARED: dict[str, Method | RefittedForest] = {**METHODS, REFITTED: RefittedForest()}
+"""What the tables of a run may show: the methods, and the paper's forest refitted as it goes, replayed only."""

@@ -68,7 +68,6 @@ class Bench:
 
 TRAIN = ("udds", "hwfet", "us06", "wltc_3b", "udds", "hwfet", "us06")
 VALID = ("artemis_urban",)
-TEST = ("sc03", "japan_10_15", "nedc")
 LEAD_S = 12.0
 BEFORE_PULSE_S = 60.0
 PULSE_S = 20.0

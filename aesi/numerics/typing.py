@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
+ComplexArray = NDArray[np.complex128]
 AnyArray = NDArray[Any]
 
 SavedState = dict[str, Any]

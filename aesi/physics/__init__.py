@@ -2,6 +2,7 @@
 
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Contribution, Effect, Record, Trace
+from aesi.physics.impedance import impedance
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, simulate
@@ -16,6 +17,7 @@ __all__ = [
     "ModelName",
     "Record",
     "Trace",
+    "impedance",
     "initial_soc",
     "initial_state",
     "simulate",

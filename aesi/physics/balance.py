@@ -1,9 +1,8 @@
 """Electrode balance: stoichiometry windows after lithium or active material was lost.
 
-Full and empty are defined by the rest voltages of the declared windows, or by an electrode that is full or
-empty before they are reached. At both, the lithium in the two electrodes
-together is what is left of it. Active material goes with the lithium it holds, at a state of charge at which the loss
-leaves the stoichiometries where they are.
+Full and empty are defined by the rest voltages of the declared windows, or by an electrode that is full or empty
+before they are reached. In both states the two electrodes together hold the cyclable lithium that is left. Active
+material is lost with the lithium it holds, at a state of charge whose stoichiometries stay.
 Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
 """
 

@@ -180,7 +180,7 @@ class _Start:
         drops = [self._drop(first, self.current_a, before_s) for before_s in FLOWED_S]
         begun = first + drops[0]
         said = f"starts under {self.current_a:.3g} A at {self.record.voltage_v[0]:.3f} V"
-        if self._charged(begun):
+        if self._charged(begun, drops[0]):
             return self._full(begun, f"{said}, at rest {begun:.3f} V", None)
         typical_a = HISTORY_C_RATE * self.cell.capacity_ah
         history_v = self._drop(begun, typical_a, FLOWED_S[-1]) - self._drop(begun, typical_a, 0.0)
@@ -202,8 +202,10 @@ class _Start:
         )
         return InitialState(self._declared(soc), sd, "load", words)
 
-    def _charged(self, voltage_v: float) -> bool:
-        return voltage_v >= self.cell.upper_voltage_v - CHARGED_V and voltage_v <= self._highest() + BEYOND_V
+    def _charged(self, voltage_v: float, drop_v: float = 0.0) -> bool:
+        """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""
+        as_read = voltage_v - max(drop_v, 0.0)
+        return voltage_v >= self.cell.upper_voltage_v - CHARGED_V and as_read <= self._highest() + BEYOND_V
 
     def _highest(self) -> float:
         return max(float(self.ocv[-1]), self.cell.upper_voltage_v)

@@ -8,6 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Constant
 
@@ -31,8 +34,7 @@ class Plating:
 class Interface:
     """What happens at the particles of one electrode, beyond what the cell file says.
 
-    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per
-    reactive area.
+    transfer_coefficient : of delithiation, one half where symmetric.  double_layer_f_m2 : capacity per reactive area.
     bins : (share of the reactive area, radius over the declared radius), one pair a particle size.
     """
 
@@ -96,3 +98,22 @@ class EspmModel:
             and self.heat is None
             and all(isinstance(d, Constant) for d in solids)
         )
+
+
+def activation_energies(cell: Cell) -> Array:
+    """(7,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, films."""
+    n, p, e = cell.negative, cell.positive, cell.electrolyte
+    return np.array(
+        [
+            n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, cell.film_ea_j_mol,
+        ]
+    )  # fmt: skip
+
+
+def heat_numbers(model: EspmModel) -> Array:
+    """(3,) heat capacity J/K (0 for none), conductance W/K, surroundings K."""
+    if model.heat is None:
+        return np.zeros(3)
+    balance = model.heat
+    return np.array([balance.heat_capacity_j_k, balance.conductance_w_k, model.cell.ambient_temperature_k])

@@ -18,6 +18,7 @@ import numpy as np
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array
+from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
@@ -28,8 +29,6 @@ from aesi.records import Hold, Run
 
 ModelName = Literal["espm", "dfn"]
 OnDepletion = Literal["raise", "clip"]
-NO_SOLUTION = 4
-LAYERS = {1: "negative electrode", 2: "positive electrode"}
 
 
 def simulate(
@@ -53,8 +52,7 @@ def simulate(
     effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
     temperature_degc : (n,) or one value: the cell's measured temperature; None leaves it to the cell file's
     initial temperature, or to the heat balance where an effect brings one.
-    hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row
-    before.
+    hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row before.
     on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
     "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
     at 10 V per unit of stoichiometry, every value stays finite, and `series["depleted"]` is 1 from the first
@@ -87,7 +85,10 @@ def simulate(
     series = _series(changed.cell, rows, time) | extra
     if fault_at >= 0:
         if on_depletion == "raise":
-            raise SimulationError(_depletion(cell, time, fault_at, fault))
+            kelvin = float(extra["temperature_k"][fault_at])
+            raise SimulationError(
+                depletion.sentence(changed, time, record.current_a, kelvin, rows, fault_at, fault)
+            )
         series["depleted"] = (np.arange(len(time)) >= fault_at).astype(float)
     elif on_depletion == "clip":
         series["depleted"] = np.zeros(len(time))
@@ -225,19 +226,6 @@ def _soc_from_rest(model: EspmModel, effects: Sequence[ActiveEffect], rest_volta
             trace = Trace(model, one, one, np.array([rest_voltage_v]), {})
             true = true - (active.effect.on_reading(trace, **active.parameters) - rest_voltage_v)
     return initial_soc(model.cell, float(true[0]))
-
-
-def _depletion(cell: Cell, time: Array, at: int, fault: int) -> str:
-    if fault in LAYERS:
-        what = f"the surface of the {LAYERS[fault]} left the stoichiometry range [0, 1]"
-    elif fault == NO_SOLUTION:
-        what = "no reaction was found that carries the current"
-    else:
-        what = "the electrolyte ran out of salt"
-    return (
-        f"{cell.name}: {what} at {time[at]:.6g} s (row {at}); the record asks for more charge than the cell "
-        'has: check soc0, capacity and the sign of the current, or use on_depletion="clip".'
-    )
 
 
 def _series(cell: Cell, rows: Array, time: Array) -> dict[str, Array]:

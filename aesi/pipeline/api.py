@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 
+from aesi.calibration import Calibration
+from aesi.calibration import calibrate as fit_cell
+from aesi.calibration.start import sized
 from aesi.data.read import Reading, read
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.discovery.cases import MOST_ROWS
@@ -13,8 +16,6 @@ from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
 from aesi.pipeline.product.declared import Declared, declared_model
 from aesi.records import Hold, Measurement
-from aesi.tracer.calibrate import Calibration
-from aesi.tracer.calibrate import calibrate as fit_cell
 from aesi.tracer.discovery import Progress
 
 FileOrRecord = str | PathLike[str] | Measurement
@@ -61,16 +62,23 @@ def discover(
 
 
 def calibrate(
-    cell: Declared, data: Data, *, soc0: float | None = None, seed: int = 0, hold: Hold | None = None
+    cell: Declared,
+    data: Data,
+    *,
+    soc0: float | None = None,
+    temperatures_degc: Mapping[str, float] | None = None,
+    hold: Hold | None = None,
 ) -> Calibration:
     """Fit the parameters that a cell's file declares to measurements; the fitted cell is `.cell` of what comes back.
 
-    cell, data, soc0, hold : as for `discover`.  Raises AesiError, one sentence, for what cannot be used.
+    cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
+    temperatures_degc : of records without a temperature column, by name.
+    Raises AesiError, one sentence, for what cannot be used.
     """
     declared = declared_model(cell).cell
     measurements = [_read(one, None, hold) for one in _listed(data)]
-    check_belongs(declared, measurements)
-    return fit_cell(declared, measurements, soc0=soc0, seed=seed)
+    check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    return fit_cell(declared, measurements, soc0=soc0, temperatures_degc=temperatures_degc)
 
 
 def _listed(records: Data) -> list[FileOrRecord]:

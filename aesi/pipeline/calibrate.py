@@ -3,81 +3,182 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from aesi.calibration import Calibration, calibrate
+from aesi.calibration.posterior import PosteriorSamples, sampled
+from aesi.calibration.start import sized
 from aesi.pipeline.belonging import check_belongs
+from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import Measurement
-from aesi.tracer.calibrate import Calibration, calibrate
+from aesi.records import Measurement, Spectrum
 
-SCHEMA = "aesi.calibration/1"
+SCHEMA = "aesi.calibration/2"
 MV = 1e3
 
 
+@dataclass(frozen=True)
+class Request:
+    """What a calibration is asked for beside its records: see `aesi.calibration.calibrate`.
+
+    temperatures_degc : by record name.  impedance : spectra to hold the result against.  posterior : steps of each
+    walker, 0 for none.  title : name of the cell that is written.
+    """
+
+    soc0: float | None = None
+    temperatures_degc: Mapping[str, float] | None = None
+    impedance: tuple[Spectrum, ...] = ()
+    posterior: int = 0
+    seed: int = 0
+    title: str | None = None
+
+
 def calibrate_files(
-    cell: Path, measurements: Sequence[Measurement], out: Path, soc0: float | None = None, seed: int = 0
+    cell: Path, measurements: Sequence[Measurement], out: Path, request: Request | None = None
 ) -> dict[str, Any]:
     """Calibrate the cell of a BPX file; writes `out` (BPX) and the report beside it, and returns the report.
 
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
+    asked = request or Request()
     declared = declared_model(cell).cell
-    check_belongs(declared, measurements)
-    found = calibrate(declared, measurements, soc0=soc0, seed=seed)
-    content = to_json(found, [note for m in measurements for note in m.notes])
+    check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    found = calibrate(
+        declared,
+        measurements,
+        soc0=asked.soc0,
+        temperatures_degc=asked.temperatures_degc,
+    )
+    if asked.title is not None:
+        found = replace(found, cell=replace(found.cell, name=asked.title, description=_made_from(found)))
+    posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
+    spectra = held_against(found.cell, asked.impedance)
+    content = to_json(found, [note for m in measurements for note in m.notes], posterior, spectra)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
     report = out.with_suffix(".report.json")
     report.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     out.with_suffix(".report.md").write_text(to_text(content), encoding="utf-8")
+    if spectra:
+        from aesi.pipeline.report.nyquist import write_nyquist
+
+        write_nyquist(out.with_suffix(".nyquist.html"), found.cell.name, spectra)
     return content
 
 
-def to_json(found: Calibration, read: Sequence[str] = ()) -> dict[str, Any]:
+def _made_from(found: Calibration) -> str:
+    records = ", ".join(e.name for e in found.errors)
+    return f"Fitted by aesi calibrate to {records}, from {found.declared.name}."
+
+
+def to_json(
+    found: Calibration,
+    read: Sequence[str] = (),
+    posterior: PosteriorSamples | None = None,
+    spectra: Sequence[SpectrumError] = (),
+) -> dict[str, Any]:
     """The report: errors by file, parameters with intervals, what stays open.
 
     read : what a reader dropped, mapped or averaged in the files.
     """
+    sampled_notes = () if posterior is None else (posterior.sentence,)
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
         "files": [
-            {"name": f.name, "before_rmse_mv": MV * f.before_v, "after_rmse_mv": MV * f.after_v}
-            for f in found.files
+            {
+                "name": e.name,
+                "temperature_degc": e.temperature_degc,
+                "before_rmse_mv": MV * e.before_v,
+                "after_rmse_mv": MV * e.after_v,
+                "capacity_share": found.capacities[e.name],
+            }
+            for e in found.errors
         ],
         "parameters": {
-            name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
+            name: {
+                "value": p.value, "low": p.low, "high": p.high, "unit": p.unit, "prior_from": p.source,
+                **_of_posterior(posterior, name),
+            }
             for name, p in found.parameters.items()
         },
         "capacity_ah": found.cell.capacity_ah,
         "declared_capacity_ah": found.declared.capacity_ah,
-        "undetermined": list(found.undetermined),
+        "undetermined": [
+            {"weights": dict(o.weights), "narrowed": o.narrowed, "sentence": o.sentence}
+            for o in found.undetermined
+        ],
+        "impedance": [
+            {
+                "name": s.measured.name,
+                "soc": s.soc,
+                "temperature_degc": s.measured.temperature_degc,
+                "rms_pct": 100.0 * s.off,
+                "band_hz": list(BAND_HZ),
+            }
+            for s in spectra
+        ],
         "at_bounds": list(found.at_bounds),
-        "notes": list(together((*read, *found.notes))),
+        "notes": list(together((*read, *found.notes, *sampled_notes))),
         "seconds": round(found.seconds, 2),
-    }
+    }  # fmt: skip
+
+
+def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:
+    if posterior is None:
+        return {}
+    interval = posterior.intervals[name]
+    return {"posterior_low": interval.low, "posterior_high": interval.high}
 
 
 def to_text(content: dict[str, Any]) -> str:
     """The report as Markdown."""
-    lines = [f"# Calibration of {content['cell']}", "", "| file | before, mV | after, mV |", "|---|---|---|"]
+    lines = [
+        f"# Calibration of {content['cell']}", "",
+        "| file | mean temperature, degC | before, mV | after, mV | capacity |", "|---|---|---|---|---|",
+    ]  # fmt: skip
     lines += [
-        f"| {f['name']} | {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} |" for f in content["files"]
+        f"| {f['name']} | {_number(f['temperature_degc'])} | {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} "
+        f"| {f['capacity_share']:.3f} |"
+        for f in content["files"]
     ]
-    lines += ["", "Errors are RMSE on the data that were fitted.", ""]
-    lines += ["| parameter | value | 95 % interval | unit |", "|---|---|---|---|"]
     lines += [
-        f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} |"
+        "",
+        "Errors are RMSE on the data that were fitted; the capacity is that of the record over the file's.",
+        "",
+    ]
+    lines += ["| parameter | value | 95 % interval | unit | prior from |", "|---|---|---|---|---|"]
+    lines += [
+        f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} | {p['prior_from']} |"
         for name, p in content["parameters"].items()
     ]
-    for title, key in (
-        ("Left open by these data", "undetermined"),
-        ("On a bound", "at_bounds"),
-        ("Notes", "notes"),
-    ):
-        if content[key]:
-            lines += ["", f"## {title}", "", *(f"- {text}" for text in content[key])]
+    if content["impedance"]:
+        low, high = BAND_HZ
+        lines += ["", f"## Impedance, {low:g} to {high:g} Hz, nothing fitted to it", ""]
+        lines += [
+            "| spectrum | state of charge | degC | root mean square of the error of abs(Z), % |",
+            "|---|---|---|---|",
+        ]
+        lines += [
+            f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {s['rms_pct']:.1f} |"
+            for s in content["impedance"]
+        ]
+    sections = (
+        ("Left open by these data", [o["sentence"] for o in content["undetermined"]]),
+        ("On a bound", content["at_bounds"]),
+        ("Notes", content["notes"]),
+    )
+    for title, texts in sections:
+        if texts:
+            lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
     return "\n".join(lines) + "\n"
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None or not np.isfinite(value) else f"{value:.1f}"

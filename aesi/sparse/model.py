@@ -1,13 +1,12 @@
 """The sparse model of the voltage error, e[k + 1] = Theta(e[k], U[k]) xi, the paper's equation (8).
 
-A model none of whose terms holds the error gives it by the inputs alone, g(U[k]). What it leaves dies away
-slowly, so a measured error still tells something about the next ones; `memory` is the share that is left
-after one step, and then
+A model without terms in the error predicts it from the inputs alone, g(U[k]). Its residual is autocorrelated, so a
+measured error improves the prediction of the next ones; `memory` is the lag-one autoregression coefficient of that
+residual, and then
 
     e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
 
-which is a feedback of gain `memory` < 1 over the whole range. (At the start of a record g(U[0]) stands for
-what came before.)
+which is stable, as memory < 1. (At the start of a record g(U[0]) stands for what came before.)
 
 It lives in scaled variables (scaling.py). Inputs outside the trained range are held at its edge and flagged
 in `FreeRun.outside`; a prediction ten times beyond the trained range of the error is a divergence. What the model
@@ -26,12 +25,13 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
+from aesi.sparse.fade import Fade
 from aesi.sparse.leverage import Leverage
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library, Term, evaluate_terms
 from aesi.sparse.terms.scaling import Scaling
 
-SCHEMA = "aesi.sparse_model/2"
+SCHEMA = "aesi.sparse_model/3"
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,7 @@ class SparseModel:
     inclusion : (m,) share of the ensemble's members that hold each term.
     low, high : (m,) 5th and 95th percentile of each coefficient over the ensemble's members.
     leverage : of the fit, where bands of a free run ask for it.
+    fade : how the correction gives way to the physics, of a model without terms in e; None where it does not.
     """
 
     name: str
@@ -56,6 +57,7 @@ class SparseModel:
     low: Array | None = None
     high: Array | None = None
     leverage: Leverage | None = None
+    fade: Fade | None = None
 
     def __repr__(self) -> str:
         return f"SparseModel({self.name!r}, {len(self.terms)} terms, step {self.dt_s:g} s)"
@@ -146,6 +148,7 @@ class SparseModel:
             "dt_s": self.dt_s,
             "memory": self.memory,
             "leverage": None if self.leverage is None else self.leverage.to_dict(),
+            "fade": None if self.fade is None else self.fade.to_dict(),
         } | {
             key: None if values is None else values.tolist()
             for key, values in (("inclusion", self.inclusion), ("low", self.low), ("high", self.high))
@@ -173,6 +176,7 @@ class SparseModel:
             float(data["memory"]),
             **optional,
             leverage=Leverage.from_dict(data["leverage"]) if data["leverage"] else None,
+            fade=Fade.from_dict(data["fade"]) if data["fade"] else None,
         )
 
     @property
@@ -224,9 +228,21 @@ class SparseModel:
         products = evaluate_terms(
             [term.without_error() for term in self.library.terms], self.scaling.apply(variables), further
         )
-        return np.stack(
+        drive = np.stack(
             [
                 self.coefficients[mine] @ products[mine]
                 for mine in (self.library.feedbacks == q for q in self._functions)
             ]
         )
+        return drive if self.fade is None else self._zero + self._weight(variables) * (drive - self._zero)
+
+    @property
+    def _zero(self) -> float:
+        """The scaled error at which the physics is exact."""
+        return float(self.scaling.error_to_scaled(np.array(0.0)))
+
+    def _weight(self, variables: Array) -> Array:
+        """(n,) what is left of the correction."""
+        assert self.fade is not None
+        unheld = self.scaling.apply(variables) + self.scaling.cut_off(variables)
+        return self.fade.weight(unheld[:, 1:], self._excess(variables))

@@ -1,4 +1,4 @@
-"""The two models that cost nothing, beside which every figure stands: no correction, and persistence."""
+"""The models that cost nothing, beside which every figure stands: physics without a correction, and persistence."""
 
 from __future__ import annotations
 
@@ -12,21 +12,24 @@ from aesi.records import ErrorSeries, FreeRun
 
 @dataclass(frozen=True)
 class Bare:
-    """The physics model as it is: the predicted error is zero."""
+    """A physics model as it is: what `ErrorSeries.physics` holds under its name, or else the model of the series."""
 
     name: str = "ESPM"
 
     def one_step(self, series: ErrorSeries) -> Array:
-        """(n,) V: zero, but for the first sample, which is the measured error_v[0]."""
-        return np.append(series.error_v[:1], np.zeros(len(series) - 1))
+        """(n,) V: no measured error helps it; the first sample is the measured error_v[0]."""
+        return self.k_step(series, 1)
 
     def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
-        """Zero throughout; it was trained on nothing, so no sample lies outside its range."""
-        return FreeRun(np.zeros(len(series)), None, np.zeros(len(series), dtype=bool))
+        """What it says beyond the model of the series; it knows no range, so no sample lies outside."""
+        return FreeRun(self._beyond(series), None, np.zeros(len(series), dtype=bool))
 
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
         """(n,) V, as `one_step`."""
-        return self.one_step(series)
+        return np.append(series.error_v[:1], self._beyond(series)[1:])
+
+    def _beyond(self, series: ErrorSeries) -> Array:
+        return series.error_v - series.left_by(self.name)
 
 
 @dataclass(frozen=True)

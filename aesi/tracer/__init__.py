@@ -1,6 +1,5 @@
-"""The loop closed on measured data: calibration, competing hypotheses, selection, verdict."""
+"""The loop closed on measured data: competing hypotheses, selection, verdict."""
 
-from aesi.tracer.calibrate import Calibration, calibrate
 from aesi.tracer.discovery import Discovery, discover
 
-__all__ = ["Calibration", "Discovery", "calibrate", "discover"]
+__all__ = ["Discovery", "discover"]

@@ -1,4 +1,4 @@
-"""Commands about one cell: simulate, predict, calibrate, discover."""
+"""Commands about one cell: simulate, predict, calibrate, impedance, discover."""
 
 from __future__ import annotations
 
@@ -81,14 +81,73 @@ def calibrate(
     data: Annotated[list[Path], typer.Option("--data", help="Measurement to fit; may be given again.")],
     out: Annotated[Path, typer.Option(help="BPX file to write; a report is written beside it.")],
     soc0: options.Soc0 = None,
-    seed: Annotated[int, typer.Option(min=0)] = 0,
+    temperature: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--temperature", help="FILE=DEGC, of a record without a temperature column; repeatable."
+        ),
+    ] = None,
     hold: options.HoldOption = None,
+    until: Annotated[
+        list[str] | None,
+        typer.Option("--until", help="FILE=SECONDS: read this record up to there; repeatable."),
+    ] = None,
+    impedance: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--impedance", help="Measured spectra to hold the result against; nothing is fitted to them."
+        ),
+    ] = None,
+    posterior: Annotated[
+        int,
+        typer.Option("--posterior", min=0, help="Samples of each walker to draw from the posterior (emcee)."),
+    ] = 0,
+    title: Annotated[str | None, typer.Option(help="Name of the cell in the file that is written.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the posterior's samples.")] = 0,
 ) -> None:
-    """Fit the physics model's own parameters to measurements."""
+    """Fit the physics model's own parameters to measurements of any temperatures together."""
     options.say_reading(data)
+    from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
 
-    flow(cell, options.measurements(data, reading, hold), out, soc0=soc0, seed=seed)
+    request = Request(
+        soc0=soc0,
+        temperatures_degc=options.by_file("--temperature", temperature),
+        impedance=options.spectra(impedance),
+        posterior=posterior,
+        seed=seed,
+        title=title,
+    )
+    records = options.measurements(data, reading, hold, options.by_file("--until", until))
+    flow(cell, records, out, request)
+
+
+def impedance(
+    cell: options.CellOption,
+    soc: Annotated[float, typer.Option(min=0.0, max=1.0, help="State of charge at rest.")],
+    frequencies: Annotated[
+        str, typer.Option(help="CSV with a column frequency_hz, or LOW:HIGH:N for N of them, log-spaced.")
+    ],
+    out: Annotated[Path, typer.Option(help="CSV to write: frequency_hz, z_real_ohm, z_imag_ohm.")],
+    temperature_degc: Annotated[float, typer.Option(help="Of the cell.")] = 25.0,
+    effect: options.Effects = None,
+    effect_file: options.EffectFiles = None,
+) -> None:
+    """The physics model in the frequency domain, at rest."""
+    from aesi.pipeline.impedance import impedance_file
+
+    z = impedance_file(
+        cell,
+        soc,
+        frequencies,
+        out,
+        temperature_degc,
+        [options.effect_values(text) for text in effect or []],
+        effect_file or [],
+    )
+    typer.echo(
+        f"{out}: {len(z):,} frequencies, {1e3 * z.real.min():.4g} to {1e3 * z.real.max():.4g} mOhm", err=True
+    )
 
 
 @options.reads_files
@@ -118,22 +177,32 @@ def discover(
     seed: Annotated[int, typer.Option(min=0)] = 0,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
+    only: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--only", help="Try this effect alone; may be repeated. What else it stands for is held."
+        ),
+    ] = None,
+    without: Annotated[
+        list[str] | None, typer.Option("--without", help="Leave this effect out; may be repeated.")
+    ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="key=value laid over the experiment file.")
     ] = None,
+    prefect: options.PrefectOption = True,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
     if experiment is not None:
         options.say_reading([experiment])
-        from flows.jobs.discovery import discover_experiment
+        from flows.jobs.start import discover_experiment
 
-        discover_experiment(str(experiment), list(overrides or []), out)
+        discover_experiment(str(experiment), list(overrides or []), out, prefect)
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
     options.say_reading([*data, *(test or [])])
     from aesi.pipeline.discovery.cases import case_of_files
-    from flows.jobs.discovery import discover as flow
+    from flows.jobs.start import discover as flow
 
     case = case_of_files(
         cell,
@@ -146,9 +215,11 @@ def discover(
         seed,
         effect_file or [],
         hold,
+        only or [],
+        without or [],
     )
     options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
-    flow(case, out)
+    flow(case, out, prefect)
 
 
 def export(

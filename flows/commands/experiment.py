@@ -7,6 +7,8 @@ from typing import Annotated, Literal
 
 import typer
 
+from flows.commands import options
+
 Experiment = Annotated[Path, typer.Argument(help="An experiment file, for instance experiments/smoke.yaml.")]
 Overrides = Annotated[
     list[str] | None, typer.Option("--set", help="key=value laid over the file: search.candidates=50.")
@@ -26,9 +28,7 @@ def run(
     cache: Annotated[
         bool, typer.Option("--cache/--no-cache", help="Use what was computed before from the same content.")
     ] = True,
-    prefect: Annotated[
-        bool, typer.Option("--prefect/--no-prefect", help="Run the stages as a Prefect flow.")
-    ] = True,
+    prefect: options.PrefectOption = True,
 ) -> None:
     """The whole flow: data, physics, search, ensembles, intervals, tables, figures, report."""
     from flows.jobs.start import start
@@ -107,11 +107,29 @@ def candidate(
 
 
 def ui(
-    port: Annotated[int, typer.Option(min=1, max=65535)] = 5000,
+    port: Annotated[
+        int | None,
+        typer.Option(min=1, max=65535, help="5000 without it; 8080 with --optuna, 4200 with --prefect."),
+    ] = None,
     host: Annotated[str, typer.Option(help="Loopback unless you say otherwise.")] = "127.0.0.1",
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+    optuna: Annotated[
+        bool, typer.Option("--optuna", help="Optuna's dashboard, also while a search runs.")
+    ] = False,
+    prefect: Annotated[
+        bool, typer.Option("--prefect", help="Prefect's server on the flow runs here.")
+    ] = False,
+    storage: Annotated[
+        str | None,
+        typer.Option(help="With --optuna: a database, as in runner.storage; else the workspace's journal."),
+    ] = None,
 ) -> None:
-    """The MLflow UI on the tracking store in use."""
-    from flows.results.ui import serve
+    """The MLflow UI on the tracking store in use, Optuna's dashboard on the searches, or Prefect on the flow runs."""
+    from flows.results.ui import serve, serve_flows, serve_studies
 
-    serve(port=port, host=host, uri=uri)
+    if prefect:
+        serve_flows(port=port or 4200, host=host)
+    elif optuna:
+        serve_studies(port=port or 8080, host=host, url=storage)
+    else:
+        serve(port=port or 5000, host=host, uri=uri)

@@ -13,7 +13,7 @@ from aesi.errors import InputError
 
 if TYPE_CHECKING:
     from aesi.data.reading import Reading
-    from aesi.records import Hold, Measurement
+    from aesi.records import Hold, Measurement, Spectrum
 
 CellOption = Annotated[
     Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
@@ -41,6 +41,11 @@ ModelOption = Annotated[
     typer.Option(
         "--model", help="Single particle with electrolyte, or porous electrode (Doyle-Fuller-Newman)."
     ),
+]
+
+PrefectOption = Annotated[
+    bool,
+    typer.Option("--prefect/--no-prefect", envvar="AESI_PREFECT", help="Run the stages as a Prefect flow."),
 ]
 
 _LIST = list[str] | None
@@ -138,11 +143,49 @@ def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
     return mapping
 
 
-def measurements(paths: list[Path], reading: Reading, hold: Hold | None = None) -> tuple[Measurement, ...]:
-    """The files as measurements, with how the current was declared to run between their rows."""
+def measurements(
+    paths: list[Path], reading: Reading, hold: Hold | None = None, until: dict[str, float] | None = None
+) -> tuple[Measurement, ...]:
+    """The files as measurements, with how the current was declared to run between their rows.
+
+    until : seconds up to which single records are read, by their names.
+    """
     from aesi.data.read import read
 
-    return tuple(read(path, reading).held(hold) for path in paths)
+    ends = dict(until or {})
+    out = []
+    for path in paths:
+        end = ends.pop(record_name(path), None)
+        out.append(read(path, reading if end is None else reading.but(stop_s=end)).held(hold))
+    if ends:
+        raise InputError(f"--until {next(iter(ends))}=...: no --data file has this name.")
+    return tuple(out)
+
+
+def record_name(path: str | Path) -> str:
+    """What a record of this file is called."""
+    return Path(path).name.split(".")[0]
+
+
+def by_file(option: str, pairs: list[str] | None) -> dict[str, float]:
+    """`FILE=NUMBER` pairs as numbers by record."""
+    out = {}
+    for pair in pairs or []:
+        file, equals, text = pair.rpartition("=")
+        try:
+            out[record_name(file)] = float(text)
+        except ValueError:
+            equals = ""
+        if not equals or not file:
+            raise InputError(f"{option} {pair}: has to read FILE=NUMBER.")
+    return out
+
+
+def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:
+    """The spectra of impedance files."""
+    from aesi.data import read_spectra
+
+    return tuple(spectrum for path in paths or [] for spectrum in read_spectra(path))
 
 
 def say_reading(paths: Iterable[Path]) -> None:

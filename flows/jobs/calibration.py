@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline.calibrate import calibrate_files
+from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.notes import together
 from aesi.records import Measurement
 from flows.base import environment
@@ -14,7 +14,7 @@ from flows.base.console import Console
 
 
 def calibrate(
-    cell: Path, measurements: Sequence[Measurement], out: Path, soc0: float | None = None, seed: int = 0
+    cell: Path, measurements: Sequence[Measurement], out: Path, request: Request | None = None
 ) -> dict[str, Any]:
     """Calibrate and say what came of it; returns the report."""
     environment.prepare()
@@ -23,12 +23,15 @@ def calibrate(
     read = together(note for m in measurements for note in m.notes)
     for note in read:
         console.say(note)
-    content = calibrate_files(cell, measurements, out, soc0, seed)
+    content = calibrate_files(cell, measurements, out, request)
     for row in content["files"]:
         console.say(
             f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after"
         )
-    for text in (*content["undetermined"], *(note for note in content["notes"] if note not in read)):
+    for row in content["impedance"]:
+        console.say(f"  {row['name']}, state of charge {row['soc']:.2f}: |Z| {row['rms_pct']:.0f} % off")
+    open_ones = [o["sentence"] for o in content["undetermined"]]
+    for text in (*open_ones, *(note for note in content["notes"] if note not in read)):
         console.say(f"  {text}")
     if content["at_bounds"]:
         console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")

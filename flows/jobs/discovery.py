@@ -5,13 +5,11 @@ cell and data -> hypotheses -> verdict -> discovery.json, report, model
 
 from __future__ import annotations
 
-import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.physics.effects import known_effects
 from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, run_case, write_discovery
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
@@ -21,35 +19,16 @@ from flows.base.console import Console, duration
 if TYPE_CHECKING:
     from aesi.tracer import Discovery
     from aesi.tracer.discovery import TriedHypothesis
+    from flows.jobs.stages import Stages
     from flows.tracking.tracker import Tracker
 
 EXPERIMENT = "discover"
 
 
-def discover(
-    case: Case, out: Path, use_prefect: bool | None = None, experiment: str = EXPERIMENT
-) -> dict[str, Any]:
-    """Trace one case and write the finding to `out`; returns the content of discovery.json.
-
-    use_prefect : run the stages as a Prefect flow; None does so where a server is configured (PREFECT_API_URL),
-    because a temporary one takes longer to start than most cases take to trace.
-    Raises AesiError, one sentence, for what cannot be used; nothing is started then.
-    """
-    environment.prepare()
+def check(case: Case) -> None:
+    """Raise AesiError, one sentence, for a cell or an effect file that cannot be used."""
     declared_model(case.cell)
-    known_effects(case.effect_files)
-    if use_prefect or (use_prefect is None and os.environ.get("PREFECT_API_URL")):
-        return _as_flow(case, out, experiment)
-    from flows.jobs.stages import plainly
-
-    console = Console()
-    return trace(case, out, plainly(console.say), console, experiment)
-
-
-def discover_experiment(path: str, overrides: Sequence[str] = (), out: Path | None = None) -> dict[str, Any]:
-    """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
-    case, folder, name = case_and_folder(path, overrides, out)
-    return discover(case, folder, experiment=name)
+    case.tried()
 
 
 def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, str]:
@@ -62,24 +41,7 @@ def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tu
     return case_of_experiment(config), folder, config.name
 
 
-def _as_flow(case: Case, out: Path, experiment: str) -> dict[str, Any]:
-    environment.make_prefect_home()
-    from prefect import flow
-
-    from flows.jobs.stages import as_tasks, server_in_reach
-
-    console = Console()
-
-    @flow(name="discover", flow_run_name=out.name, validate_parameters=False, persist_result=False)
-    def discovery() -> dict[str, Any]:
-        """Trace a residual to the physics that the declared model lacks."""
-        return trace(case, out, as_tasks(console.say), console, experiment)
-
-    with server_in_reach():
-        return discovery()
-
-
-def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) -> dict[str, Any]:
+def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str) -> dict[str, Any]:
     """The flow itself; `run` runs a stage."""
     started = time.monotonic()
     if (out / ARCHIVE).exists():
@@ -96,8 +58,26 @@ def trace(case: Case, out: Path, run: Any, console: Console, experiment: str) ->
             tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise
     _track_result(tracker, case, found, content, out)
+    run.publish("discovery", _page(content, out, tracker), "What the model lacks")
     _say(console, content, found.notes, out, started)
     return content
+
+
+def _page(content: dict[str, Any], out: Path, tracker: Tracker | None) -> str:
+    """The finding as Prefect shows it: verdict, errors, and where the rest is."""
+    from aesi.pipeline.report.words import reason_finding
+
+    states = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding"}
+    lines = [f"# {content['verdict']}: {', '.join(content['effects']) or 'nothing to add'}", ""]
+    lines += [reason_finding(content), "", "| model | fit, mV | test, mV |", "|---|---:|---:|"]
+    for state, words in states.items():
+        figures = [content[state].get(part, {}).get("rmse_mv") for part in ("fit", "test")]
+        shown = " | ".join("" if value is None else f"{value:.2f}" for value in figures)
+        lines.append(f"| {words} | {shown} |")
+    lines += ["", f"Report: `{out / 'report.html'}`", ""]
+    if tracker is not None:
+        lines.append(f"Tracked: [{tracker.run_id}]({tracker.address})")
+    return "\n".join(lines)
 
 
 class Follow:
@@ -154,6 +134,8 @@ def _track_result(
 ) -> None:
     if tracker is None:
         return
+    from aesi.pipeline.report.sizes import finding_line
+
     tracker.parameters(
         {
             "cell": found.cell.name,
@@ -165,7 +147,11 @@ def _track_result(
             "max_effects": case.max_effects,
             "seed": case.seed,
         },
-        {"verdict": content["verdict"], "effects": ", ".join(content["effects"])},
+        {
+            "verdict": content["verdict"],
+            "effects": ", ".join(content["effects"]),
+            "finding": finding_line(content),
+        },
     )
     states = ("before", "recalibrated", "after")
     errors = {
@@ -183,22 +169,25 @@ def _track_result(
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
-    from aesi.pipeline.report.words import confidence, reason_finding
+    from aesi.pipeline.report.sizes import finding_line
+    from aesi.pipeline.report.words import name_confidence, reason_finding
 
-    rest = {"none": "nothing to add", "unknown": "something that no effect of the catalogue explains"}
-    said = [*content["effects"], *([rest[content["verdict"]]] if content["verdict"] in rest else [])]
-    console.say(f"{content['verdict']} ({confidence(content)}): {', '.join(said)}")
+    console.say(finding_line(content) + name_confidence(content))
+    for warning in content["warnings"]:
+        console.say(f"  WARNING: {warning}")
     console.say(f"  {reason_finding(content)}")
-    for note in together(notes):
-        console.say(f"  {note}")
     for group in content["indistinguishable"]:
         console.say(f"  these data cannot tell apart: {', '.join(group)}")
-    rmse: Callable[[str, str], float] = lambda state, part: content[state][part]["rmse_mv"]  # noqa: E731
     for part in ("fit", "test"):
-        if content["after"].get(part):
-            values = [rmse(state, part) for state in ("before", "recalibrated", "after")]
-            before, own, after = values
-            console.say(
-                f"  {part}: {before:.2f} mV as declared, {own:.2f} mV recalibrated, {after:.2f} mV after"
-            )
+        if content["before"].get(part):
+            console.say(f"  {part}: {_errors_of(content, part)}")
+    for note in together(notes):
+        console.say(f"  {note}")
     console.say(f"Finished in {duration(time.monotonic() - started)}. Report: {out / 'report.html'}")
+
+
+def _errors_of(content: dict[str, Any], part: str) -> str:
+    """The errors of one part; that of `after` only where something was added."""
+    words = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding added"}
+    shown = list(words) if content["effects"] else ["before", "recalibrated"]
+    return ", ".join(f"{content[state][part]['rmse_mv']:.2f} mV {words[state]}" for state in shown)

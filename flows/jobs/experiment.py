@@ -9,9 +9,11 @@ the rest, tracks each once, and ends with the result of an uninterrupted run.
 from __future__ import annotations
 
 import os
+import re
 import time
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flows.base import environment
 from flows.base.console import Console, duration
@@ -19,11 +21,11 @@ from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import working_on
 
 if TYPE_CHECKING:
-    from flows.jobs.stages import RunStage
+    from flows.jobs.stages import Stages
     from flows.tracking.tracker import Tracker
 
 
-def run_experiment(request: RunRequest, run: RunStage, console: Console) -> Path:
+def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
     """The flow itself; `run` runs a stage."""
     from flows.tracking.store import Store
 
@@ -42,7 +44,7 @@ def run_experiment(request: RunRequest, run: RunStage, console: Console) -> Path
 def _stages(
     request: RunRequest,
     tracker: Tracker,
-    run: RunStage,
+    run: Stages,
     console: Console,
     started: float,
 ) -> Path:
@@ -52,6 +54,7 @@ def _stages(
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.load import load
     from aesi.pipeline.experiment.outputs import Result, write_outputs
+    from aesi.pipeline.experiment.validation import validation_mser
     from aesi.pipeline.notes import together
     from flows.base.stage_cache import Cache
     from flows.search.study import run_study
@@ -65,15 +68,29 @@ def _stages(
     track_start(tracker, config, loaded, folder)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
     follow = CandidateTracker(tracker, config, loaded, problem)
-    found = run("search", lambda: run_study(problem, config, console, request.use_cache, follow))
+    name = f"{config.name}, seed {config.seed} ({tracker.run_id[:8]})"
+    found = run(
+        "search",
+        lambda: run_study(
+            problem,
+            config,
+            console,
+            request.use_cache,
+            follow,
+            publish_as=name,
+            on_generation=lambda done, total: run.progress("search", done, total),
+        ),
+    )
+    tracker.metrics({f"importance/{gene}": share for gene, share in found.result.importances().items()})
     cache = Cache(console.say, request.use_cache)
     key = (config.digest, found.key)
     models = run(
         "final models",
         lambda: cache.get("final models", key, lambda: final_models(problem, found.chosen, config)),
     )
-    fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config))
-    evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split))
+    fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config, loaded.left_out))
+    validation = validation_mser(loaded, problem, found.candidates())
+    evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split, validation))
     seconds = time.monotonic() - started
     rows = found.rows()
     result = Result(
@@ -91,7 +108,26 @@ def _stages(
     summary = run("report", lambda: write_outputs(folder, result))
     tracker.json("comparison.json", comparison(result))
     track_result(tracker, folder, summary, found.number, fitted)
+    key = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")
+    run.publish(f"{key}-report", _page(folder, summary, tracker), f"What came of {config.name}")
+    run.publish(
+        f"{key}-tables", (folder / "tables.md").read_text(encoding="utf-8"), f"Tables of {config.name}"
+    )
     return folder
+
+
+def _page(folder: Path, summary: Mapping[str, Any], tracker: Tracker) -> str:
+    """The headline of the report as Prefect shows it, and where the rest is."""
+    row = next(row for row in summary["models"] if row["name"] == summary["chosen"])
+    free, step = row["free_run"], row.get("intervals", {})
+    lines = [f"# {row['name']}: {free['test_mser_pct']:.1f} % less squared error on test, in free run", ""]
+    if summary["fallback"]:
+        lines += [f"**{summary['fallback']}**", ""]
+    lines.append(f"- {free['test_rmse_mv']:.2f} mV RMSE in free run, {row['terms']} terms")
+    if step:
+        lines.append(f"- {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:.0f} %")
+    lines += [f"- report: `{folder / 'report.html'}`", f"- tracked: [{tracker.run_id}]({tracker.address})"]
+    return "\n".join(lines)
 
 
 def _shown(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""The flows as Prefect knows them: parameters that a form can ask for, and nothing else."""
+"""The jobs as Prefect knows them: parameters that a form can ask for, names that a person would give."""
 
 from __future__ import annotations
 
@@ -6,15 +6,34 @@ from pathlib import Path
 from typing import Any, Literal
 
 from prefect import flow
+from prefect.runtime import flow_run
 
 from flows.base import environment
 from flows.base.console import Console
+from flows.jobs.discovery import EXPERIMENT, case_and_folder, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
-from flows.jobs.stages import as_tasks
+from flows.jobs.stages import PrefectStages
 
 
-@flow(name="experiment", flow_run_name="{path}", validate_parameters=False, persist_result=False)
+def _experiment_name() -> str:
+    """`measured_nmc, seed 0`."""
+    from aesi.pipeline.experiment.config import read_experiment
+
+    given = flow_run.parameters
+    config = read_experiment(given["path"], given.get("overrides") or ())
+    return f"{config.name}, seed {config.seed}"
+
+
+def _discovery_name() -> str:
+    """`what nmc_30ah lacks on drive.csv`."""
+    given = flow_run.parameters
+    if given.get("path"):
+        return f"what the model lacks, {Path(given['path']).stem}"
+    return f"what {given['cell']} lacks on {', '.join(given['data'])}"
+
+
+@flow(name="experiment", flow_run_name=_experiment_name, validate_parameters=False, persist_result=False)
 def experiment(
     path: str,
     overrides: list[str] | None = None,
@@ -28,15 +47,28 @@ def experiment(
     console = Console()
     request = RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
     limit_s = request.config().runner.stage_timeout_s
-    return run_experiment(request, as_tasks(console.say, limit_s), console)
+    return run_experiment(request, PrefectStages(console.say, limit_s), console)
 
 
-@flow(name="discovery", flow_run_name="{path}", validate_parameters=False, persist_result=False)
-def discovery(path: str, overrides: list[str] | None = None, out: str | None = None) -> dict[str, Any]:
-    """The whole job of `aesi discover` on the case that an experiment file describes."""
-    from flows.jobs.discovery import case_and_folder, trace
+@flow(name="discovery", flow_run_name=_discovery_name, validate_parameters=False, persist_result=False)
+def discovery(
+    path: str | None = None,
+    overrides: list[str] | None = None,
+    out: str | None = None,
+    cell: str = "",
+    data: list[str] | None = None,
+    case: Any = None,
+    tracked_as: str = EXPERIMENT,
+) -> dict[str, Any]:
+    """The whole job of `aesi discover`.
 
+    path : an experiment file that describes the case, as a deployment gives it; else `case`, which only a process
+    that has read the records can hand over: `cell` and `data` then say what it is about.
+    """
     environment.prepare()
     console = Console()
-    case, folder, name = case_and_folder(path, overrides or (), Path(out) if out else None)
-    return trace(case, folder, as_tasks(console.say), console, name)
+    folder = Path(out) if out else None
+    if case is None:
+        case, folder, tracked_as = case_and_folder(str(path), overrides or (), folder)
+    assert folder is not None  # `aesi discover` with records asks for one
+    return trace(case, folder, PrefectStages(console.say), console, tracked_as)

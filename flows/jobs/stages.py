@@ -1,4 +1,4 @@
-"""How the stages of a flow are run: as Prefect tasks, or as the plain functions they are."""
+"""How the stages of a job are run: as Prefect tasks, or as the plain functions they are."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Protocol, TypeVar
+from uuid import UUID
 
 from aesi.errors import AesiError
 from flows.base.console import duration
@@ -26,50 +27,97 @@ class ServerAway(AesiError):
     """The Prefect server that is configured does not answer."""
 
 
-class RunStage(Protocol):
-    """Runs one stage: its name, a function of nothing, and how often it may be tried again."""
+class Stages(Protocol):
+    """Runs the stages of a job, and shows what comes of them where there is somebody to show it."""
 
-    def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T: ...
+    def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
+        """One stage: its name, a function of nothing, and how often it may be tried again."""
+        ...
+
+    def progress(self, name: str, done: int, total: int) -> None:
+        """How far the stage at work has come."""
+        ...
+
+    def publish(self, key: str, markdown: str, about: str) -> None:
+        """A page about the job, kept under a key of lower-case letters, digits and dashes."""
+        ...
 
 
-def plainly(say: Say, timeout_s: float | None = None) -> RunStage:
-    """Stages as function calls. Raises StageOverdue where one takes longer than `timeout_s`."""
+class PlainStages:
+    """Stages as function calls; nobody watches. Raises StageOverdue where one takes longer than `timeout_s`."""
 
-    def run(name: str, work: Callable[[], T], retries: int = 0) -> T:
+    def __init__(self, say: Say, timeout_s: float | None = None) -> None:
+        self._say, self._timeout_s = say, timeout_s
+
+    def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
         started = time.monotonic()
-        with _limit(name, timeout_s):
+        with _limit(name, self._timeout_s):
             result = work()
-        say(f"{name}: done in {duration(time.monotonic() - started)}")
+        self._say(f"{name}: done in {duration(time.monotonic() - started)}")
         return result
 
-    return run
+    def progress(self, name: str, done: int, total: int) -> None:
+        """Nothing: the console shows it."""
+
+    def publish(self, key: str, markdown: str, about: str) -> None:
+        """Nothing: the files are there."""
 
 
-def as_tasks(say: Say, timeout_s: float | None = None) -> RunStage:
-    """Stages as Prefect tasks, seen in its UI where a server is configured.
+class PrefectStages:
+    """Stages as Prefect tasks, with artifacts, seen in its UI.
 
     They close over what they need instead of taking it as parameters, because Prefect would walk through
     every array it is handed; what they compute is kept by content (`flows.base.stage_cache`,
-    `flows.evaluation.outcome_store`), with and without Prefect. Bad input is not tried again.
+    `flows.evaluation.outcome_store`), with and without Prefect. Bad input is not tried again. An artifact that
+    cannot be stored is said, and costs nothing else.
     """
-    from prefect import task
-    from prefect.cache_policies import NO_CACHE
 
-    plain = plainly(say, timeout_s)
+    def __init__(self, say: Say, timeout_s: float | None = None) -> None:
+        self._say = say
+        self._plain = PlainStages(say, timeout_s)
+        self._bars: dict[str, UUID] = {}
 
-    def run(name: str, work: Callable[[], T], retries: int = 0) -> T:
+    def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
+        from prefect import task
+        from prefect.cache_policies import NO_CACHE
+
         stage = task(
             name=name,
+            task_run_name=name,
             retries=retries,
             retry_delay_seconds=2,
             retry_condition_fn=_passing,
             cache_policy=NO_CACHE,
             persist_result=False,
-        )(lambda: plain(name, work))
+        )(lambda: self._plain(name, work))
         result: T = stage()
         return result
 
-    return run
+    def progress(self, name: str, done: int, total: int) -> None:
+        """A bar beside the task at work; one write to the server each time."""
+        from prefect.artifacts import create_progress_artifact, update_progress_artifact
+
+        share = 100.0 * done / total
+        with self._told("progress"):
+            if name in self._bars:
+                update_progress_artifact(self._bars[name], share)
+            else:
+                self._bars[name] = create_progress_artifact(share, description=f"{name}: of {total}")
+
+    def publish(self, key: str, markdown: str, about: str) -> None:
+        """A Markdown artifact of the flow run."""
+        from prefect.artifacts import create_markdown_artifact
+
+        with self._told(key):
+            create_markdown_artifact(markdown, key=key, description=about)
+
+    @contextmanager
+    def _told(self, what: str) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:
+            reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+            self._say(f"prefect: the artifact {what} is not shown ({reason}).")
 
 
 @contextmanager

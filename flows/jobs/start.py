@@ -1,18 +1,23 @@
-"""`aesi run`: under Prefect, or as the plain functions that the stages are."""
+"""`aesi run` and `aesi discover`: under Prefect, or as the plain functions that the stages are."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from flows.base import environment
 from flows.base.console import Console
+from flows.jobs.discovery import EXPERIMENT, case_and_folder, check, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
-from flows.jobs.stages import plainly, server_in_reach
+from flows.jobs.stages import PlainStages, server_in_reach
 
+if TYPE_CHECKING:
+    from aesi.pipeline.discovery.discover import Case
+
+T = TypeVar("T")
 NO_SERVER = "connect to ephemeral Prefect API server"
 
 
@@ -27,27 +32,12 @@ def start(
 ) -> Path:
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
     environment.prepare()
-    console = Console()
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache)
     config = request.config()  # bad input is refused before anything is started
-    console.say(f"{config.name}: loading the libraries ...")  # at once: on a busy machine they take long
-    if use_prefect:
-        if not os.environ.get("PREFECT_API_URL"):
-            console.say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
-        try:
-            return _under_prefect(request)
-        except RuntimeError as error:
-            if NO_SERVER not in str(error):
-                raise
-            console.say("Prefect's temporary server did not start in time; the stages run without it.")
-    return run_experiment(request, plainly(console.say, config.runner.stage_timeout_s), console)
 
+    def under_prefect() -> Path:
+        from flows.jobs.prefect_flows import experiment
 
-def _under_prefect(request: RunRequest) -> Path:
-    environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
-    from flows.jobs.prefect_flows import experiment
-
-    with server_in_reach():
         folder: Path = experiment(
             request.path,
             list(request.overrides),
@@ -56,4 +46,61 @@ def _under_prefect(request: RunRequest) -> Path:
             resume=request.resume,
             use_cache=request.use_cache,
         )
-    return Path(folder)
+        return Path(folder)
+
+    def plainly() -> Path:
+        console = Console()
+        return run_experiment(request, PlainStages(console.say, config.runner.stage_timeout_s), console)
+
+    return _with_or_without(under_prefect, plainly, use_prefect)
+
+
+def discover(case: Case, out: Path, use_prefect: bool = True, tracked_as: str = EXPERIMENT) -> dict[str, Any]:
+    """Trace one case and write the finding to `out`; returns the content of discovery.json.
+
+    Raises AesiError, one sentence, for what cannot be used; nothing is started then.
+    """
+    environment.prepare()
+    check(case)
+
+    def under_prefect() -> dict[str, Any]:
+        from flows.jobs.prefect_flows import discovery
+
+        found: dict[str, Any] = discovery(
+            out=str(out),
+            cell=case.cell.name.removesuffix(".json").removesuffix(".bpx"),
+            data=[one.name for one in case.measurements],
+            case=case,
+            tracked_as=tracked_as,
+        )
+        return found
+
+    def plainly() -> dict[str, Any]:
+        console = Console()
+        return trace(case, out, PlainStages(console.say), console, tracked_as)
+
+    return _with_or_without(under_prefect, plainly, use_prefect)
+
+
+def discover_experiment(
+    path: str, overrides: Sequence[str] = (), out: Path | None = None, use_prefect: bool = True
+) -> dict[str, Any]:
+    """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
+    case, folder, name = case_and_folder(path, overrides, out)
+    return discover(case, folder, use_prefect, name)
+
+
+def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], use_prefect: bool) -> T:
+    """Under Prefect where it is wanted, and its own temporary server starts."""
+    if use_prefect:
+        if not os.environ.get("PREFECT_API_URL"):  # said at once: on a busy machine it takes half a minute
+            Console().say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
+        environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
+        try:
+            with server_in_reach():
+                return under_prefect()
+        except RuntimeError as error:
+            if NO_SERVER not in str(error):
+                raise
+            Console().say("Prefect's temporary server did not start in time; the stages run without it.")
+    return plainly()

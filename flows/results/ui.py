@@ -1,4 +1,4 @@
-"""`aesi ui`: MLflow's own UI on the tracking store in use, on loopback unless told otherwise."""
+"""`aesi ui`: MLflow on what is tracked, Optuna on the searches, Prefect on the flow runs; on loopback."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import socket
 import sys
 
 from aesi.errors import InputError
+from flows.base import environment
 from flows.tracking.store import Store, default_uri
 
 TRAINING = "#/experiments?workflowType=machine_learning"
@@ -30,6 +31,34 @@ def serve(port: int, host: str, uri: str | None) -> None:
     os.execve(
         sys.executable, command, os.environ | QUIETLY
     )  # so that whatever ends this process ends the server
+
+
+def serve_studies(port: int, host: str, url: str | None) -> None:
+    """Optuna's dashboard on the studies of the workspace, or of the database at `url`, until interrupted."""
+    from optuna_dashboard import run_server
+
+    from flows.search.published_study import journal, study_storage
+
+    if not url and not journal().exists():
+        raise InputError(
+            f"no search has been run in this workspace ({journal()} is not there); `aesi run` makes one."
+        )
+    if not _free(host, port):
+        raise InputError(f"port {port} on {host} is taken; give another with --port.")
+    print(f"Optuna's dashboard shows the searches at http://{host}:{port}/ (Ctrl-C ends it)", flush=True)
+    run_server(study_storage(url), host=host, port=port)
+
+
+def serve_flows(port: int, host: str) -> None:
+    """Prefect's server on the flow runs of the workspace, until interrupted."""
+    if not _free(host, port):
+        raise InputError(f"port {port} on {host} is taken; give another with --port.")
+    environment.prepare()
+    environment.make_prefect_home()
+    print(f"Prefect shows the flow runs at http://{host}:{port}/runs (Ctrl-C ends it)", flush=True)
+    command = [sys.executable, "-m", "prefect", "server", "start", "--host", host, "--port", str(port)]
+    api = {"PREFECT_UI_API_URL": f"http://{host}:{port}/api"}
+    os.execve(sys.executable, command, os.environ | api)
 
 
 def _free(host: str, port: int) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from optuna.importance import get_param_importances
 from optuna.study import Study
 from optuna.trial import FrozenTrial, TrialState
 
@@ -14,6 +15,8 @@ from aesi.errors import FitError
 from aesi.sparse import FitnessWeights, Genome, fitness
 from flows.search.term_sampler import INDEX, genome_of, violation
 
+LEAST_TOLD = 20
+"""Candidates from which the importance of a gene can be told at all."""
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 RECORD = "record"
 RECORDED = (
@@ -73,8 +76,16 @@ class SearchResult:
 
     def front(self) -> tuple[Trial, ...]:
         """Feasible trials that no other feasible one beats in all losses."""
-        return tuple(
-            trial for trial in self.feasible if not any(_dominates(other, trial) for other in self.feasible)
+        best = {trial.user_attrs[INDEX] for trial in self.study.best_trials}
+        return tuple(trial for trial in self.feasible if trial.number in best)
+
+    def importances(self) -> dict[str, float]:
+        """Gene -> its share of the variance of the fitness, by Optuna; empty where too few candidates tell."""
+        told = [trial for trial in self.trials if trial.losses is not None]
+        if len(told) < LEAST_TOLD:
+            return {}
+        return dict(
+            get_param_importances(self.study, target=lambda trial: -trial.user_attrs[RECORD]["fitness"])
         )
 
     def best(self, weights: FitnessWeights | None = None) -> Pick:
@@ -115,11 +126,6 @@ def _read(trial: FrozenTrial) -> Trial:
         numbers,
         trial.user_attrs.get("reason"),
     )
-
-
-def _dominates(a: Trial, b: Trial) -> bool:
-    pairs = list(zip(a.losses or (), b.losses or (), strict=True))
-    return all(x <= y for x, y in pairs) and any(x < y for x, y in pairs)
 
 
 def _around(centre: FitnessWeights) -> tuple[FitnessWeights, ...]:

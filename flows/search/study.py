@@ -19,6 +19,7 @@ from flows.evaluation.generation import Evaluation, Tally
 from flows.evaluation.open_pool import open_pool
 from flows.evaluation.outcome_store import Outcomes, open_outcomes
 from flows.search.nsga2 import Constraints, search
+from flows.search.published_study import PublishedStudy
 from flows.search.result import SearchResult
 
 OnScored = Callable[[int, Genome, ScoredCandidate | Failed], None]
@@ -37,6 +38,10 @@ class Found:
     chosen: Candidate
     key: str
     scored: dict[int, ScoredCandidate | Failed]
+
+    def candidates(self) -> tuple[Candidate, ...]:
+        """All that came to something."""
+        return tuple(one.candidate for one in self.scored.values() if not isinstance(one, Failed))
 
     def rows(self) -> list[dict[str, Any]]:
         """The candidates that were evaluated, as the report draws them."""
@@ -64,8 +69,13 @@ def run_study(
     reuse: bool = True,
     on_scored: OnScored | None = None,
     tally: Tally | None = None,
+    publish_as: str | None = None,
+    on_generation: Callable[[int, int], None] | None = None,
 ) -> Found:
     """Search until all candidates of the experiment are known, and pick one.
+
+    on_generation : told how many candidates of how many are done, a generation at a time.
+    publish_as : name of the study in Optuna's storage; None publishes nothing.
 
     Raises FitError, with the reasons counted, where no candidate is feasible.
     """
@@ -76,6 +86,11 @@ def run_study(
     scored: dict[int, ScoredCandidate | Failed] = {}
     waiting: dict[Genome, list[ScoredCandidate | Failed]] = {}
     started = time.monotonic()
+    space = genome_space(problem, config)
+    constraints = Constraints(config.search.pearson_train, config.search.pearson_valid)
+    published = None
+    if publish_as:
+        published = PublishedStudy(publish_as, config.runner.storage, constraints, space, console.say)
 
     def evaluate_many(genomes: Sequence[Genome]) -> Iterator[tuple[int, Candidate | Failed]]:
         for position, outcome in evaluation(genomes):
@@ -86,6 +101,11 @@ def run_study(
         scored[number] = waiting[genome].pop()
         if on_scored is not None:
             on_scored(number, genome, scored[number])
+        if published is not None:
+            published.add(number, genome, scored[number])
+        done, total = len(scored), config.search.candidates
+        if on_generation is not None and (done % config.search.population == 0 or done == total):
+            on_generation(done, total)
         console.progress("candidates", len(scored), config.search.candidates, started, _best(scored))
 
     try:
@@ -95,9 +115,9 @@ def run_study(
             seed=config.seed,
             on_candidate=on_candidate,
             evaluate_many=evaluate_many,
-            space=genome_space(problem, config),
+            space=space,
             population=config.search.population,
-            constraints=Constraints(config.search.pearson_train, config.search.pearson_valid),
+            constraints=constraints,
             weights=weights(config),
             warm_start=None if config.search.warm_start else (),
         )

@@ -27,7 +27,7 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.genome_space import GenomeSpace
 
-__all__ = ["GenomeSpace", "TermSampler", "distributions", "genome_of", "violation"]
+__all__ = ["GenomeSpace", "TermSampler", "distributions", "genome_of", "violation", "widened"]
 
 TERMS = "terms"
 INDEX = "index"
@@ -88,14 +88,14 @@ class TermSampler(NSGAIISampler):
         return create_trial(
             state=state,
             params={name: getattr(genome, name) for name in chosen},
-            distributions=_widened(chosen, genome),
+            distributions=widened(chosen, genome),
             user_attrs={TERMS: genome.terms, INDEX: index, **noted},
             system_attrs={self._get_generation_key(): index // self.size},
             **contents,
         )
 
 
-def _widened(chosen: dict[str, BaseDistribution], genome: Genome) -> dict[str, BaseDistribution]:
+def widened(chosen: dict[str, BaseDistribution], genome: Genome) -> dict[str, BaseDistribution]:
     """Ranges that hold a warm start from outside of the space as well; Optuna refuses it otherwise."""
     for name, distribution in chosen.items():
         value = getattr(genome, name)

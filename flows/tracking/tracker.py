@@ -23,6 +23,7 @@ from flows.tracking.store import KIND, Store, now_ms
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 SAMPLE_S = 10.0
+LOCAL_UI = "http://127.0.0.1:5000"
 
 
 class Trackable(Protocol):
@@ -88,6 +89,12 @@ class Tracker:
     def experiment_id(self) -> str:
         """MLflow's id of the experiment."""
         return self._experiment_id
+
+    @property
+    def address(self) -> str:
+        """Where MLflow's UI shows the run: on the server, or on the one that `aesi ui` starts."""
+        server = self.store.uri if self.store.uri.startswith("http") else LOCAL_UI
+        return f"{server.rstrip('/')}/#/experiments/{self._experiment_id}/runs/{self.run_id}"
 
     def parameters(self, values: Mapping[str, Any], tags: Mapping[str, str] | None = None) -> None:
         """Parameters of the parent run."""

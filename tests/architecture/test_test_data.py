@@ -21,6 +21,7 @@ MAY = {
     "aesi/pipeline/experiment/load.py": "cuts the split",
     "aesi/pipeline/experiment/evaluate.py": "judges the models, already chosen",
     "aesi/pipeline/api.py": "takes them from the caller",
+    "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
     "aesi/pipeline/discovery/cases.py": "reads the files",
     "aesi/pipeline/discovery/finding.py": "tells what a reader did to them",
     "aesi/pipeline/discovery/discover.py": "hands them to the tracer",

@@ -99,11 +99,12 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert found.rmse_mv("after") < 1.2 < found.rmse_mv("before")
     frame = found.to_frame()
     assert isinstance(frame, pd.DataFrame)
-    best = frame.iloc[0]
-    assert (best.effect, best.parameter, best.unit) == ("series_resistance", "resistance_ohm", "ohm")
-    assert best.low <= 1e-3 <= best.high
+    assert frame.score.is_monotonic_decreasing
+    (named,) = frame[frame.effect == "series_resistance"].itertuples()
+    assert (named.parameter, named.unit) == ("resistance_ohm", "ohm")
+    assert named.low <= 1e-3 <= named.high
     assert {trace.name for trace in found.plot("test").data} >= {"measured", "after", "as declared"}
-    assert found.model.effects[-1].id == "series_resistance"
+    assert found.model.cell.contact_resistance_ohm == pytest.approx(1e-3, rel=0.01), "a cell file can hold it"
     folder = found.save(tmp_path / "found")
     assert {path.name for path in folder.iterdir()} == {"discovery.json", "report.html", "model"}
 

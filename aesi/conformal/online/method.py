@@ -19,8 +19,8 @@ from aesi.numerics.quantiles import conformal_quantile
 from aesi.numerics.typing import Array
 
 RELATIVE_FLOOR = 1e-3
-"""No interval is narrower than this share of the marginal one: below it lie the quantisation of the sensor
-and stretches of rest, where a width of zero would claim knowledge that nobody has."""
+"""No interval is narrower than this share of the marginal one: at rest the residual is constant to the sensor's
+quantisation, and a fitted width would shrink to zero."""
 MIN_WINDOW = 10
 
 

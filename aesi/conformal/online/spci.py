@@ -1,8 +1,8 @@
 """Sequential predictive conformal inference: quantile regression on the history, scaled on held-out runs.
 
 The scale is the conformal quantile of |e - middle| / half-width over rows that the regression did not see.
-Neighbouring rows depend on each other, so its guarantee is approximate; runs longer than the memory keep it
-close, and the adaptive step holds the level from there on.
+Neighbouring rows are autocorrelated, so coverage is guaranteed approximately only; held-out runs longer than the
+correlation length keep it close, and the adaptive step (`tracker`) holds the level in use.
 
 Xu & Xie, ICML 2023, doi:10.48550/arXiv.2212.03463, refits at every step; here the regression is fitted once,
 which its features allow: they carry the recent scale, so what changes with time is an input.

@@ -1,4 +1,4 @@
-"""The adaptive step: widen after a miss, narrow after a hit.
+"""Adaptive conformal inference on the logarithm of the half-width: widen after a miss, narrow after a hit.
 
     r_g <- r_g exp((rate [g is the sample's group] + shared rate) (1[e outside the band] - a))       (1)
 

@@ -1,10 +1,10 @@
-"""Trees on top of a line: a regressor that cannot extrapolate, freed from location and scale.
+"""Tree ensembles on normalised residuals: a linear quantile band supplies the location and scale.
 
     Q_tau(e | x) = m(x) + s(x) q_tau(x'),    [m - s/2, m + s/2] the linear quantile band                 (1)
 
 x' holds the features divided by s, the logarithm of s, and the current as it is. Trees are constant in their
-leaves; without (1) they would have to learn a line and a proportionality step by step, and would fail on the
-first error larger than those they saw.
+leaves: without (1) they would approximate a linear location-scale model by steps, and could give no interval beyond
+the largest error of the calibration.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """Text tables: comma, semicolon, tab or bar between the cells, plain or gzip, in any encoding loggers write.
 
 The header is the first line that names known columns, or else the first that is neither blank nor a comment (#).
-Numbers are converted by pyarrow in a
-stream, so that ten million rows cost the memory of their numbers; only when that fails does a slow pass in
-Python look for the first cell at fault.
+Numbers are converted by pyarrow as a stream, so that ten million rows cost the memory of their numbers; only when that
+fails does a slow pass in Python look for the first cell at fault.
 """
 
 from __future__ import annotations

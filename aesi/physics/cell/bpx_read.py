@@ -10,6 +10,8 @@ from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.parts import (
     CONTACT_RESISTANCE,
+    FILM_ENERGY,
+    FILM_RESISTANCE,
     CellParameters,
     Electrode,
     Electrolyte,
@@ -58,6 +60,8 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         volume_m3=_optional(fields, "Volume [m3]"),
         surface_area_m2=_optional(fields, "External surface area [m2]"),
         contact_resistance_ohm=float(user.get(CONTACT_RESISTANCE, 0.0)),
+        film_resistance_ohm=float(user.get(FILM_RESISTANCE, 0.0)),
+        film_ea_j_mol=float(user.get(FILM_ENERGY, 0.0)),
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),

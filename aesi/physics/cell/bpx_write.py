@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from aesi.physics.cell.parts import CONTACT_RESISTANCE, CellParameters, Electrode
+from aesi.physics.cell.parts import (
+    CONTACT_RESISTANCE,
+    FILM_ENERGY,
+    FILM_RESISTANCE,
+    CellParameters,
+    Electrode,
+)
 from aesi.physics.cell.relations import to_bpx
 
 BPX_VERSION = "1.1.0"
@@ -51,8 +57,11 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
             "Transport efficiency": cell.separator.transport_efficiency,
         },
     }
-    if cell.contact_resistance_ohm:
-        parts["User-defined"] = {CONTACT_RESISTANCE: cell.contact_resistance_ohm}
+    own = {CONTACT_RESISTANCE: cell.contact_resistance_ohm, FILM_RESISTANCE: cell.film_resistance_ohm}
+    if cell.film_resistance_ohm:
+        own[FILM_ENERGY] = cell.film_ea_j_mol
+    if any(own.values()):
+        parts["User-defined"] = {name: value for name, value in own.items() if value}
     state = {
         "Initial conditions": {
             "Initial state-of-charge": 1.0,

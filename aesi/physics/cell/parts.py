@@ -18,6 +18,8 @@ from aesi.physics.cell.relations import Constant, Relation
 NO_ENTROPY = Constant(0.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
+FILM_RESISTANCE = "Film resistance [Ohm]"
+FILM_ENERGY = "Film resistance activation energy [J.mol-1]"
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,9 @@ class CellParameters:
     """Everything a simulation needs to know about a cell; `aesi.Cell` adds how it is read and written.
 
     Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no
-    thermal data), contact resistance in ohm in series with the whole cell.
+    thermal data), contact resistance in ohm in series with the whole cell; it is that
+    of metal, the same at any temperature. That of films on the particles, ohm at the reference temperature, falls as
+    exp(E/R (1/T - 1/T_ref)) with its activation energy in J/mol.
     """
 
     negative: Electrode
@@ -101,6 +105,8 @@ class CellParameters:
     volume_m3: float | None = None
     surface_area_m2: float | None = None
     contact_resistance_ohm: float = 0.0
+    film_resistance_ohm: float = 0.0
+    film_ea_j_mol: float = 0.0
     name: str = "cell"
     description: str = ""
     references: str = ""

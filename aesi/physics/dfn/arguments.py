@@ -12,7 +12,7 @@ from aesi.numerics.galerkin import gauss_lobatto, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table, solid_diffusion
-from aesi.physics.model import EspmModel, Plating
+from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
 
 NO_PLATING = Plating(0.0, 0.5)
 
@@ -136,29 +136,11 @@ def _electrodes(model: EspmModel) -> Electrodes:
             [area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient, e.c0_mol_m3]
         ),
         plating_to_c=1.0 / (FARADAY_C_MOL * n.thickness_m),
-        energies=_energies(model),
-        heat=_heat(model),
+        energies=activation_energies(model.cell),
+        heat=heat_numbers(model),
         area=cell.total_area_m2,
         contact=cell.contact_resistance_ohm,
+        film=cell.film_resistance_ohm,
         transference=e.transference,
         reference_k=cell.reference_temperature_k,
     )
-
-
-def _energies(model: EspmModel) -> Array:
-    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
-    n, p, e = model.cell.negative, model.cell.positive, model.cell.electrolyte
-    return np.array(
-        [
-            n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
-        ]
-    )  # fmt: skip
-
-
-def _heat(model: EspmModel) -> Array:
-    """Heat capacity J/K (0 for none), conductance W/K, surroundings K."""
-    if model.heat is None:
-        return np.zeros(3)
-    balance = model.heat
-    return np.array([balance.heat_capacity_j_k, balance.conductance_w_k, model.cell.ambient_temperature_k])

@@ -2,6 +2,8 @@
 
 Units are particles: of one size, at one place. Places are Gauss points, those of the negative electrode first, each
 counted from its collector. Currents of units and places are per area of the cell, positive for delithiation.
+
+numba's cache on disk names these classes: who renames one deletes `__pycache__` of this folder.
 """
 
 from __future__ import annotations
@@ -64,7 +66,7 @@ class Electrodes(NamedTuple):
     before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.  ocp, entropic : (2, table).
     alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.  node_share : (places,) weights.
     plating : rate A/m2 of cell at c0, transfer coefficient, c0.
-    plating_to_c : mol/m3 per C/m2.  energies : (6,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
+    plating_to_c : mol/m3 per C/m2.  energies : (7,) J/mol.  heat : (3,).  area : m2.  contact, film : ohm.
     transference : cation transference number.
     """
 
@@ -84,6 +86,7 @@ class Electrodes(NamedTuple):
     heat: Array
     area: float
     contact: float
+    film: float
     transference: float
     reference_k: float
 
@@ -122,7 +125,7 @@ class DfnTrial(NamedTuple):
     ohm : (places, points of an electrode) ohm m2.  layer_c A/(V m2), layer_old A/m2 : (places,) double layers.
     total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
     between.  faster : (3,) factors of diffusion, negative, positive, salt.
-    no_spread : zeros, for an instant.  rates : (6,) Arrhenius factors, by `Electrodes.energies`.
+    no_spread : zeros, for an instant.  rates : (7,) Arrhenius factors, by `Electrodes.energies`.
     """
 
     calm_z: Array
@@ -174,7 +177,7 @@ class NewtonScratch(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """Weights of step lengths in use, by slot: see `transport_kernels.renew`."""
+    """Weights of step lengths in use, by slot: see `diffusion_kernels.renew`."""
 
     keys: IntArray
     particle: Array

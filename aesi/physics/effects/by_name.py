@@ -42,6 +42,15 @@ def known_effects(files: Iterable[str | PathLike[str]] = ()) -> dict[str, Effect
     return known
 
 
+def selected(
+    known: Mapping[str, Effect], only: Iterable[str] = (), without: Iterable[str] = ()
+) -> dict[str, Effect]:
+    """Of `known` those named, or all but those named.  Raises InputError with the nearest match for an unknown id."""
+    kept = {named_effect(name, known).id for name in only} or set(known)
+    left_out = {named_effect(name, known).id for name in without}
+    return {name: effect for name, effect in known.items() if name in kept - left_out}
+
+
 def activated(
     effects: Iterable[tuple[str, Mapping[str, float]]], files: Iterable[str | PathLike[str]] = ()
 ) -> tuple[ActiveEffect, ...]:

@@ -3,11 +3,11 @@
     Phi = U(x_r) + eta(i_r, x_r, c_r) + ohmic_r(i) + chi ln(c_r / c_mean),   sum i_r = I        r = 1..4 regions
     ohmic_r : mean drop in solid and electrolyte between region r, the collector and the separator
 
-Each region has a particle of its own and reacts with the electrolyte there. strength s replaces what differs between
-regions by s times the difference: 1 is the full model, 0 one reaction everywhere.
+Each region has a particle of its own and reacts with the electrolyte there. The strength s scales what differs between
+regions: 1 is the full model, 0 one reaction everywhere.
 
-Leaves out what happens within a quarter of an electrode. Holds for thick
-electrodes, high rates, poor electrolyte, and flat open-circuit potentials.
+Leaves out what happens within a quarter of an electrode. Holds for thick electrodes, high rates, poor electrolyte, and
+flat open-circuit potentials.
 
 Source: Doyle, Fuller & Newman, J. Electrochem. Soc. 140 (1993) 1526, doi:10.1149/1.2221597, on four regions.
 """

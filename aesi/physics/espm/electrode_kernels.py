@@ -74,16 +74,20 @@ def end_weight(z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
 def solve_electrode(  # type: ignore[no-untyped-def]
-    lo, hi, regions, side, total, dt, thermal, temperature_rise, chi,
-    region_of, share, exchange, exchange_factor, alpha, capacity, plating, plated,
-    theta_pred, give, ocp, entropic, ohm, salt, log_salt, region_salt,
-    y, theta, delta, dl_current, region_total, plating_current, work,
-):  # fmt: skip
+    lo, hi, side, total, dt, thermal, temperature_rise, chi, exchange_factor, particles, surfaces, memory
+):
     """Currents y[lo:hi] of the units of one electrode; returns Phi.
 
-    theta_pred : surface stoichiometry at the end of the step if each unit carried its share.  give : what one unit
-    of deviating current takes from it.  delta : (2 regions,) potentials of the double layers, old in, new out.
+    total : A/m2 of cell, positive for delithiation.  thermal : R T / F, V.  chi : 2 (1 - t+) R T / F, V.
+    exchange_factor : of temperature.  particles, surfaces, memory : see `layout`; memory.delta and memory.layer are
+    old in, new out.
     """
+    region_of, share, exchange = particles.place[:, 1], particles.share, particles.exchange
+    ocp, entropic = surfaces.ocp[side], surfaces.entropic[side]
+    alpha, capacity, plating = surfaces.alpha[side], surfaces.capacity[side], surfaces.plating
+    y, theta, theta_pred, give, ohm, salt, log_salt, region_salt = memory[:8]
+    delta, dl_current, region_total, plated, plating_current, work = memory[8:]
+    regions = ohm.shape[0]
     n = hi - lo
     first = side * regions
     potential, slope = work[0], work[1]

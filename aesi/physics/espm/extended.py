@@ -7,23 +7,21 @@ kinetics, double layers, plating, and a temperature that is measured or follows 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
-from aesi.physics.cell import Cell, Electrode
+from aesi.physics.espm.layout import Drive, Salt, Surfaces, Units, Whole
 from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
-    DiffusionTable,
     conductivity_table,
     electrolyte_diffusion,
     ocp_table,
     solid_diffusion,
 )
-from aesi.physics.model import EspmModel, Interface, Plating
+from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
 from aesi.records import Hold
 
 NO_PLATING = Plating(0.0, 0.5)
@@ -41,18 +39,8 @@ def run_extended(
     theta0 = np.array(model.cell.stoichiometries(soc0))
     given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
-    fault_at, fault = run_general(
-        time,
-        current,
-        kelvin,
-        given,
-        hold == "backward",
-        model.substep_s,
-        model.most_substeps,
-        theta0,
-        *general_arguments(model),
-        out,
-    )  # type: ignore[call-arg]
+    drive = Drive(time, current, kelvin, given, hold == "backward", model.substep_s, model.most_substeps)
+    fault_at, fault = run_general(drive, theta0, *general_arguments(model), out)
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]
@@ -60,31 +48,44 @@ def run_extended(
 
 
 @lru_cache(maxsize=64)
-def general_arguments(model: EspmModel) -> tuple[Any, ...]:
-    """Everything `extended_kernels.run_general` takes between the initial state and the output."""
+def general_arguments(model: EspmModel) -> tuple[Units, Salt, Surfaces, Whole]:
+    """What `extended_kernels.run_general` knows of the cell."""
     cell = model.cell
-    n, p, e = cell.negative, cell.positive, cell.electrolyte
-    sphere, stack = sphere_modes(model.solid_order), stack_of(model)
-    solids = [solid_diffusion(x.diffusivity) for x in (n, p)]
+    whole = Whole(
+        energies=activation_energies(cell),
+        heat=heat_numbers(model),
+        area=cell.total_area_m2,
+        separator=cell.separator.thickness_m / cell.separator.transport_efficiency,
+        contact=cell.contact_resistance_ohm,
+        film=cell.film_resistance_ohm,
+        reference_k=cell.reference_temperature_k,
+    )
+    return particle_units(model), _salt(model), _surfaces(model), whole
+
+
+def _salt(model: EspmModel) -> Salt:
+    e, stack = model.cell.electrolyte, stack_of(model)
     diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)
-    to_current = 1.0 / FARADAY_C_MOL
-    return (
-        *_units(model, solids),
-        _padded([x.psi for x in solids]), np.array([0.0 if x.linear else 1.0 / x.d0 for x in solids]),
-        sphere.at, sphere.project,
-        _interface(model), *_ohmic(model),
-        stack.lam * diffusion.d0, stack.gain * to_current,
-        stack.to_nodes, np.ascontiguousarray(stack.project.T), stack.gauss, stack.mean,
-        diffusion.psi, 0.0 if diffusion.linear else 1.0 / diffusion.d0,
-        np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
-        np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
-        conductivity_table(e.conductivity, e.c0_mol_m3),
-        _energies(cell), _heat(model), _scalars(model, diffusion.top),
-    )  # fmt: skip
+    return Salt(
+        rates=stack.lam * diffusion.d0,
+        gains=stack.gain * (1.0 / FARADAY_C_MOL),
+        to_nodes=stack.to_nodes,
+        project=np.ascontiguousarray(stack.project.T),
+        gauss=stack.gauss,
+        mean=stack.mean,
+        psi=diffusion.psi,
+        strength=0.0 if diffusion.linear else 1.0 / diffusion.d0,
+        top=diffusion.top,
+        c0=e.c0_mol_m3,
+        kappa=conductivity_table(e.conductivity, e.c0_mol_m3),
+        supply=1.0 - e.transference,
+        contrast=model.region_contrast,
+    )
 
 
-def _units(model: EspmModel, solids: list[DiffusionTable]) -> tuple[Array, ...]:
-    """Particles, region by region from each collector, size by size: see `run_general` for the names."""
+def particle_units(model: EspmModel) -> Units:
+    """Particles, region by region from each collector, size by size."""
+    solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
     sides = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))
@@ -104,8 +105,19 @@ def _units(model: EspmModel, solids: list[DiffusionTable]) -> tuple[Array, ...]:
                 exchange.append(area * FARADAY_C_MOL * electrode.rate_constant)
     sums = [sum(v for v, unit in zip(volume, units, strict=True) if unit[0] == side) for side in range(2)]
     fractions = [v / sums[unit[0]] for v, unit in zip(volume, units, strict=True)]
-    columns = (rates, gains, lump, share, fractions, exchange)
-    return (np.array(units, dtype=np.int64), *(np.array(c) for c in columns))
+    return Units(
+        place=np.array(units, dtype=np.int64),
+        rates=np.array(rates),
+        gains=np.array(gains),
+        lump=np.array(lump),
+        share=np.array(share),
+        volume=np.array(fractions),
+        exchange=np.array(exchange),
+        psi=_padded([x.psi for x in solids]),
+        strength=np.array([0.0 if x.linear else 1.0 / x.d0 for x in solids]),
+        at=sphere.at,
+        project=sphere.project,
+    )
 
 
 def _padded(tables: list[Array]) -> Array:
@@ -114,26 +126,32 @@ def _padded(tables: list[Array]) -> Array:
     return np.array([t if len(t) == longest else np.zeros(longest) for t in tables])
 
 
-def _interface(model: EspmModel) -> Array:
-    """Rows: transfer coefficients; double-layer capacities F/m2 of cell a region; plating rate and coefficient."""
+def _surfaces(model: EspmModel) -> Surfaces:
     n, p = model.cell.negative, model.cell.positive
     plating = model.negative.plating or NO_PLATING
     area_n = n.area_per_volume_1_m * n.thickness_m / model.regions
-    return np.array(
-        [
-            [model.negative.transfer_coefficient, model.positive.transfer_coefficient],
-            [_capacity(model, n, model.negative), _capacity(model, p, model.positive)],
-            [area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient],
-        ]
+    solid, salt = ohmic_drops(model)
+    return Surfaces(
+        ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
+        entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
+        alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),
+        capacity=np.array([interface_capacity(model, side) for side in range(2)]),
+        plating=np.array([area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient]),
+        plating_to_c=model.regions / (FARADAY_C_MOL * n.thickness_m),
+        solid=solid,
+        salt=salt,
     )
 
 
-def _capacity(model: EspmModel, electrode: Electrode, interface: Interface) -> float:
+def interface_capacity(model: EspmModel, side: int) -> float:
+    """F/m2 of cell: double layer of one region of an electrode (0 negative, 1 positive)."""
+    cell = model.cell
+    electrode, interface = ((cell.negative, model.negative), (cell.positive, model.positive))[side]
     area = electrode.area_per_volume_1_m * electrode.thickness_m / model.regions
     return interface.double_layer_f_m2 * area
 
 
-def _ohmic(model: EspmModel) -> tuple[Array, Array]:
+def ohmic_drops(model: EspmModel) -> tuple[Array, Array]:
     """Ohm m2 of the solid (2, regions, regions), and of the electrolyte times its conductivity, by region crossed."""
     n, p = model.cell.negative, model.cell.positive
     solid, salt = ohmic_shares(model.regions)
@@ -142,40 +160,4 @@ def _ohmic(model: EspmModel) -> tuple[Array, Array]:
         np.array(
             [salt * n.thickness_m / n.transport_efficiency, salt * p.thickness_m / p.transport_efficiency]
         ),
-    )
-
-
-def _energies(cell: Cell) -> Array:
-    """J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity."""
-    n, p, e = cell.negative, cell.positive, cell.electrolyte
-    return np.array(
-        [
-            n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol,
-        ]
-    )  # fmt: skip
-
-
-def _heat(model: EspmModel) -> Array:
-    """Heat capacity J/K (0 for none), conductance W/K, surroundings K."""
-    if model.heat is None:
-        return np.zeros(3)
-    balance = model.heat
-    return np.array([balance.heat_capacity_j_k, balance.conductance_w_k, model.cell.ambient_temperature_k])
-
-
-def _scalars(model: EspmModel, top: float) -> Array:
-    cell = model.cell
-    return np.array(
-        [
-            cell.total_area_m2,
-            cell.electrolyte.c0_mol_m3,
-            top,
-            cell.separator.thickness_m / cell.separator.transport_efficiency,
-            cell.contact_resistance_ohm,
-            1.0 - cell.electrolyte.transference,
-            cell.reference_temperature_k,
-            model.regions / (FARADAY_C_MOL * cell.negative.thickness_m),
-            model.region_contrast,
-        ]
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +11,7 @@ from aesi.numerics.galerkin import StackModes, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.relations import Constant, Relation, Scaled, Sum
+from aesi.physics.espm.layout import PlainCell, PlainSalt, PlainSolid
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
@@ -29,7 +29,7 @@ def run_plain(
     out = np.empty((7, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))
     arguments = plain_arguments(model)
-    fault_at, fault = run_linear(time, current, hold == "backward", theta0, *arguments, out)  # type: ignore[call-arg]
+    fault_at, fault = run_linear(time, current, hold == "backward", theta0, *arguments, out)
     return out, fault_at, fault
 
 
@@ -71,8 +71,8 @@ def _salt_gain(stack: StackModes) -> Array:
 
 
 @lru_cache(maxsize=64)
-def plain_arguments(model: EspmModel) -> tuple[Any, ...]:
-    """Everything `kernels.run_linear` takes between the record and the output."""
+def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]:
+    """What `kernels.run_linear` knows of the cell."""
     cell = model.cell
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     temperature, reference = cell.initial_temperature_k, cell.reference_temperature_k
@@ -81,18 +81,24 @@ def plain_arguments(model: EspmModel) -> tuple[Any, ...]:
     scale = np.array([stoichiometry_per_coulomb(cell, x) for x in (n, p)])
     diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)
     faster = arrhenius(e.diffusivity_ea_j_mol, temperature, reference)
-    kappa = conductivity_table(e.conductivity, e.c0_mol_m3)
-    rise = temperature - reference
+    salt_gain = _salt_gain(stack) * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2)
     return (
-        rates, scale[:, None] * sphere.gain[None, 1:], 3.0 * scale,
-        stack.lam * diffusion.d0 * faster,
-        _salt_gain(stack) * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2),
-        stack.to_nodes, np.ascontiguousarray(stack.project.T), stack.gauss, stack.mean,
-        diffusion.psi, 1.0 / diffusion.d0, not diffusion.linear, model.substep_s, model.most_substeps,
-        ocp_table(shifted_ocp(n, rise), "negative"), ocp_table(shifted_ocp(p, rise), "positive"),
-        kappa * arrhenius(e.conductivity_ea_j_mol, temperature, reference),
-        _scalars(model, temperature, diffusion.top),
-    )  # fmt: skip
+        PlainSolid(rates, scale[:, None] * sphere.gain[None, 1:], 3.0 * scale),
+        PlainSalt(
+            rates=stack.lam * diffusion.d0 * faster,
+            gains=salt_gain,
+            to_nodes=stack.to_nodes,
+            project=np.ascontiguousarray(stack.project.T),
+            gauss=stack.gauss,
+            mean=stack.mean,
+            psi=diffusion.psi,
+            strength=1.0 / diffusion.d0,
+            nonlinear=not diffusion.linear,
+            substep=model.substep_s,
+            most=model.most_substeps,
+        ),
+        _cell(model, temperature, diffusion.top),
+    )
 
 
 def _solid_rate(electrode: Electrode, temperature: float, reference: float) -> float:
@@ -101,26 +107,29 @@ def _solid_rate(electrode: Electrode, temperature: float, reference: float) -> f
     return d * faster / electrode.particle_radius_m**2
 
 
-def _scalars(model: EspmModel, temperature: float, top: float) -> Array:
+def _cell(model: EspmModel, temperature: float, top: float) -> PlainCell:
     cell = model.cell
     n, s, p, e = cell.negative, cell.separator, cell.positive, cell.electrolyte
     thermal_v = GAS_CONSTANT_J_MOL_K * temperature / FARADAY_C_MOL
     reference = cell.reference_temperature_k
-    return np.array(
-        [
-            cell.total_area_m2,
-            e.c0_mol_m3,
-            top,
-            n.area_per_volume_1_m * n.thickness_m,
-            p.area_per_volume_1_m * p.thickness_m,
-            FARADAY_C_MOL * n.rate_constant * arrhenius(n.rate_ea_j_mol, temperature, reference),
-            FARADAY_C_MOL * p.rate_constant * arrhenius(p.rate_ea_j_mol, temperature, reference),
-            thermal_v,
-            2.0 * (1.0 - e.transference) * thermal_v,
-            n.thickness_m / (3.0 * n.transport_efficiency)
-            + s.thickness_m / s.transport_efficiency
-            + p.thickness_m / (3.0 * p.transport_efficiency),
-            (n.thickness_m / n.conductivity_s_m + p.thickness_m / p.conductivity_s_m) / 3.0,
-            cell.contact_resistance_ohm,
-        ]
+    rise = temperature - reference
+    conductivity = conductivity_table(e.conductivity, e.c0_mol_m3)
+    through_layers = n.thickness_m / (3.0 * n.transport_efficiency) + s.thickness_m / s.transport_efficiency
+    return PlainCell(
+        ocp_n=ocp_table(shifted_ocp(n, rise), "negative"),
+        ocp_p=ocp_table(shifted_ocp(p, rise), "positive"),
+        kappa=conductivity * arrhenius(e.conductivity_ea_j_mol, temperature, reference),
+        area=cell.total_area_m2,
+        c0=e.c0_mol_m3,
+        top=top,
+        reactive_n=n.area_per_volume_1_m * n.thickness_m,
+        reactive_p=p.area_per_volume_1_m * p.thickness_m,
+        exchange_n=FARADAY_C_MOL * n.rate_constant * arrhenius(n.rate_ea_j_mol, temperature, reference),
+        exchange_p=FARADAY_C_MOL * p.rate_constant * arrhenius(p.rate_ea_j_mol, temperature, reference),
+        thermal_v=thermal_v,
+        salt_v=2.0 * (1.0 - e.transference) * thermal_v,
+        path=through_layers + p.thickness_m / (3.0 * p.transport_efficiency),
+        solid=(n.thickness_m / n.conductivity_s_m + p.thickness_m / p.conductivity_s_m) / 3.0,
+        contact=cell.contact_resistance_ohm
+        + cell.film_resistance_ohm / arrhenius(cell.film_ea_j_mol, temperature, reference),
     )

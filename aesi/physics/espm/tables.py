@@ -46,8 +46,7 @@ def ocp_table(ocp: Relation, what: str) -> Array:
 class DiffusionTable:
     """Diffusivity split into a constant `d0` and the integral `psi` of the rest over the variable.
 
-    psi : (points,) on [0, top]; zeros where the diffusivity is constant.  The flux is d0 grad c + grad
-    psi(c).
+    psi : (points,) on [0, top]; zeros where the diffusivity is constant.  The flux is d0 grad c + grad psi(c).
     """
 
     d0: float

@@ -4,15 +4,14 @@ import math
 
 from numba import njit
 
-from aesi.physics.espm.kernels import FASTMATH, SMALLEST_SALT, lookup, step_weights
-
-GAS = 8.31446261815324
+from aesi.constants import GAS_CONSTANT_J_MOL_K
+from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights, wet
 
 
 @njit(inline="always", fastmath=FASTMATH)
 def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
     """Factor of a rate at `temperature` over that at `reference` (K)."""
-    return math.exp(energy / GAS * (1.0 / reference - 1.0 / temperature))
+    return math.exp(energy / GAS_CONSTANT_J_MOL_K * (1.0 / reference - 1.0 / temperature))
 
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
@@ -31,14 +30,17 @@ def renew_weights(dt, faster, units, rates, e_rates, w, w_e):  # type: ignore[no
 
 @njit(inline="always", fastmath=FASTMATH)
 def step_electrolyte(  # type: ignore[no-untyped-def]
-    j0, j1, deviation, ahead, strength, one_minus_t, rates, gains, w, project, psi, top, to_nodes, c0,
-    q, c, rest, forcing, before,
-):  # fmt: skip
+    j0, j1, deviation, ahead, faster, electrolyte, w, dissolved
+):
     """Step the modes q and the concentrations c at the nodes.
 
     j0, j1 : cell current density at both ends.  deviation : (2 regions,) of each region's current from its share.
-    ahead : this step over the last, 0 for the first.  strength : factor of the explicit part psi, 0 where linear.
+    ahead : this step over the last, 0 for the first.  faster : factor of temperature on the explicit part.
     """
+    rates, gains, to_nodes, project = electrolyte[:4]
+    psi, top, c0, one_minus_t = electrolyte.psi, electrolyte.top, electrolyte.c0, electrolyte.supply
+    q, c, rest, forcing, before = dissolved
+    strength = electrolyte.strength * faster
     regions = deviation.shape[0] // 2
     forcing[:] = 0.0
     if strength > 0.0:
@@ -66,12 +68,21 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def step_particle(  # type: ignore[no-untyped-def]
-    mean, z, u0, u1, dt, rates, gains, lump, w, strength, at, project, psi, nodes, force, force_end
+    u, mean, z, u0, u1, dt, faster, particles, w, scratch
 ):
-    """Step one particle under a current from u0 to u1; returns its new mean and what a unit of current takes.
+    """Step particle u under a current from u0 to u1; returns its new mean and what a unit of current takes.
 
-    strength : factor of the explicit part psi, 0 where diffusion is linear; predicted, then corrected once.
+    faster : factor of temperature on the explicit part, which is predicted, then corrected once.
     """
+    side, rates, gains, lump = (
+        particles.place[u, 0],
+        particles.rates[u],
+        particles.gains[u],
+        particles.lump[u],
+    )
+    strength, psi = particles.strength[side] * faster, particles.psi[side]
+    at, project = particles.at, particles.project
+    nodes, force, force_end = scratch
     taken = lump * dt
     force[:] = 0.0
     if strength > 0.0:
@@ -108,13 +119,22 @@ def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: 
     """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
 
     contrast : factor of what differs between the regions of an electrode in the logarithm.
+    Returns the mean over rest of the electrode that has less.
     """
     for i in range(gauss.shape[0]):
         g = 0.0
         for j in range(c.shape[0]):
             g += gauss[i, j] * c[j]
-        salt[i] = max(g / c0, SMALLEST_SALT)
+        salt[i] = g / c0
     regions = log_salt.shape[0] // 2
+    driest = 1.0
+    for side in range(2):
+        whole = 0.0
+        for r in range(side * regions, (side + 1) * regions):
+            whole += (5.0 * (salt[3 * r] + salt[3 * r + 2]) + 8.0 * salt[3 * r + 1]) / 18.0 / regions
+        driest = min(driest, whole)
+    for i in range(gauss.shape[0]):
+        salt[i] = wet(salt[i])
     for side in range(2):
         middle = 0.0
         for r in range(side * regions, (side + 1) * regions):
@@ -124,6 +144,7 @@ def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: 
             middle += log_salt[r] / regions
         for r in range(side * regions, (side + 1) * regions):
             log_salt[r] = middle + contrast * (log_salt[r] - middle)
+    return driest
 
 
 @njit(inline="always", fastmath=FASTMATH)

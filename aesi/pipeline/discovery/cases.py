@@ -30,6 +30,8 @@ def case_of_files(
     seed: int = 0,
     effect_files: Sequence[Path] = (),
     hold: Hold | None = None,
+    only: Sequence[str] = (),
+    without: Sequence[str] = (),
 ) -> Case:
     """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
 
@@ -48,6 +50,8 @@ def case_of_files(
         max_effects,
         seed,
         tuple(effect_files),
+        tuple(only),
+        tuple(without),
     )
 
 

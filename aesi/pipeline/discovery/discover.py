@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from aesi.physics.effects import CATALOGUE, known_effects
+from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
+from aesi.physics.folded import folded
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -35,6 +36,7 @@ class Case:
     """One case as it was asked for.
 
     cell : a BPX file, or a saved model or its folder, whose cell and effects are what is declared.
+    only, without : ids of the effects that are tried, or are not; all where neither names one.
     """
 
     cell: Path | HybridModel
@@ -45,6 +47,12 @@ class Case:
     max_effects: int = 3
     seed: int = 0
     effect_files: tuple[Path, ...] = ()
+    only: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+
+    def tried(self) -> dict[str, Effect]:
+        """The effects that compete.  Raises InputError for an effect file or an id that is none."""
+        return selected(known_effects(self.effect_files), self.only, self.without)
 
 
 def run_case(case: Case, out: Path | None = None, progress: Progress | None = None) -> Discovery:
@@ -60,7 +68,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
         holdout=case.holdout,
         max_effects=case.max_effects,
         seed=case.seed,
-        effects=known_effects(case.effect_files),
+        effects=case.tried(),
         given=given.effects,
         archive=None if out is None else out / ARCHIVE,
         progress=progress,
@@ -82,8 +90,15 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
 
 
 def found_model(found: Discovery) -> HybridModel:
-    """The cell with what was found."""
-    return HybridModel(found.cell, found.model_effects, soc0=found.soc0, hold=found.hold)
+    """The cell with what was found: in its file as far as that holds it, the rest as effects.
+
+    What moves full and empty (lost lithium or active material) stays an effect, so that a state of charge is the same.
+    """
+    inside = folded(found.cell, found.model_effects)
+    if not inside.same_window(found.cell):
+        inside = folded(found.cell, ())
+    left = inside.left if inside.held else found.model_effects
+    return HybridModel(inside.cell, left, soc0=found.soc0, hold=found.hold)
 
 
 def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:

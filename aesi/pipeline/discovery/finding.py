@@ -83,7 +83,7 @@ class Finding:
         import pandas as pd
 
         rows = []
-        for candidate in self.content["candidates"]:
+        for candidate in sorted(self.content["candidates"], key=lambda c: -c["score"]):
             about = {key: candidate[key] for key in ("effect", "kind", "score", "test_rmse_mv")}
             for name, values in (candidate["parameters"] or {None: {}}).items():
                 rows.append(about | {"parameter": name} | values)

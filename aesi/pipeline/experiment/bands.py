@@ -103,12 +103,15 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     """(n,) True where the model had been trained on such inputs.
 
     The models behind left-out pieces share the scaling of the whole training set and cannot tell by themselves:
-    for a piece of a training record, the range is that of the training rows outside it.
+    for a piece of a training record, the range is that of the training rows outside it. Physics extrapolates as it
+    does in use, and so does a correction that fades into it: all of their rows count.
     """
-    if isinstance(model, Bare | Persistence):  # trained on nothing
+    faded = isinstance(model, SparseModel) and model.fade is not None
+    if faded or isinstance(model, Bare | Persistence):
         return np.ones(len(series), dtype=bool)
     seen = [
-        record.inputs[_others(len(record), rows)] if record is series else record.inputs for record in train
+        record.inputs[_others(len(record), rows)] if record.name == series.name else record.inputs
+        for record in train
     ]
     low = np.min([rows.min(axis=0) for rows in seen if len(rows)], axis=0)
     high = np.max([rows.max(axis=0) for rows in seen if len(rows)], axis=0)

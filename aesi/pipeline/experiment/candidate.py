@@ -29,8 +29,7 @@ class ScoredCandidate:
 
     coverage_pct, width_v : share of validation samples covered, and mean width in V; None where the residuals
     cannot be calibrated (`note` says why).  seconds : what it took, by the clock.
-    The candidate's honest residuals have done their work by then and are left out: at 88,200 rows they would be
-    nearly all of what is stored of it.
+    The out-of-fold residuals are not kept: at 88,200 rows they would be nearly all of what is stored of a candidate.
     """
 
     candidate: Candidate
@@ -124,7 +123,13 @@ def genome_space(problem: Problem, config: ExperimentConfig) -> GenomeSpace:
     """The ranges of the genes that the experiment names."""
     search, library = config.search, config.library
     return GenomeSpace(
-        len(problem.library), search.lambda1, search.lambda2, search.tau, library.p_c, library.d
+        len(problem.library),
+        search.lambda1,
+        search.lambda2,
+        search.tau,
+        library.p_c,
+        library.d,
+        library.feedback,
     )
 
 

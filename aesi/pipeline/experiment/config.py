@@ -36,7 +36,19 @@ if TYPE_CHECKING:
 
 NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 
-ComparedModel = Literal["ESPM", "AESI I", "AESI II", "SINDy-C", "ridge", "gradient boosting"]
+ComparedModel = Literal[
+    "ESPM",
+    "ESPM, one resistor",
+    "ESPM, initial state fitted",
+    "ESPM recalibrated",
+    "AESI I",
+    "AESI II",
+    "SINDy-C",
+    "PySINDy ensemble",
+    "DMD with control",
+    "ridge",
+    "gradient boosting",
+]
 
 
 class ExperimentConfig(Section):

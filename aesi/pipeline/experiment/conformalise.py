@@ -7,15 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import overload
 
 import numpy as np
 
-from aesi.conformal import METHODS, Calibrated, Method
+from aesi.conformal import COMPARED, Calibrated, Method, RefittedForest, RefittedIntervals
 from aesi.errors import FitError
 from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.records import HeldOutDrive
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -24,38 +26,49 @@ SEARCHED = ("AESI I", "AESI II")
 
 
 def conformalise(
-    models: Sequence[Fitted], problem: Problem, chosen: Candidate, config: ExperimentConfig
+    models: Sequence[Fitted],
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    left_out: Sequence[HeldOutDrive] = (),
 ) -> tuple[Fitted, ...]:
     """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
-    All: the validation records. The ensembles also each training piece, by a model fitted without it. Models
-    that were fitted to nothing also the training records.
+    All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
+    also the training records.
+    left_out : training drives under physics fitted without a part of them; by default the drives as they are.
     """
-    unseen: list[Unseen] = list(fold_models(problem, chosen))
-    lambda1 = chosen.genome.lambda1
-    return tuple(_conformalised(one, unseen, problem, config, lambda1) for one in models)
+    return tuple(_conformalised(one, problem, chosen, config, left_out) for one in models)
 
 
 def _conformalised(
-    one: Fitted, unseen: Sequence[Unseen], problem: Problem, config: ExperimentConfig, lambda1: float
+    one: Fitted,
+    problem: Problem,
+    chosen: Candidate,
+    config: ExperimentConfig,
+    left_out: Sequence[HeldOutDrive],
 ) -> Fitted:
-    if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
-        one = replace(one, model=with_leverage(one.model, problem, lambda1))
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
-    if one.model.name in SEARCHED:
-        pairs += unseen
+    if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
+        pairs += fold_models(problem, chosen, one.model, left_out)
+        one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
     elif isinstance(one.model, Bare | Persistence):
-        pairs += [(one.model, series, WHOLE) for series in problem.split.train]
+        pairs += [(one.model, each.series, each.rows) for each in left_out]
+        if not left_out:
+            pairs += [(one.model, series, WHOLE) for series in problem.split.train]
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []
-    compared: dict[str, Calibrated] = {}
+    compared: dict[str, Calibrated | RefittedIntervals] = {}
     try:
         intervals = _intervals(pairs, config, method(config))
-        if one.model.name in SEARCHED:
-            compared = {name: _intervals(pairs, config, METHODS[name]) for name in config.conformal.compare}
     except FitError as error:
         notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
+    for name in config.conformal.compare if one.model.name in SEARCHED else ():
+        try:
+            compared[name] = _intervals(pairs, config, COMPARED[name])
+        except FitError as error:
+            notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
     try:
         errors = HonestErrors.of(pairs, problem.split.train, config.conformal.horizons_s)
         bands = errors.bands(config.conformal.alpha)
@@ -69,7 +82,19 @@ def _conformalised(
     return replace(one, intervals=intervals, bands=bands, compared=compared, notes=tuple(notes))
 
 
-def _intervals(pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method) -> Calibrated:
+@overload
+def _intervals(pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method) -> Calibrated: ...
+
+
+@overload
+def _intervals(
+    pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method | RefittedForest
+) -> Calibrated | RefittedIntervals: ...
+
+
+def _intervals(
+    pairs: Sequence[Unseen], config: ExperimentConfig, chosen: Method | RefittedForest
+) -> Calibrated | RefittedIntervals:
     conformal = config.conformal
     return chosen.fit(
         [(series.error_v - model.one_step(series))[rows] for model, series, rows in pairs],

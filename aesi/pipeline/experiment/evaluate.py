@@ -16,10 +16,11 @@ import numpy as np
 from aesi.conformal import FreeRunBands, Intervals
 from aesi.conformal.free_run import HorizonBand
 from aesi.conformal.scores import score
-from aesi.numerics.metrics import mser, rmse
+from aesi.numerics.metrics import rmse
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.bands import error_ahead, reach
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
 
@@ -47,15 +48,23 @@ class _Judged:
     compared: dict[str, Intervals]
 
 
-def evaluate(fitted: Sequence[Fitted], split: Split) -> EvaluatedModels:
-    """Figures of every model on train, validation and test records, and the traces that the report draws."""
+def evaluate(
+    fitted: Sequence[Fitted], split: Split, validation: Mapping[str, float] | None = None
+) -> EvaluatedModels:
+    """Figures of every model on train, validation and test records, and the traces that the report draws.
+
+    validation : model -> reduction over drives that chose nothing, per cent (`aesi.pipeline.experiment.validation`).
+    """
     traces: dict[tuple[Role, str], dict[str, ModelVoltage]] = {}
     rows, outside = [], {}
     for one in fitted:
         started = time.monotonic()
-        judged = {role: [_judge(one, series) for series in getattr(split, role)] for role in ROLES}
+        judged = {role: [_judge(one, series, role) for series in getattr(split, role)] for role in ROLES}
         seconds = one.seconds + time.monotonic() - started
-        rows.append(_row(one, judged, seconds))
+        row = _row(one, judged, seconds)
+        if validation and one.model.name in validation:
+            row["validation_mser_pct"] = validation[one.model.name]
+        rows.append(row)
         for role, records in judged.items():
             for record in records:
                 key = (role, record.series.name)
@@ -72,7 +81,7 @@ def evaluate(fitted: Sequence[Fitted], split: Split) -> EvaluatedModels:
     )
 
 
-def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
+def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
     free = one.model.free_run(series)
     prediction = one.model.one_step(series)
     residual = series.error_v - prediction
@@ -83,7 +92,9 @@ def _judge(one: Fitted, series: ErrorSeries) -> _Judged:
         one_step=prediction,
         intervals=None if one.intervals is None else one.intervals.intervals(residual, series.current_a),
         bands=None if one.bands is None else one.bands.intervals(series, free, reach(one.model, series)),
-        compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()},
+        compared={name: each.intervals(residual, series.current_a) for name, each in one.compared.items()}
+        if role == "test"  # the tables show no other
+        else {},
     )
 
 
@@ -95,7 +106,10 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
         if not records:
             continue
         error = _joined(r.series.error_v for r in records)
-        free[f"{role}_mser_pct"] = mser(error, _joined(r.free.error_v for r in records))
+        left = error - _joined(r.free.error_v for r in records)
+        for key, against in (("mser_pct", DECLARED), ("mser_recalibrated_pct", RECALIBRATED)):
+            physics = _joined(r.series.left_by(against) for r in records)
+            free[f"{role}_{key}"] = 100.0 * (1.0 - float(np.mean(left**2) / np.mean(physics**2)))
         free[f"{role}_rmse_mv"] = MILLIVOLT_PER_VOLT * rmse(error, _joined(r.free.error_v for r in records))
         after = _joined(r.series.error_v[1:] for r in records)
         step[f"{role}_rmse_mv"] = MILLIVOLT_PER_VOLT * rmse(after, _joined(r.one_step[1:] for r in records))

@@ -10,10 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from aesi.conformal import Calibrated, FreeRunBands
+from aesi.conformal import Calibrated, FreeRunBands, RefittedIntervals
 from aesi.pipeline.experiment.candidate import genome_space, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.experiment.load import Loaded, cuts
+from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
 from aesi.sparse import Candidate, Options, Problem
 from aesi.sparse.baselines import BASELINES, Judge, Tuning
@@ -35,7 +36,7 @@ class Fitted:
     seconds: float
     intervals: Calibrated | None = None
     bands: FreeRunBands | None = None
-    compared: Mapping[str, Calibrated] = field(default_factory=dict)
+    compared: Mapping[str, Calibrated | RefittedIntervals] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     trials: tuple[Mapping[str, Any], ...] = ()
 
@@ -55,7 +56,10 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
         best=search.top_share,
         horizon=search.horizon,
         fold=search.fold,
+        cuts=cuts(config.data),
         regime=search.regime,
+        feedback=library.feedback,
+        fade=library.fade,
         seed=config.seed,
     )
     return Problem.build(loaded.split, options)
@@ -77,8 +81,8 @@ def _model(name: str, problem: Problem, chosen: Candidate, tuning: Tuning) -> tu
         return chosen.bagging, len(chosen.bagging.terms)
     if name == "AESI II":
         return chosen.stability, len(chosen.stability.terms)
-    if name == "ESPM":
-        return Bare(), 0
+    if name in PHYSICS_NAMES:
+        return Bare(name), 0
     if name == "persistence":
         return Persistence(), 0
     baseline = BASELINES[name](problem, tuning)

@@ -7,9 +7,10 @@ the states that its history gave it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,10 +24,11 @@ from aesi.physics import ActiveEffect, Cell, initial_state, simulate
 from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
+from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models, without
+from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.pipeline.product.declared import declared_model
-from aesi.pipeline.product.error_series import error_series
-from aesi.records import ROLES, ErrorSeries, Measurement, Role, Split
+from aesi.records import ROLES, ErrorSeries, HeldOutDrive, Hold, Measurement, Role, Split
 from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
@@ -40,12 +42,15 @@ class Loaded:
     config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
+    cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : for each part of the training drives that
+    is left out in turn (`cuts`), its drive under physics that was fitted to all the others.
     """
 
     cell: Cell
     cell_name: str
     effects: tuple[ActiveEffect, ...]
     split: Split
+    left_out: tuple[HeldOutDrive, ...]
     soc0: dict[str, float]
     digests: dict[str, str]
     notes: tuple[str, ...]
@@ -127,9 +132,9 @@ def _load(config: ExperimentConfig) -> Loaded:
     given = declared_model(path)
     cell, effects = given.cell, (*given.effects, *_effects(config))
     sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
-    series: dict[str, ErrorSeries] = {}
     soc0: dict[str, float] = {}
     notes: list[str] = []
+    records: dict[str, FitRecord] = {}
     for name, (measurement, known_soc0) in sources.records.items():
         check_belongs(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
@@ -138,22 +143,118 @@ def _load(config: ExperimentConfig) -> Loaded:
         notes.append(start.sentence)
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
-        run = simulate(
-            cell, even.time_s, even.current_a, soc0[name], effects, even.temperature_degc, config.data.hold
+        records[name] = no_rows(even, start.soc)
+    drives = _training_drives(config.data, records, sources.roles)
+    for name, rows in drives:
+        records[name].rows[rows] = True
+    hold = config.data.hold
+    physics = physics_models(cell, effects, records, hold, config.cell.start)
+    series, empty = _series(physics, records, config)
+    for name in empty:
+        if name not in sources.roles["test"]:
+            _refuse(physics, records[name], hold)
+        notes.append(
+            f"{name} runs empty in the model; its stoichiometries were held at the edge from there on."
         )
-        whole = error_series(even, run, config.data.dt_s)
-        # Before the record is cut: a filtered current has to know what came before a piece.
-        series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
+    split = _split(config.data, series, sources.roles)
+    refitted = config.cell.start == "recalibrated" and len(drives) > 1
+    left_out = tuple(
+        HeldOutDrive(
+            _without(config, cell, effects, records, drive, rows, piece.name) if refitted else piece, rows
+        )
+        for drive, piece in zip(drives, split.train, strict=True)
+        for rows in _parts(len(piece), cuts(config.data))
+    )
+    chosen = physics.chosen
     return Loaded(
-        cell=cell,
+        cell=chosen.cell,
         cell_name=cell.name or path.stem,
         effects=effects,
-        split=_split(config.data, series, sources.roles),
-        soc0=soc0,
+        split=split,
+        left_out=left_out,
+        soc0={name: chosen.soc0(each) for name, each in soc0.items()},
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
     )
+
+
+def _series(
+    physics: PhysicsModels, records: Mapping[str, FitRecord], config: ExperimentConfig
+) -> tuple[dict[str, ErrorSeries], list[str]]:
+    """Whole records under the physics, and the names of those that run empty there."""
+    series: dict[str, ErrorSeries] = {}
+    empty = []
+    for name, record in records.items():
+        whole, ran_empty = physics.series(record.measurement, record.soc0, config.data.dt_s, config.data.hold)
+        # Before the record is cut: a filtered current has to know what came before a piece.
+        series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
+        if ran_empty:
+            empty.append(name)
+    return series, empty
+
+
+def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:
+    """Raise what a simulation that may not run empty says."""
+    chosen, data = physics.chosen, record.measurement
+    simulate(
+        chosen.cell,
+        data.time_s,
+        data.current_a,
+        chosen.soc0(record.soc0),
+        chosen.effects,
+        data.temperature_degc,
+        hold,
+    )
+
+
+def _training_drives(
+    data: DataConfig, records: Mapping[str, FitRecord], roles: Mapping[Role, Sequence[str]]
+) -> list[tuple[str, slice]]:
+    """Record and rows of each training drive, in the order of `Split.train`."""
+    if data.repeats is None:
+        return [(name, slice(0, len(records[name].rows))) for name in roles["train"]]
+    (name, record), repeats = next(iter(records.items())), data.repeats
+    time = record.measurement.time_s
+    drives = []
+    for number in repeats.train:
+        begin = time[0] + (number - 1) * repeats.period_s
+        low, high = np.searchsorted(time, [begin, begin + repeats.period_s])
+        drives.append((name, slice(int(low), int(low + round((high - low) * (1 - repeats.valid_share))))))
+    return drives
+
+
+def cuts(data: DataConfig) -> int:
+    """Into how many parts a training drive is cut to be left out in turn.
+
+    Repeats of one record lie side by side in the state of charge. A test repeat lies between two of training, half a
+    repeat from either at most, and so does half a repeat from its other half; without a whole one, three repeats are
+    missing in a row, which asks for more than the test.
+    """
+    return 2 if data.repeats is not None else 1
+
+
+def _parts(n: int, count: int) -> list[slice]:
+    edges = np.linspace(0, n, count + 1).round().astype(int)
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
+
+
+def _without(
+    config: ExperimentConfig,
+    cell: Cell,
+    effects: tuple[ActiveEffect, ...],
+    records: Mapping[str, FitRecord],
+    drive: tuple[str, slice],
+    part: slice,
+    called: str,
+) -> ErrorSeries:
+    """A training drive under physics that was fitted to all but a part of it."""
+    name, rows = drive
+    unseen = slice(rows.start + part.start, rows.start + part.stop)
+    others = without(records, name, unseen)
+    physics = physics_models(cell, effects, others, config.data.hold, config.cell.start)
+    series, _ = _series(physics, {name: records[name]}, config)
+    return series[name].take(rows, called)
 
 
 @dataclass(frozen=True, eq=False)

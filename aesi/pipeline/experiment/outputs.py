@@ -14,6 +14,7 @@ from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.evaluate import EvaluatedModels
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import tables, write_figures, write_run_report
@@ -25,7 +26,7 @@ from aesi.sparse.ranking import svd_ranking
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
 ENSEMBLES = ("AESI I", "AESI II")
-PHYSICS = "ESPM"
+PHYSICS = DECLARED
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +98,7 @@ def notes(result: Result) -> tuple[str, ...]:
 
 def published(name: str) -> str:
     """A model of the error as the hybrid that it makes with the physics; the physics alone keeps its name."""
-    return name if name == PHYSICS else f"{PHYSICS} + {name}"
+    return name if name in PHYSICS_NAMES else f"{PHYSICS} + {name}"
 
 
 def _published_trace(trace: RecordTrace) -> RecordTrace:

@@ -56,7 +56,7 @@ class ComparedRun:
 
 
 @dataclass(frozen=True)
-class Cell:
+class ComparedCell:
     """Text, what it sorts by (None: the text), and the range below it."""
 
     text: str
@@ -72,7 +72,7 @@ class PageTable:
     title: str
     caption: str
     header: tuple[str, ...]
-    rows: tuple[tuple[Cell, ...], ...]
+    rows: tuple[tuple[ComparedCell, ...], ...]
 
 
 def write_comparison(path: Path, runs: Sequence[ComparedRun]) -> Path:
@@ -119,7 +119,11 @@ def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
         else "All settings are the same.",
         ("run", "started", *keys),
         tuple(
-            (Cell(run.label), Cell(run.started), *(Cell(run.settings.get(key, ABSENT)) for key in keys))
+            (
+                ComparedCell(run.label),
+                ComparedCell(run.started),
+                *(ComparedCell(run.settings.get(key, ABSENT)) for key in keys),
+            )
             for run in runs
         ),
     )
@@ -134,8 +138,8 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
         ("run", "model", *(COLUMNS[name] for name in names)),
         tuple(
             (
-                Cell(run.label),
-                Cell(run.settings.get("chosen_model", ABSENT)),
+                ComparedCell(run.label),
+                ComparedCell(run.settings.get("chosen_model", ABSENT)),
                 *(_figure(run, n) for n in names),
             )
             for run in runs
@@ -143,13 +147,13 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
     )
 
 
-def _figure(run: ComparedRun, name: str) -> Cell:
+def _figure(run: ComparedRun, name: str) -> ComparedCell:
     value = run.metrics.get(name)
     if value is None:
-        return Cell(ABSENT)
+        return ComparedCell(ABSENT)
     model = run.settings.get("chosen_model", "")
     ends = run.comparison.get("intervals", {}).get(model, {}).get(name.rpartition("/")[2])
-    return Cell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
+    return ComparedCell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
 
 
 def _verdicts(runs: Sequence[ComparedRun]) -> PageTable | None:
@@ -164,17 +168,17 @@ def _verdicts(runs: Sequence[ComparedRun]) -> PageTable | None:
         ("run", "verdict", "effects", *names),
         tuple(
             (
-                Cell(run.label),
-                Cell(str(run.discovery["verdict"])),
-                Cell(", ".join(run.discovery["effects"]) or "none"),
-                *(_parameters(run).get(name, Cell(ABSENT)) for name in names),
+                ComparedCell(run.label),
+                ComparedCell(str(run.discovery["verdict"])),
+                ComparedCell(", ".join(run.discovery["effects"]) or "none"),
+                *(_parameters(run).get(name, ComparedCell(ABSENT)) for name in names),
             )
             for run in found
         ),
     )
 
 
-def _parameters(run: ComparedRun) -> dict[str, Cell]:
+def _parameters(run: ComparedRun) -> dict[str, ComparedCell]:
     """effect.parameter -> value with unit, of the effects that were added."""
     cells = {}
     for candidate in run.discovery.get("candidates", ()):
@@ -182,7 +186,7 @@ def _parameters(run: ComparedRun) -> dict[str, Cell]:
             for name, given in candidate["parameters"].items():
                 low, high = given.get("low"), given.get("high")
                 ends = f"{_text(low)} to {_text(high)}" if low is not None and high is not None else ""
-                cells[f"{candidate['effect']}.{name}"] = Cell(
+                cells[f"{candidate['effect']}.{name}"] = ComparedCell(
                     f"{_text(given['value'])} {given.get('unit', '')}".strip(), given["value"], ends
                 )
     return cells
@@ -198,7 +202,7 @@ def _genes(runs: Sequence[ComparedRun]) -> PageTable | None:
         "The genes of the chosen candidate.",
         ("run", *names),
         tuple(
-            (Cell(run.label), *(_value(run.comparison.get("genome", {}).get(name)) for name in names))
+            (ComparedCell(run.label), *(_value(run.comparison.get("genome", {}).get(name)) for name in names))
             for run in runs
         ),
     )
@@ -220,10 +224,13 @@ def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
         f"Coefficients of the terms that not all runs hold; {shared} terms are in all {len(having)} runs."
     )
     if len(having) > MOST_COLUMNS:
-        counted = tuple((Cell(term), Cell(str(count[term]), count[term])) for term in differing)
+        counted = tuple(
+            (ComparedCell(term), ComparedCell(str(count[term]), count[term])) for term in differing
+        )
         return PageTable("terms", "Terms", caption, ("term", "in runs"), counted)
     rows = tuple(
-        (Cell(term), *(_value(run.comparison["terms"].get(term)) for run in having)) for term in differing
+        (ComparedCell(term), *(_value(run.comparison["terms"].get(term)) for run in having))
+        for term in differing
     )
     return PageTable("terms", "Terms", caption, ("term", *(run.label for run in having)), rows)
 
@@ -238,12 +245,12 @@ TABLES: tuple[Callable[[Sequence[ComparedRun]], PageTable | None], ...] = (
 """The tables of the page, in their order."""
 
 
-def _value(value: Any) -> Cell:
+def _value(value: Any) -> ComparedCell:
     if value is None:
-        return Cell(ABSENT)
+        return ComparedCell(ABSENT)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        return Cell(str(value))
-    return Cell(_text(value), float(value))
+        return ComparedCell(str(value))
+    return ComparedCell(_text(value), float(value))
 
 
 def _text(value: float) -> str:

@@ -9,10 +9,9 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
+from aesi.pipeline.report.sizes import SAME_SHARE, sized
 from aesi.pipeline.report.views import DiscoveryView, Row, RunView
 
-SAME_SHARE = 0.98
-"""An error after that is not below this share of the recalibrated one is no better than a refit."""
 LARGE_SHARE = 0.5
 """An explainable rest above this share of the remaining error is worth a sentence."""
 NEARLY = 0.98
@@ -86,21 +85,38 @@ def interval_finding(model: Row) -> str:
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such."""
     verdict, effects = view.discovery["verdict"], view.discovery["effects"]
-    sure = f" ({confidence(view.discovery)})"
     if verdict == "none":
-        return f"Nothing is missing from the declared model of {view.cell} that these data could show{sure}."
+        return f"Nothing is missing from the declared model of {view.cell} that these data could show."
     if verdict == "unknown":
         rest = "that no effect of the catalogue explains beyond doubt"
         if not effects:
-            return f"The declared model of {view.cell} misses something real {rest}{sure}."
-        return f"{_named(view, effects)}; and something real is left {rest}{sure}."
+            return f"The declared model of {view.cell} misses something real {rest}."
+        return f"{_named(view, effects)}; and something real is left {rest}."
+    sure = name_confidence(view.discovery)
+    if refit_does_as_well(view.discovery):
+        return (
+            f"One of two explanations: {_lowered(_named(view, effects))}{sure}; or the model's own parameters are off, "
+            "since a refit of them does as well on data that chose nothing."
+        )
     return f"{_named(view, effects)}{sure}."
 
 
-def confidence(discovery: Mapping[str, Any]) -> str:
-    """The confidence of a verdict, never as certainty."""
+def name_confidence(discovery: Mapping[str, Any]) -> str:
+    """The confidence in the names of a finding, never as certainty; '' where there is no finding."""
+    if discovery["verdict"] != "found":
+        return ""
     value = discovery["confidence"]
-    return f"over {100 * CERTAIN:.0f} % confidence" if value > CERTAIN else f"{100 * value:.0f} % confidence"
+    share = f"over {100 * CERTAIN:.0f} %" if value > CERTAIN else f"{100 * value:.0f} %"
+    names = "this name" if len(discovery["effects"]) == 1 else "these names"
+    return f" ({share} confidence in {names})"
+
+
+def refit_does_as_well(discovery: Mapping[str, Any]) -> bool:
+    """Whether the declared model with its own parameters refitted leaves as little of unseen data as the finding."""
+    own, after = (
+        discovery.get(state, {}).get("test", {}).get("rmse_mv") for state in ("recalibrated", "after")
+    )
+    return own is not None and after is not None and after > SAME_SHARE * own
 
 
 def reason_finding(discovery: Mapping[str, Any]) -> str:
@@ -146,7 +162,8 @@ def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
     kinds = {row["effect"]: row["kind"] for row in view.discovery["candidates"]}
     groups: dict[str, list[str]] = {}
     for effect in effects:
-        groups.setdefault(kinds.get(effect, "physics"), []).append(_title(view.titles, effect))
+        name = sized(effect, view.discovery, _title(view.titles, effect))
+        groups.setdefault(kinds.get(effect, "physics"), []).append(name)
     parts = []
     if "physics" in groups:
         parts.append(f"the declared model of {view.cell} lacks {listed(groups['physics'])}")
@@ -158,6 +175,10 @@ def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
         parts.append(f"the data, not the cell, show {listed(groups['instrument'])}")
     text = "; ".join(parts)
     return text[:1].upper() + text[1:]
+
+
+def _lowered(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def _verb(names: Sequence[str]) -> str:
@@ -178,15 +199,12 @@ def discovery_consequence(view: DiscoveryView) -> str:
             f"own parameters refitted by {values['recalibrated']:.1f} mV; the noise floor is "
             f"{view.discovery['noise_floor_mv']:.1f} mV."
         )
-    text = (
+    return (
         f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
         f"same model with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model "
         f"with the finding added by {values['after']:.1f} mV; the noise floor is "
         f"{view.discovery['noise_floor_mv']:.1f} mV."
     )
-    if view.discovery["effects"] and values["after"] > SAME_SHARE * values["recalibrated"]:
-        text += " A refit of the model's own parameters does as well here: it can stand in for the finding."
-    return text
 
 
 def look_alike_finding(view: DiscoveryView) -> str:

@@ -6,6 +6,8 @@ from typing import Any
 
 from aesi.records import ErrorModel
 from aesi.sparse.baselines.boosting import gradient_boosting
+from aesi.sparse.baselines.dmd_c import dmd_with_control
+from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
 from aesi.sparse.baselines.ridge import plain_ridge
 from aesi.sparse.baselines.sindy_c import Judge, tuned_sindy_c
 from aesi.sparse.search.genome_space import GenomeSpace
@@ -32,6 +34,8 @@ BASELINES: dict[str, Callable[[Problem, Tuning], ErrorModel]] = {
     "SINDy-C": lambda problem, tuning: tuned_sindy_c(
         problem, tuning.seed, tuning.candidates, tuning.population, tuning.space, tuning.judge, tuning.told
     ),
+    "PySINDy ensemble": lambda problem, tuning: pysindy_ensemble(problem, tuning.seed),
+    "DMD with control": lambda problem, _: dmd_with_control(problem),
     "ridge": lambda problem, _: plain_ridge(problem),
     "gradient boosting": lambda problem, tuning: gradient_boosting(problem, tuning.seed),
 }

@@ -2,7 +2,7 @@
 
     e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
 
-The trees see the inputs alone, as a tree that sees e[k] learns to echo it and says nothing in free run. Depth
+The trees see the inputs alone: a tree that sees e[k] learns persistence, which is worth nothing in free run. Depth
 and learning rate come from a small grid, judged on the left-out pieces.
 """
 

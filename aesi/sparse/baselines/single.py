@@ -10,7 +10,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import Failed
 from aesi.sparse.model import SparseModel
-from aesi.sparse.search.evaluate import FitnessWeights, fitness, sparse_model
+from aesi.sparse.search.evaluate import FitnessWeights, faded, fitness, sparse_model
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.judge import Judged, fold_runs, on_validation
 from aesi.sparse.search.problem import Problem
@@ -48,7 +48,7 @@ def evaluate_single(
         return Failed("no term is left")
     fits = np.stack([fit(factor[:, columns]) for factor in problem.fold_factors])
     runs, memory = fold_runs(problem, active, fits, fits, coefficients)
-    model = sparse_model(problem, active, coefficients, memory, name)
+    model = faded(sparse_model(problem, active, coefficients, memory, name), problem, runs.amplitudes[0])
     folds, (valid,) = runs.judge(problem, 0), on_validation(problem, runs, (model,))
     if not np.isfinite(folds.loss + valid.loss):
         return Failed("the model diverges in free run")

@@ -10,6 +10,7 @@ from aesi.numerics.metrics import pearson
 from aesi.numerics.typing import Array, IntArray
 from aesi.records import Failed
 from aesi.sparse.ensemble import Ensemble, best_members, combine
+from aesi.sparse.fade import Fade
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.judge import FoldRuns, fold_runs, on_validation
@@ -33,7 +34,7 @@ class FitnessWeights:
 
 @dataclass(frozen=True, eq=False)
 class HonestResiduals:
-    """Errors that a model left which had not seen them, for calibration.
+    """Out-of-fold prediction errors, for the calibration of intervals: each by models that were not fitted to its row.
 
     one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
     by models fitted on all rows but the piece around each.  stable_v : the same by fits of the stable terms.
@@ -59,6 +60,7 @@ class Candidate:
     rows, started anew with each fold).
     free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (of the fold models
     on the folds where there are none).
+    fold_sums : (2, n_folds, 3) for `aesi.sparse.search.nested`, of AESI I and II.
     """
 
     genome: Genome
@@ -73,6 +75,7 @@ class Candidate:
     bagging: SparseModel
     stability: SparseModel
     residuals: tuple[HonestResiduals, ...]
+    fold_sums: Array
     oob_by_resample: Array
     valid_losses: tuple[float, float]
 
@@ -122,8 +125,12 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     ]
     runs, memory = fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
     bagging, stability = (
-        sparse_model(problem, active, coefficients, memory, name, ensemble)
-        for name, coefficients in (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
+        faded(
+            sparse_model(problem, active, coefficients, memory, name, ensemble), problem, runs.amplitudes[k]
+        )
+        for k, (name, coefficients) in enumerate(
+            (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
+        )
     )
     valid, valid_stable = on_validation(problem, runs, (bagging, stability))
     valid_losses = valid.loss, valid_stable.loss
@@ -146,6 +153,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         bagging=bagging,
         stability=stability,
         residuals=_honest(problem, runs),
+        fold_sums=runs.sums[:2],
         oob_by_resample=losses,
         valid_losses=valid_losses,
     )
@@ -163,6 +171,14 @@ def _honest(problem: Problem, runs: FoldRuns) -> tuple[HonestResiduals, ...]:
         HonestResiduals(record.name, left[a:b, 0], left[a:b, 1])
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)
     )
+
+
+def faded(model: SparseModel, problem: Problem, amplitude: float) -> SparseModel:
+    """The model as it gives way to the physics, where the problem wants that and its terms allow it."""
+    if model.has_feedback or not problem.options.fade:
+        return model
+    edge = np.ones(len(model.input_names))
+    return replace(model, fade=Fade(amplitude, -edge, edge))
 
 
 def sparse_model(

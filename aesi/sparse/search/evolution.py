@@ -40,8 +40,8 @@ def fittest(
 ) -> T:
     """The fittest of `candidates` genomes, bred in generations of `population`, the better half of all as parents.
 
-    The first ones are the plain starts of the space. Those that
-    are not `admitted` rank below all that are. Raises FitError where none survives.
+    The first ones are the plain starts of the space. Those that are not `admitted` rank below all that are.
+    Raises FitError where none survives.
     """
     alive: list[T] = []
     starts = list(space.plain_starts())

@@ -6,7 +6,7 @@ a long one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,8 @@ import numpy as np
 from aesi.numerics.blocks import leave_out_weights, pieces
 from aesi.numerics.typing import IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
-from aesi.records import ErrorSeries
+from aesi.records import ErrorSeries, HeldOutDrive
+from aesi.sparse.fade import Fade
 from aesi.sparse.leverage import Leverage
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import Candidate, sparse_model
@@ -25,33 +26,55 @@ N_PIECES = 12
 """Long enough to drift, short enough that the models without them are nearly the one that is judged."""
 
 
-def fold_models(problem: Problem, candidate: Candidate) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
+def fold_models(
+    problem: Problem,
+    candidate: Candidate,
+    judged: SparseModel | None = None,
+    left_out: Sequence[HeldOutDrive] = (),
+) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
     """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
 
-    One for every piece; folds in which no term survives are left out.
+    One for every piece: the folds of the search, where these are drives.  Folds in which no term survives are
+    left out.  judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
+    left_out : for every fold, its record under physics that has not seen the fold either; by default the records as
+    they are.
     """
-    genome = candidate.genome
-    active = np.flatnonzero(genome.active(problem.library))
+    genome, judged = candidate.genome, judged or candidate.bagging
+    active = _terms(problem, candidate, judged)
     solver = STRidge(genome.lambda1, genome.lambda2)
     n = len(problem.target)
-    cut = pieces(problem.spans, max(1, n // N_PIECES))
+    drives = problem.folds_are_drives
+    cut = list(problem.folds) if drives else pieces(problem.spans, max(1, n // N_PIECES))
     augmented = np.empty((n, len(active) + 1), order="F")
     augmented[:, :-1] = problem.theta(active).T
     augmented[:, -1] = problem.target
     augmented *= np.sqrt(problem.row_weights)[:, None]
     q_rows, r = orthonormal(augmented)
     factors = triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
-    for (a, b), factor in zip(cut, factors, strict=True):
+    for i, ((a, b), factor) in enumerate(zip(cut, factors, strict=True)):
         coefficients = solver.fit_factor(factor)
         if not coefficients.any():
             continue
         kept = np.flatnonzero(coefficients)
         seen = np.r_[0:a, b:n]
         model = replace(
-            sparse_model(problem, active, coefficients, candidate.bagging.memory, "left-out piece"),
+            sparse_model(problem, active, coefficients, judged.memory, "left-out piece"),
             leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
         )
-        yield model, *_samples(problem, a, b)
+        if judged.fade is not None:
+            low, high = problem.inputs[seen].min(axis=0), problem.inputs[seen].max(axis=0)
+            model = replace(model, fade=Fade(judged.fade.amplitude, low, high))
+        record, rows = fold_samples(problem, a, b)
+        yield model, left_out[i].series if drives and left_out else record, rows
+
+
+def _terms(problem: Problem, candidate: Candidate, judged: SparseModel) -> IntArray:
+    """Numbers of the terms that enter the fits of a fold."""
+    active = np.flatnonzero(candidate.genome.active(problem.library))
+    if judged.name != candidate.stability.name:
+        return active
+    stable = set(candidate.stability.library.terms)
+    return np.array([j for j in active if problem.library.terms[j] in stable])
 
 
 def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
@@ -61,7 +84,7 @@ def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> Spars
     return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))
 
 
-def _samples(problem: Problem, a: int, b: int) -> tuple[ErrorSeries, slice]:
+def fold_samples(problem: Problem, a: int, b: int) -> tuple[ErrorSeries, slice]:
     """The record that training rows a to b - 1 come from, and the samples they predict: row k, sample k + 1."""
     for record, (first, last) in zip(problem.split.train, problem.spans, strict=True):
         if first <= a < last:

@@ -15,7 +15,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class GenomeSpace:
-    """Ranges of the genes; `size` is the number of library terms.
+    """Ranges of the genes; `size` is the number of library terms, `feedback` whether any may hold the error.
 
     The paper searches lambda1 in 1e-13 to 1e-1. On measured cells at 1 Hz the best ridge is near 10, so the
     upper end is wider here; the paper's range is one argument away.
@@ -27,6 +27,7 @@ class GenomeSpace:
     tau: Range = (0.3, 0.7)
     p_c: tuple[int, int] = (0, 5)
     d: tuple[int, int] = (1, 5)
+    feedback: bool = True
 
     @classmethod
     def of(cls, library: Library) -> GenomeSpace:
@@ -44,7 +45,7 @@ class GenomeSpace:
             float(rng.uniform(*self.tau)),
             int(rng.integers(self.p_c[0], self.p_c[1] + 1)),
             int(rng.integers(self.d[0], self.d[1] + 1)),
-            bool(rng.integers(2)),
+            bool(rng.integers(2)) and self.feedback,
         )
 
     def plain_starts(self) -> tuple[Genome, ...]:
@@ -66,7 +67,7 @@ class GenomeSpace:
             )
             for lambda1 in (1.0, 100.0)
             for p_c, d in sorted(extents)
-            for feedback in (False, True)
+            for feedback in ((False, True) if self.feedback else (False,))
         )
 
     def child(self, mother: Genome, father: Genome, rng: np.random.Generator) -> Genome:
@@ -90,7 +91,7 @@ class GenomeSpace:
             if rng.random() < 0.2:
                 changes[gene] = int(np.clip(getattr(genome, gene) + rng.choice([-1, 1]), low, high))
         if rng.random() < 0.05:
-            changes["feedback"] = not genome.feedback
+            changes["feedback"] = self.feedback and not genome.feedback
         return replace(genome, **changes)
 
 

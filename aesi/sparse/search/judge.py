@@ -11,6 +11,7 @@ from aesi.numerics.metrics import mse, mser, pearson
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import ErrorSeries
 from aesi.sparse import free_run
+from aesi.sparse.fade import amplitude
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.problem import Problem, balanced_weights, spans_of
 
@@ -59,18 +60,27 @@ def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, ro
 
 @dataclass(frozen=True, eq=False)
 class FoldRuns:
-    """(n, 3) scaled predictions, by regime: of the fold's fit, its refit of the stable terms, and AESI I."""
+    """(n, 3) scaled predictions, by regime: of the fold's fit, its refit of the stable terms, and AESI I.
+
+    from_none : the free run that no measured error starts (`free_run` where the error feeds back).
+    amplitudes : of the three (fade.py).  sums : (3, n_folds, 3) over each fold, of e**2, e p and p**2 with p the
+    prediction from none before its amplitude, in free run; scaled.
+    """
 
     one_step: Array
     free_run: Array
+    from_none: Array
+    sums: Array
+    amplitudes: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
     def judge(self, problem: Problem, column: int) -> Judged:
         """How one of the three did over all pieces."""
         run = self.free_run if problem.options.regime == "free_run" else self.one_step
         bare = problem.target - problem.zero
         with np.errstate(invalid="ignore"):
-            left = problem.target - run[:, column]
-            loss = float((problem.row_weights @ left**2) / (problem.row_weights @ bare**2))
+            runs = (run, self.from_none) if problem.options.regime == "free_run" else (run,)
+            squares = [problem.row_weights @ (problem.target - each[:, column]) ** 2 for each in runs]
+            loss = float(np.mean(squares) / (problem.row_weights @ bare**2))
             loss_free = mse(problem.target, self.free_run[:, column]) / float(np.mean(bare**2))
             loss_step = mse(problem.target, self.one_step[:, column])
         return Judged(
@@ -89,28 +99,50 @@ def fold_runs(
         drive_of(problem, active, np.stack([fit, refit, bagging]), slice(a, b))
         for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)
     ]
-    remembers = not any(functions.any() for _, functions in drives)
-    memory = memory_of(problem, [drive[0][:, 0] for drive, _ in drives]) if remembers else 0.0
+    if not any(functions.any() for _, functions in drives):
+        return _without_feedback(problem, np.vstack([drive[0] for drive, _ in drives]))
     parts = []
     for (a, b), (drive, functions) in zip(problem.folds, drives, strict=True):
         rows = slice(a, b)
-        if remembers:
-            columns = drive[0].T
-            one = np.column_stack(
-                [free_run.remember_ahead(given, memory, problem.error[rows], 1) for given in columns]
-            )
-            free = np.column_stack([free_run.remember(given, memory, problem.error[a]) for given in columns])
-        else:
-            one = one_step_predictions(problem, drive, functions, rows)
-            restart = np.zeros(b - a, dtype=bool)
-            restart[0] = True
-            free = free_predictions(problem, drive, functions, rows, restart, np.zeros(3))
+        one = one_step_predictions(problem, drive, functions, rows)
+        restart = np.zeros(b - a, dtype=bool)
+        restart[0] = True
+        free = free_predictions(problem, drive, functions, rows, restart, np.zeros(3))
         parts.append((one, free))
-    return FoldRuns(np.vstack([one for one, _ in parts]), np.vstack([free for _, free in parts])), memory
+    free_run_ = np.vstack([free for _, free in parts])
+    sums = _sums(problem, free_run_)
+    return FoldRuns(np.vstack([one for one, _ in parts]), free_run_, free_run_, sums), 0.0
+
+
+def _sums(problem: Problem, given: Array) -> Array:
+    error = problem.target[:, None] - problem.zero
+    with np.errstate(invalid="ignore", over="ignore"):
+        products = np.stack([np.broadcast_to(error**2, given.shape), error * given, given**2], axis=-1)
+        return np.stack([products[a:b].sum(axis=0) for a, b in problem.folds], axis=1)
+
+
+def _without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
+    """given : (n, 3) scaled predictions by the inputs alone, of rows that the models have not seen."""
+    amplitudes = [1.0] * given.shape[1]
+    sums = _sums(problem, given)
+    if problem.options.fade:
+        given = problem.fade[:, None] * given
+        sums = _sums(problem, given)
+        amplitudes = [
+            amplitude(problem.target, column, problem.folds, problem.row_weights) for column in given.T
+        ]
+        given = given * amplitudes
+    memory = memory_of(problem, [given[a:b, 0] for a, b in problem.folds])
+    one, free = np.empty_like(given), np.empty_like(given)
+    for a, b in problem.folds:
+        for j, column in enumerate(given[a:b].T):
+            one[a:b, j] = free_run.remember_ahead(column, memory, problem.error[a:b], 1)
+            free[a:b, j] = free_run.remember(column, memory, problem.error[a])
+    return FoldRuns(one, free, given, sums, (amplitudes[0], amplitudes[1], amplitudes[2])), memory
 
 
 def memory_of(problem: Problem, given: Sequence[Array]) -> float:
-    """The share of an honest residual that is left one step later: its lag-one regression, within [0, 1)."""
+    """Lag-one autoregression coefficient of a residual that the fit has not seen, within [0, 1)."""
     product, square = 0.0, 0.0
     for (a, b), prediction in zip(problem.folds, given, strict=True):
         left = problem.target[a:b] - prediction

@@ -9,8 +9,8 @@ can be computed once for the whole library and sliced. Three kinds of row weight
 - all rows, for the refit after stability selection.
 
 Out-of-bag and validation losses are taken in free run inside pieces of `horizon` rows, each started from its
-measured error (`regime="one_step"` for the loss as the paper prints it). One-step losses cannot tell a good
-simulator from a good echo.
+measured error (`regime="one_step"` for the loss as the paper prints it). One-step losses
+cannot tell a good simulator from one that repeats the last measured error.
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from aesi.numerics.blocks import (
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries, Split
+from aesi.sparse.fade import range_weight
 from aesi.sparse.terms.basis import FUNCTIONS, values
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library, evaluate_terms
@@ -52,8 +53,10 @@ class Options:
     resamples, block : bootstrap resamples, and rows in a block (default: 500, or a tenth of the rows where
     there are fewer than 5,000).
     best : share of resamples that enters the ensemble.  horizon : rows of a free run (default: the block).
-    fold : rows of a left-out piece (default: an eighth of the rows).
+    fold : rows of a left-out piece (default: records, each cut into `cuts`, or an eighth of the rows of a single one).
     regime : what the losses measure.  outside : what happens beyond the trained range.
+    feedback : whether terms may hold the error at all.
+    fade : whether a correction without such terms gives way to the physics where nothing bears it out (fade.py).
     balance : let every record count alike, in fits and losses, whatever the size of its error. Otherwise one
     record near the end of discharge, where the error is largest, decides the model for all others.
     """
@@ -69,9 +72,12 @@ class Options:
     best: float = 0.1
     horizon: int | None = None
     fold: int | None = None
+    cuts: int = 1
     regime: Regime = "free_run"
     outside: Outside = "clip"
     balance: bool = True
+    feedback: bool = True
+    fade: bool = False
     seed: int = 0
 
 
@@ -80,12 +86,13 @@ class Problem:
     """Training rows k -> k + 1 of all records, numbered through, and what was computed from them.
 
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
-    error_functions : (12, n) the functions of the fed-back error.  error, target : (n,) scaled e[k] and
-    e[k + 1].
+    error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
+    error, target : (n,) scaled e[k] and e[k + 1].
     counts : (resamples, n) how often each resample holds a row.
+    fade : (n,) what is left of a correction at each row by a model that has not seen its fold (fade.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
-    factors : (resamples, m + 1, m + 1), fold_factors likewise, and
-    full_factor (m + 1, m + 1): F with F' F = [Theta y]' W [Theta y], W the row weights times the counts.
+    factors : (resamples, m + 1, m + 1), fold_factors likewise, and full_factor (m + 1, m + 1): F with
+    F' F = [Theta y]' W [Theta y], W the row weights times the counts.
     notes : what was left out of the library, and why, one sentence each.
     """
 
@@ -99,11 +106,13 @@ class Problem:
     which: IntArray
     error_functions: Array
     error: Array
+    inputs: Array
     target: Array
     counts: CountArray
     row_weights: Array
     restart: BoolArray
     folds: tuple[Span, ...]
+    fade: Array
     factors: Array
     fold_factors: Array
     full_factor: Array
@@ -139,7 +148,7 @@ class Problem:
             [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
         )
         block = options.block or default_block(n)
-        cut = tuple(pieces(spans, options.fold or default_fold(n)))
+        cut = left_out_pieces(spans, options.fold, options.cuts)
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         augmented = np.empty((n, len(library) + 1), order="F")
         for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
@@ -163,16 +172,23 @@ class Problem:
             which=which,
             error_functions=error_functions,
             error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
+            inputs=rows[:, 1:],
             target=target,
             counts=weights,
             row_weights=row_weights,
             restart=starts_mask(pieces(spans, options.horizon or block), n),
             folds=cut,
+            fade=_fade(rows[:, 1:], cut),
             factors=every[: len(weights)],
             fold_factors=every[len(weights) :],
             full_factor=r,
             notes=notes,
         )
+
+    @property
+    def folds_are_drives(self) -> bool:
+        """Whether what is left out are records, or the parts of each that were asked for by `Options.cuts`."""
+        return self.options.fold is None and len(self.spans) > 1
 
     @property
     def zero(self) -> float:
@@ -222,9 +238,26 @@ def default_block(n: int) -> int:
     return min(500, max(10, n // 10))
 
 
-def default_fold(n: int) -> int:
-    """Rows of a left-out piece where none is asked for: an eighth."""
-    return max(10, n // 8)
+def left_out_pieces(spans: Sequence[Span], fold: int | None, cuts: int) -> tuple[Span, ...]:
+    """Pieces of about `fold` rows; where none is asked for, records cut into `cuts`, or eighths of a single one."""
+    if fold is None and len(spans) > 1:
+        return tuple(piece for a, b in spans for piece in cut_evenly(a, b, cuts))
+    return tuple(pieces(spans, fold or max(10, spans[-1][1] // 8)))
+
+
+def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
+    """The rows a to b - 1 in consecutive pieces."""
+    edges = np.linspace(a, b, cuts + 1).round().astype(int)
+    return [(int(p), int(q)) for p, q in pairwise(edges)]
+
+
+def _fade(inputs: Array, folds: Sequence[Span]) -> Array:
+    """(n,) by how far each row's scaled inputs lie outside the range of the other folds."""
+    parts = []
+    for a, b in folds:
+        others = np.delete(inputs, np.s_[a:b], axis=0)
+        parts.append(range_weight(inputs[a:b], others.min(axis=0), others.max(axis=0)))
+    return np.concatenate(parts)
 
 
 LEAST_SHARE = 0.1

@@ -31,11 +31,6 @@ def low_pass(x: Array, dt_s: float, tau_s: float) -> Array:
     return lfilter([1.0 - keep], [1.0, -keep], x, zi=[keep * x[0]])[0] if len(x) else x
 
 
-def is_derivable(name: str) -> bool:
-    """Whether `name` is one of the inputs this module can derive."""
-    return name in ("soc", "I_next") or _FILTERED.match(name) is not None
-
-
 def with_inputs(series: ErrorSeries, names: Sequence[str]) -> ErrorSeries:
     """The record with exactly the named inputs, in that order; those it lacks are derived.
 

@@ -2,6 +2,9 @@
 
     x' = 2 (x - low) / (high - low) - 1
 
+The range of the error is taken on both sides alike, -max |e| to max |e|, so that a scaled error of zero is none: a
+ridge then shrinks a model towards the physics, and not towards the middle of the errors that were seen.
+
 Outside the trained range Chebyshev polynomials grow like a power and tan has poles, so a term there says
 nothing that was learned. Scaled values are therefore held at -1 or 1, and the samples are flagged. With
 `outside="extrapolate"` they are left as they are.
@@ -30,9 +33,11 @@ class Scaling:
 
     @classmethod
     def of(cls, blocks: Sequence[Array], outside: Outside = "clip") -> Scaling:
-        """The range over several (n, n_variables) blocks."""
+        """The range over several (n, n_variables) blocks, the error first."""
         low = np.min([block.min(axis=0) for block in blocks], axis=0)
         high = np.max([block.max(axis=0) for block in blocks], axis=0)
+        high[0] = max(-low[0], high[0])
+        low[0] = -high[0]
         return cls(low, high, outside)
 
     def apply(self, data: Array) -> Array:

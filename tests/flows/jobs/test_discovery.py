@@ -34,7 +34,7 @@ def case(monkeypatch):
 
 
 def test_everything_is_written_and_tracked(tracked, case):
-    from flows.jobs.discovery import discover
+    from flows.jobs.start import discover
     from flows.tracking.store import Store
 
     out = tracked / "out"
@@ -61,7 +61,7 @@ def test_a_cell_file_that_is_none_is_refused_before_anything_starts(workspace, c
     from dataclasses import replace
 
     from aesi.errors import CellError
-    from flows.jobs.discovery import discover
+    from flows.jobs.start import discover
 
     path = tmp_path / "cell.json"
     path.write_text("{}")
@@ -77,7 +77,7 @@ def test_under_prefect_the_finding_is_the_same(tracked, case):
     from prefect.client.schemas.sorting import FlowRunSort, TaskRunSort
     from prefect.testing.utilities import prefect_test_harness
 
-    from flows.jobs.discovery import discover
+    from flows.jobs.start import discover
 
     plain = discover(case, tracked / "plain", use_prefect=False)
     with prefect_test_harness(server_startup_timeout=180):

@@ -8,11 +8,11 @@ import pytest
 
 from aesi.errors import DataError
 from flows.base.console import Console
-from flows.jobs.stages import ServerAway, StageOverdue, plainly, server_in_reach
+from flows.jobs.stages import PlainStages, ServerAway, StageOverdue, server_in_reach
 
 
 def test_a_stage_says_when_it_is_done(said):
-    assert plainly(said.append)("sums", lambda: 2 + 2) == 4
+    assert PlainStages(said.append)("sums", lambda: 2 + 2) == 4
     assert said == ["sums: done in 0 s"]
 
 
@@ -21,14 +21,14 @@ def test_a_stage_that_takes_too_long_is_interrupted_in_one_sentence(said):
     with pytest.raises(
         StageOverdue, match=r"'rest' took longer than .* \(runner\.stage_timeout_s\)"
     ) as caught:
-        plainly(said.append, timeout_s=0.2)("rest", lambda: time.sleep(30))
+        PlainStages(said.append, timeout_s=0.2)("rest", lambda: time.sleep(30))
     assert time.monotonic() - started < 5
     assert "\n" not in str(caught.value)
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 
 
 def test_the_time_of_one_stage_is_not_taken_from_the_next(said):
-    run = plainly(said.append, timeout_s=0.5)
+    run = PlainStages(said.append, timeout_s=0.5)
     for _ in range(3):
         run("rest", lambda: time.sleep(0.3))
     assert len(said) == 3
@@ -65,7 +65,7 @@ def test_as_tasks_a_passing_failure_is_tried_again_and_bad_input_is_not(said):
     from prefect import flow
     from prefect.testing.utilities import prefect_test_harness
 
-    from flows.jobs.stages import as_tasks
+    from flows.jobs.stages import PrefectStages
 
     tries = {"network": 0, "input": 0}
 
@@ -81,7 +81,7 @@ def test_as_tasks_a_passing_failure_is_tried_again_and_bad_input_is_not(said):
 
     @flow
     def job():
-        run = as_tasks(said.append)
+        run = PrefectStages(said.append)
         found = run("data", away_once, retries=2)
         with pytest.raises(DataError, match="row 3"):
             run("more", wrong, retries=2)

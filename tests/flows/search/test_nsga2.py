@@ -1,30 +1,16 @@
 """The search: deterministic, resumable, shared, and cheap beside its candidates."""
 
-import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import optuna
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[2] / "unit" / "sparse"))
-
-from sparse_records import make_record
-
 from aesi.errors import FitError
-from aesi.records import Failed, Split
-from aesi.sparse import FitnessWeights, Genome, Options, Problem, evaluate
+from aesi.records import Failed
+from aesi.sparse import FitnessWeights, Genome, evaluate
 from aesi.sparse.search.genome_space import GenomeSpace
 from flows.search.nsga2 import Constraints, search
-
-
-@pytest.fixture(scope="module")
-def problem():
-    return Problem.build(
-        Split((make_record(500, seed=1), make_record(400, seed=2, name="second")), (), ()),
-        Options(p_c=2, d=2, mixed=False, resamples=8, block=50),
-    )
 
 
 def genomes(result):

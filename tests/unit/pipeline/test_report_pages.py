@@ -37,7 +37,7 @@ def discovery_html(views, tmp_path_factory):
 
 def test_the_finding_comes_before_the_evidence(run_html, discovery_html):
     assert run_html.index("<h1>") < run_html.index('data-figure="voltage_test"')
-    assert discovery_html.index("lacks self-heating") < discovery_html.index('data-figure="residual_test"')
+    assert discovery_html.index("self-heating") < discovery_html.index('data-figure="residual_test"')
 
 
 def test_nothing_is_loaded_from_elsewhere(run_html, discovery_html):

@@ -54,12 +54,16 @@ def test_one_step_that_loses_to_persistence_is_said_to_lose():
 
 @pytest.mark.parametrize(
     ("verdict", "phrase"),
-    [("found", "lacks self-heating"), ("none", "Nothing is missing"), ("unknown", "no effect")],
+    [
+        ("found", "lacks 1.25 mohm [1.10, 1.40] of self-heating"),
+        ("none", "Nothing is missing"),
+        ("unknown", "no effect"),
+    ],
 )
 def test_each_verdict_has_its_sentence(views, verdict, phrase):
     text = words.discovery_finding(views.discovery_view(200, verdict=verdict))
     assert phrase in text
-    assert "97 % confidence" in text
+    assert ("97 % confidence" in text) == (verdict == "found")  # it belongs to a name
 
 
 @pytest.mark.parametrize(
@@ -80,7 +84,7 @@ def test_the_cell_is_named_once(views):
     view = views.discovery_view(200)
     found = replace(view, discovery={**view.discovery, "effects": ["self_heating", "ambient_temperature"]})
     text = words.discovery_finding(found)
-    assert "lacks self-heating; its ambient temperature is not as declared" in text
+    assert "self-heating; its ambient temperature (1.25 mohm [1.10, 1.40]) is not as declared" in text
     assert text.count(view.cell) == 1
 
 
@@ -103,7 +107,9 @@ def test_a_refit_that_does_as_well_is_said_to(views):
     view = views.discovery_view(200)
     assert "refit" not in words.discovery_consequence(view).split(";")[1]
     same = {**view.discovery, "recalibrated": {"test": {"rmse_mv": 1.1}}}
-    assert "can stand in for the finding" in words.discovery_consequence(replace(view, discovery=same))
+    text = words.discovery_finding(replace(view, discovery=same))
+    assert text.startswith("One of two explanations: the declared model")
+    assert "a refit of them does as well" in text
 
 
 @pytest.mark.parametrize(
@@ -135,8 +141,10 @@ def test_a_rest_that_follows_nothing_is_not_called_little(views):
 
 
 def test_no_verdict_is_called_certain():
-    assert words.confidence({"confidence": 1.0}) == "over 99 % confidence"
-    assert words.confidence({"confidence": 0.97}) == "97 % confidence"
+    found = {"verdict": "found", "effects": ["self_heating"]}
+    assert words.name_confidence({**found, "confidence": 1.0}) == " (over 99 % confidence in this name)"
+    assert words.name_confidence({**found, "confidence": 0.97}) == " (97 % confidence in this name)"
+    assert words.name_confidence({"verdict": "unknown", "effects": [], "confidence": 0.99}) == ""
 
 
 def test_the_range_that_the_data_cover_is_told(views):

@@ -86,12 +86,15 @@ def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> 
 
 
 def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str]) -> Figure:
-    """Measured voltage, current, and the residual in each state of the model, over time."""
+    """Voltage measured and in the first and last state of the model, current, and the residuals, over time."""
     fig = stack(3, (0.3, 0.2, 0.5))
     placed, unit = end_to_end(traces)
     for i, item in enumerate(placed):
         trace = item.trace
         assert isinstance(trace, DiscoveryTrace)
+        for state in dict.fromkeys((next(iter(labels)), list(labels)[-1])):
+            voltage = getattr(trace, f"{state}_v")
+            line(fig, item.x, voltage, labels[state], style.STATE_COLOURS[state], 1, first=False)
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, 1.0)
         line(fig, item.x, trace.current_a, "current", style.GREY, 2, i == 0, 1.0)
         for state, label in labels.items():
@@ -103,9 +106,12 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
     fig.update_yaxes(title_text="residual, mV", zeroline=True, row=3)
     fig.update_xaxes(title_text=time_title(placed, unit), row=3)
     part = "data that chose nothing" if traces[0].part == "test" else "the data the loop was fitted on"
-    caption = f"Residual (measured minus model) over time on {part}; discharge current is positive."
+    caption = (
+        f"Voltage measured, {' and '.join(dict.fromkeys((next(iter(labels.values())), list(labels.values())[-1])))}; "
+        f"current, positive on discharge; residual (measured minus model), on {part}."
+    )
     return style.framed(
-        fig, f"Residual over time, {traces[0].part} part", caption, 600, hovermode="x unified"
+        fig, f"Voltage and residual over time, {traces[0].part} part", caption, 600, hovermode="x unified"
     )
 
 

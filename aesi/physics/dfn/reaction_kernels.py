@@ -13,6 +13,7 @@ Where it goes to and fro, at the edges of potentials, its steps are halved until
 
 import math
 
+from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.dfn.local_kernels import (
     SMALLEST_SALT,
     compiled,
@@ -22,9 +23,8 @@ from aesi.physics.dfn.local_kernels import (
     salt_logarithm,
 )
 from aesi.physics.espm.electrode_kernels import bounded_exp
-from aesi.physics.espm.transport_kernels import GAS
 
-GAS_OVER_FARADAY = GAS / 96485.33212331001
+GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 
 UPDATE_TOLERANCE_V = 5e-5
 """Newton's method squares what is left: after an update below this the error is about its square over 2 R T / F,

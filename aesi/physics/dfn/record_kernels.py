@@ -5,10 +5,10 @@ import math
 import numpy as np
 from numba import njit
 
+from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
-from aesi.physics.dfn.newton_kernels import GAS_OVER_FARADAY
-from aesi.physics.dfn.step_kernels import advance, hold_layers, settle
-from aesi.physics.dfn.transport_kernels import renew, salt_forcing
+from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY
+from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle
 from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
 from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
 
@@ -169,7 +169,7 @@ def smallest(values):  # type: ignore[no-untyped-def]
 @njit(inline="always", fastmath=FASTMATH)
 def set_rates(e, t, t_k):  # type: ignore[no-untyped-def]
     """Arrhenius factors of everything that has an activation energy."""
-    for i in range(6):
+    for i in range(7):
         t.rates[i] = arrhenius(e.energies[i], t_k, e.reference_k)
 
 
@@ -180,7 +180,7 @@ def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untype
     for i in range(s.gap_path.shape[0]):
         if s.gap_path[i] > 0.0:
             gap += s.gap_path[i] / lookup(s.kappa, state.c[i] / s.top)
-    return phi_p - phi_n - density * (gap / t.rates[5] + e.contact * e.area)
+    return phi_p - phi_n - density * (gap / t.rates[5] + (e.contact + e.film / t.rates[6]) * e.area)
 
 
 @compiled

@@ -2,9 +2,7 @@
 
 from numba import njit
 
-from aesi.physics.dfn.local_kernels import compiled
-from aesi.physics.dfn.newton_kernels import solve_reaction
-from aesi.physics.dfn.transport_kernels import (
+from aesi.physics.dfn.diffusion_kernels import (
     calm_particles,
     calm_salt,
     drops,
@@ -14,6 +12,8 @@ from aesi.physics.dfn.transport_kernels import (
     salt_at_places,
     salt_forcing,
 )
+from aesi.physics.dfn.local_kernels import compiled
+from aesi.physics.dfn.reaction_kernels import solve_reaction
 from aesi.physics.espm.electrode_kernels import end_weight
 from aesi.physics.espm.kernels import FASTMATH, lookup
 from aesi.physics.espm.transport_kernels import solid_forcing

@@ -11,14 +11,16 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
-from aesi.tracer.cycler_zero import flowing
 
 TYPICAL_SOLID_EA_J_MOL = 30e3
 TYPICAL_RATE_EA_J_MOL = 35e3
 TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
-"""Where the file declares none: a cell answers to temperature, and data at one temperature cannot say how much.
+"""Where the file declares none: a cell answers to temperature, and data at one temperature cannot say how much. Records
+of several temperatures move them from there, see `aesi.calibration.parameters`.
 Diffusion and rates as in the parametrisation of O'Regan et al., Electrochim. Acta 425 (2022) 140700, rounded; the
 electrolyte as in the BPX example cell."""
+OPEN_SHARE = 1e-3
+"""Of the largest current of a record: below this a cycler has its relay open, whatever it reads."""
 FULL_WINDOW_V = 0.15
 LONG_CHARGE = 0.3
 """Of the capacity: a charge that changes the branch of the hysteresis, where there is one."""
@@ -96,6 +98,12 @@ def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, .
         "other branch of a hysteresis that this model does not have."
     )
     return kept, (note,)
+
+
+def flowing(current_a: Array) -> BoolArray:
+    """(n,) True where a current flows."""
+    size = np.abs(current_a)
+    return size > OPEN_SHARE * size.max()
 
 
 def _numbered(flags: BoolArray) -> Array:

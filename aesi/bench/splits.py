@@ -1,0 +1,197 @@
+"""Which splits of the measured drives a hybrid is asked to survive, and how one is judged.
+
+Every split trains on some drives of a cell and is tested, in free run, on drives that it has not seen:
+
+    nmc        each three, and each two, of the five parts of the NMC pouch cell's drive; the others test
+    hg2        each drive of the LG HG2 at 25 degC in turn; the others train
+    panasonic  the same for the Panasonic NCR18650PF
+    m50t       each half (odd and even repeats) of the LG M50T's UDDS in turn
+
+Every second split of a cell is a development split: rules and defaults may be chosen by a look at those. The others
+judge, and they alone are tested at other temperatures as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from aesi.errors import InputError
+from aesi.numerics.typing import Array
+from aesi.pipeline.experiment.bands import reach
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.physics_models import DECLARED
+from aesi.pipeline.experiment.sections import RepeatsConfig
+from aesi.records import ErrorSeries
+
+MV = 1e3
+
+
+@dataclass(frozen=True)
+class SplitCase:
+    """One split.
+
+    cell : of which table row.  experiment : file name of the experiment whose settings it takes.
+    overrides : what is laid over that.  abroad : names of test records at other temperatures.
+    development : whether rules may be chosen by a look at it.
+    """
+
+    cell: str
+    name: str
+    experiment: str
+    overrides: tuple[str, ...]
+    abroad: tuple[str, ...]
+    development: bool
+
+
+DRIVES = {
+    "hg2": ("25degC_us06", "25degC_la92", "25degC_mixed1", "25degC_mixed2", "25degC_mixed3"),
+    "panasonic": (
+        "25degC_us06",
+        "25degC_la92",
+        "25degC_hwfet",
+        "25degC_cycle_1",
+        "25degC_cycle_2",
+        "25degC_cycle_3",
+    ),
+}
+ABROAD = {
+    "hg2": ("10degC_us06", "40degC_la92"),
+    "panasonic": ("10degC_cycle_1", "0degC_cycle_1"),
+}
+EXPERIMENTS = {
+    "nmc": "measured_nmc_drive.yaml",
+    "hg2": "lg_18650hg2.yaml",
+    "panasonic": "panasonic_ncr18650pf.yaml",
+    "m50t": "lg_m50t_udds.yaml",
+}
+NMC_PARTS = (1, 2, 3, 4, 5)
+NMC_PERIOD_S = 1800.0
+M50T_HALVES = ((1, 3, 5, 7), (2, 4, 6))
+M50T_PERIOD_S = 2600.0
+
+
+def all_splits() -> tuple[SplitCase, ...]:
+    """Every split, the cells one after the other."""
+    every = [*_by_repeats("nmc", NMC_PERIOD_S, _nmc_parts()), *_by_drive("hg2"), *_by_drive("panasonic")]
+    halves = (M50T_HALVES, M50T_HALVES[::-1])
+    return (*every, *_by_repeats("m50t", M50T_PERIOD_S, halves))
+
+
+def chosen_splits(
+    cells: Sequence[str] = tuple(EXPERIMENTS),
+    a_cell: int | None = None,
+    only: str | None = None,
+    development: bool | None = None,
+) -> tuple[SplitCase, ...]:
+    """Splits of the named cells, at most `a_cell` of each, spread evenly over its list.
+
+    only : a part of the name.  development : those alone, or the judging ones alone.
+    """
+    unknown = [name for name in cells if name not in EXPERIMENTS]
+    if unknown:
+        raise InputError(
+            f"there is no cell {unknown[0]!r} in this benchmark; there are: {', '.join(EXPERIMENTS)}."
+        )
+    kept: list[SplitCase] = []
+    for cell in cells:
+        mine = [s for s in all_splits() if s.cell == cell and (only is None or only in s.name)]
+        mine = [s for s in mine if development is None or s.development == development]
+        if a_cell is not None and a_cell < len(mine):
+            mine = [mine[i] for i in np.linspace(0, len(mine) - 1, a_cell).round().astype(int)]
+        kept += mine
+    if not kept:
+        raise InputError("no split is chosen; `aesi bench splits` without options runs all of them.")
+    return tuple(kept)
+
+
+def judged(fitted: Sequence[Fitted], tests: Sequence[ErrorSeries]) -> dict[str, Any]:
+    """Model -> RMSE (mV), reduction against the declared model (per cent), and band of the pooled test records."""
+    return {one.model.name: _figures(one, tests) for one in fitted}
+
+
+def against(mine: Mapping[str, Any], other: Mapping[str, Any]) -> float:
+    """Reduction of the squared error of `other` by `mine`, per cent; both entries of `judged`."""
+    return float(100.0 * (1.0 - (mine["rmse_mv"] / other["rmse_mv"]) ** 2))
+
+
+def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
+    runs = [one.model.free_run(series) for series in tests]
+    truth = np.concatenate([series.error_v for series in tests])
+    declared = np.concatenate([series.left_by(DECLARED) for series in tests])
+    left = truth - np.concatenate([run.error_v for run in runs])
+    figures: dict[str, Any] = {
+        "rmse_mv": MV * float(np.sqrt(np.mean(left**2))),
+        "mser_pct": float(100.0 * (1.0 - np.mean(left**2) / np.mean(declared**2))),
+        "diverged": sum(run.diverged_at is not None for run in runs),
+    }
+    if one.bands is None:
+        return figures
+    alpha = one.bands.alpha
+    bands = [
+        one.bands.intervals(series, run, reach(one.model, series))
+        for series, run in zip(tests, runs, strict=True)
+    ]
+    low = np.concatenate([band.lower_v for band in bands])
+    high = np.concatenate([band.upper_v for band in bands])
+    covered = (low <= left) & (left <= high)
+    ends = np.cumsum([len(series) for series in tests])[:-1]
+    figures |= {
+        "rows": len(left),
+        "coverage_pct": 100.0 * float(covered.mean()),
+        "worst_drive_coverage_pct": 100.0 * min(float(part.mean()) for part in np.split(covered, ends)),
+        "width_mv": MV * float(np.mean(high - low)),
+        "winkler_mv": MV * float(np.mean(_winkler(left, low, high, alpha))),
+    }
+    return figures
+
+
+def _winkler(left: Array, low: Array, high: Array, alpha: float) -> Array:
+    outside = np.maximum(low - left, 0.0) + np.maximum(left - high, 0.0)
+    return np.asarray(high - low + 2.0 / alpha * outside)
+
+
+def _nmc_parts() -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    return [
+        (train, tuple(part for part in NMC_PARTS if part not in train))
+        for count in (3, 2)
+        for train in combinations(NMC_PARTS, count)
+    ]
+
+
+def _by_repeats(
+    cell: str, period_s: float, parts: Sequence[tuple[tuple[int, ...], tuple[int, ...]]]
+) -> Iterator[SplitCase]:
+    for number, (train, test) in enumerate(parts):
+        repeats = RepeatsConfig(period_s=period_s, train=train, test=test)
+        yield SplitCase(
+            cell=cell,
+            name=f"{cell} {'+'.join(map(str, train))}",
+            experiment=EXPERIMENTS[cell],
+            overrides=(f"data.repeats={repeats.model_dump_json()}",),
+            abroad=(),
+            development=number % 2 == 1,
+        )
+
+
+def _by_drive(cell: str) -> Iterator[SplitCase]:
+    for number, drive in enumerate(DRIVES[cell]):
+        development = number % 2 == 1
+        abroad = () if development else ABROAD[cell]
+        train = ", ".join(other for other in DRIVES[cell] if other != drive)
+        yield SplitCase(
+            cell=cell,
+            name=f"{cell} without {drive}",
+            experiment=EXPERIMENTS[cell],
+            overrides=(
+                f"data.train=[{train}]",
+                "data.valid=[]",
+                f"data.test=[{', '.join((drive, *abroad))}]",
+            ),
+            abroad=abroad,
+            development=development,
+        )

@@ -1,0 +1,161 @@
+"""The model that a calibration fits: a working vector in, residuals and their slopes out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.calibration.parameters import Free, Shapes, moved
+from aesi.calibration.records import Prepared
+from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell
+from aesi.physics.espm.extended import run_extended
+from aesi.physics.espm.plain import run_plain
+from aesi.physics.model import EspmModel
+
+SOLID_ORDER = 8
+"""Eight modes resolve a particle to 0.4 mV under a drive to 3C."""
+MOST_STEPS = 4
+ERROR_V = 5e-3
+"""What a calibrated single-particle model is expected to miss."""
+INDEPENDENT = 200
+"""Rows of a record that say something of their own: what a model misses stays the same over many."""
+OUTLIER_V = 0.015
+"""Beyond this an error counts by its size and no longer by its square (pseudo-Huber)."""
+AGEING_SD = 0.03
+"""Of the logarithm of the capacity that a cell has lost by the time of a record: cells age between tests."""
+NEWER = 0.1
+"""Deviations that a record's capacity may exceed that of the file by: none, but for the descent to start inside."""
+ZERO_SHARE = 5e-4
+"""Of the largest current among the records: what a cycler's zero is uncertain by, 0.1 % of its range being usual."""
+STEP = 0.02
+
+
+@dataclass(frozen=True)
+class WorkingVector:
+    """Where the parts of a working vector stand."""
+
+    globals: int
+    ocp: int
+    entropic: int
+    records: int
+
+    @property
+    def zero(self) -> int:
+        """Of the cycler's zero, after the global parameters."""
+        return self.globals
+
+    @property
+    def shapes(self) -> slice:
+        """Of the knots."""
+        return slice(self.globals + 1, self.globals + 1 + self.ocp + self.entropic)
+
+    @property
+    def size(self) -> int:
+        """Of the whole vector."""
+        return self.shapes.stop + 2 * self.records
+
+    def soc(self, record: int) -> int:
+        """Of a record's state of charge."""
+        return self.shapes.stop + 2 * record
+
+    def age(self, record: int) -> int:
+        """Of a record's capacity."""
+        return self.shapes.stop + 2 * record + 1
+
+
+class Model:
+    """Residuals of prepared records under a working vector, each coordinate a standard normal deviate a priori."""
+
+    def __init__(
+        self, cell: Cell, records: tuple[Prepared, ...], free: tuple[Free, ...], shapes: Shapes
+    ) -> None:
+        self.cell, self.records, self.free, self.shapes = cell, records, free, shapes
+        self.layout = WorkingVector(len(free), shapes.n_ocp, shapes.n_entropic, len(records))
+        self.zero_a = ZERO_SHARE * max(float(np.abs(r.data.current_a).max()) for r in records)
+        self.weights = [
+            min(1.0, INDEPENDENT / len(r.rows)) ** 0.5 / ERROR_V * r.trusted.astype(float) for r in records
+        ]
+        bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
+        self.low, self.high = np.array(bounds).T
+        ages = [self.layout.age(i) for i in range(len(records))]
+        self.high[ages] = NEWER  # a cell ages and does not grow younger
+        self.simulations = 0
+
+    def cell_at(self, x: Array) -> Cell:
+        """The cell with all that is global moved."""
+        values = {f.name: f.value(float(z)) for f, z in zip(self.free, x, strict=False)}
+        cell = moved(self.cell, values)
+        return replace(cell, positive=self.shapes.on(cell.positive, x[self.layout.shapes]))
+
+    def run(self, index: int, cell: Cell, x: Array) -> Array:
+        """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`)."""
+        self.simulations += 1
+        record = self.records[index]
+        aged = float(np.exp(AGEING_SD * x[self.layout.age(index)]))
+        cell = replace(
+            cell,
+            negative=replace(cell.negative, c_max_mol_m3=cell.negative.c_max_mol_m3 * aged),
+            positive=replace(cell.positive, c_max_mol_m3=cell.positive.c_max_mol_m3 * aged),
+        )
+        model = EspmModel(cell, solid_order=SOLID_ORDER, substep_s=record.longest_s, most_substeps=MOST_STEPS)
+        soc = record.start.soc + record.soc_sd * float(x[self.layout.soc(index)])
+        current = record.rows.current_a
+        if record.slow:
+            current = current - self.zero_a * float(x[self.layout.zero]) * record.flows
+        if record.kelvin is None and model.is_plain:
+            return run_plain(model, record.rows.time_s, current, soc, record.hold)[0]
+        return run_extended(model, record.rows.time_s, current, record.kelvin, soc, record.hold)[0]
+
+    def errors(self, x: Array) -> list[Array]:
+        """(rows,) V of each record, measured less model."""
+        cell = self.cell_at(x)
+        return [r.rows.voltage_v - self.run(i, cell, x)[0] for i, r in enumerate(self.records)]
+
+    def residual(self, x: Array) -> Array:
+        """All errors over what they are expected to be, large ones by their size, and the priors."""
+        parts = [w * saturated(e) for w, e in zip(self.weights, self.errors(x), strict=True)]
+        return np.concatenate([*parts, x])
+
+    def jacobian(self, x: Array) -> Array:
+        """(rows + n, n) slopes of `residual`: one-sided differences, and in closed form for the knots."""
+        cell = self.cell_at(x)
+        runs = [self.run(i, cell, x) for i in range(len(self.records))]
+        blocks = [np.zeros((len(r.rows), self.layout.size)) for r in self.records]
+        for j in range(self.layout.zero + 1):
+            h = STEP if x[j] + STEP <= self.high[j] else -STEP
+            there = x.copy()
+            there[j] += h
+            changed = cell if j == self.layout.zero else self.cell_at(there)
+            for i, record in enumerate(self.records):
+                if j < self.layout.zero or record.slow:
+                    blocks[i][:, j] = (self.run(i, changed, there)[0] - runs[i][0]) / h
+        for i, record in enumerate(self.records):
+            kelvin = record.kelvin
+            rise = (
+                np.full(len(record.rows), cell.initial_temperature_k) if kelvin is None else kelvin
+            ) - cell.reference_temperature_k
+            blocks[i][:, self.layout.shapes] = self.shapes.columns(runs[i][2], rise)
+            for j in (self.layout.soc(i), self.layout.age(i)):
+                there = x.copy()
+                there[j] += 10.0 * STEP
+                blocks[i][:, j] = (self.run(i, cell, there)[0] - runs[i][0]) / (10.0 * STEP)
+        parts = []
+        for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
+            lenient = w * leniency(record.rows.voltage_v - run[0])
+            parts.append(-lenient[:, None] * block)
+        return np.vstack([*parts, np.eye(self.layout.size)])
+
+
+def saturated(error_v: Array) -> Array:
+    """V whose square is twice the pseudo-Huber loss of the errors."""
+    scale = error_v / OUTLIER_V
+    return np.sign(error_v) * OUTLIER_V * np.sqrt(2.0 * (np.sqrt(1.0 + scale**2) - 1.0))
+
+
+def leniency(error_v: Array) -> Array:
+    """Slope of `saturated`: one for small errors."""
+    scale = error_v / OUTLIER_V
+    root = np.sqrt(1.0 + scale**2)
+    return 1.0 / (root * np.sqrt(2.0 / (root + 1.0)))

@@ -1,0 +1,106 @@
+"""Samples of what a calibration leaves open, by emcee: how far the intervals of the linearised fit were off.
+
+The potentials' knots, the states of charge, the ages and the cycler's zero enter the voltage all but linearly; they are
+integrated out in closed form about each sample, so that the walkers move in the global parameters alone:
+
+    log p(z) = -1/2 (r' r - b' H^-1 b) - 1/2 log det H,      H = J_l' J_l + 1,   b = J_l' r
+
+r the weighted residuals at z with the linear ones where the fit put them, J_l their slopes.
+Foreman-Mackey et al., PASP 125 (2013) 306, doi:10.1086/670067.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.calibration.fit import Calibration, Interval, information_weights
+from aesi.errors import InputError
+from aesi.numerics.typing import Array
+
+BURNT = 0.5
+"""Share of the steps, at the start, that is thrown away."""
+SPREAD = 0.5
+"""Walkers start this many deviations of the linearised fit about it."""
+
+
+@dataclass(frozen=True, eq=False)
+class PosteriorSamples:
+    """samples : (n, parameters) working coordinates.  intervals : 95 %, from them.  off : name -> width over that of
+    the linear interval.  accepted : share of proposals.  autocorrelation : steps, nan where the chain is too short."""
+
+    samples: Array
+    intervals: dict[str, Interval]
+    off: dict[str, float]
+    accepted: float
+    autocorrelation: float
+
+    @property
+    def sentence(self) -> str:
+        """How far the linear intervals were off, for a reader."""
+        widths = np.array(list(self.off.values()))
+        worst = max(self.off, key=lambda name: abs(np.log(self.off[name])))
+        chain = (
+            "the chain is too short to say how far its samples repeat one another; draw more"
+            if not np.isfinite(self.autocorrelation)
+            else f"a sample repeats itself over {self.autocorrelation:.0f} steps"
+        )
+        return (
+            f"posterior of {len(self.samples)} samples: intervals {np.median(widths):.2f} times as wide as the linear "
+            f"ones in the median, most off {worst} ({self.off[worst]:.2f} times); {chain}."
+        )
+
+
+def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
+    """Draw from the posterior of the global parameters, `steps` of each walker.
+
+    Raises InputError where emcee is not installed or the steps are too few.
+    """
+    try:
+        import emcee
+    except ImportError:
+        raise InputError("--posterior needs emcee: pip install 'aesi[posterior]'.") from None
+    if steps < 4:
+        raise InputError(f"--posterior {steps}: at least four steps, some hundreds to be of use.")
+    model, n = found.model, len(found.model.free)
+    jacobian, errors = model.jacobian(found.x), model.errors(found.x)
+    weights = np.concatenate([*information_weights(model, errors), np.ones(model.layout.size)])
+    linear = weights[:, None] * jacobian[:, n:]
+    hessian = linear.T @ linear
+    inverse, (_, log_det) = np.linalg.inv(hessian), np.linalg.slogdet(hessian)
+
+    def log_probability(z: Array) -> float:
+        if ((z < model.low[:n]) | (z > model.high[:n])).any():
+            return -np.inf
+        x = found.x.copy()
+        x[:n] = z
+        r = weights * model.residual(x)
+        b = linear.T @ r
+        value = -0.5 * float(r @ r - b @ inverse @ b) - 0.5 * float(log_det)
+        return value if np.isfinite(value) else -np.inf
+
+    rng = np.random.default_rng(seed)
+    walkers = 2 * n + 2
+    root = np.linalg.cholesky(found.covariance[:n, :n])
+    start = found.x[:n] + SPREAD * rng.standard_normal((walkers, n)) @ root.T
+    start = np.clip(start, model.low[:n] + 1e-6, model.high[:n] - 1e-6)
+    sampler = emcee.EnsembleSampler(walkers, n, log_probability)
+    sampler.random_state = np.random.RandomState(seed).get_state()
+    sampler.run_mcmc(start, steps)
+    kept = sampler.get_chain(discard=int(BURNT * steps), flat=True)
+    autocorrelation = float(np.mean(emcee.autocorr.integrated_time(sampler.get_chain(), quiet=True)))
+    if steps < 50.0 * autocorrelation:
+        autocorrelation = np.nan
+    return _summary(found, kept, float(np.mean(sampler.acceptance_fraction)), autocorrelation)
+
+
+def _summary(found: Calibration, samples: Array, accepted: float, autocorrelation: float) -> PosteriorSamples:
+    out, off = {}, {}
+    for j, free in enumerate(found.model.free):
+        low, middle, high = np.quantile(samples[:, j], [0.025, 0.5, 0.975])
+        out[free.name] = Interval(
+            free.value(float(middle)), free.value(float(low)), free.value(float(high)), free.unit, free.source
+        )
+        off[free.name] = float((high - low) / (2.0 * 1.96 * np.sqrt(found.covariance[j, j])))
+    return PosteriorSamples(samples, out, off, accepted, autocorrelation)

@@ -1,0 +1,114 @@
+"""Records made ready for a calibration: thinned, with an initial state and a temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.calibration.start import flowing
+from aesi.calibration.thinning import thinned
+from aesi.constants import ZERO_CELSIUS_K
+from aesi.errors import DataError
+from aesi.numerics.typing import Array, BoolArray
+from aesi.physics.cell import Cell
+from aesi.physics.initial_state import InitialState, initial_state
+from aesi.records import Hold, Measurement
+
+SOC_SD = 0.005
+"""Of a state of charge that a potential in doubt gave; one that was given is believed."""
+SLOW_C_RATE = 0.15
+"""Below this a cycler's zero is a share of the current."""
+MOST_ROWS = 4000
+"""Rows of a drive that a fit sees: windows grow until there are no more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """One record as a calibration sees it.
+
+    data : as measured.  rows, hold, longest_s : what is simulated.  kelvin : (rows,) K or None for the cell's own.
+    start : state of charge at the first row; soc_sd : what it is uncertain by here.  slow : C/7 at most.
+    flows : (rows,) 1 where a current flows, else 0.  trusted : (rows,) see `Thinned`.
+    """
+
+    data: Measurement
+    rows: Measurement
+    hold: Hold
+    longest_s: float
+    kelvin: Array | None
+    start: InitialState
+    soc_sd: float
+    slow: bool
+    flows: Array
+    trusted: BoolArray
+
+    @property
+    def name(self) -> str:
+        """The measurement's name."""
+        return self.data.name
+
+    @property
+    def mean_kelvin(self) -> float | None:
+        """K, over the rows."""
+        return None if self.kelvin is None else float(self.kelvin.mean())
+
+
+def prepared(cell: Cell, records: Sequence[Measurement], soc0: float | None) -> tuple[Prepared, ...]:
+    """Every record with its rows and its initial state.  soc0 : of all that their voltage does not contradict."""
+    return tuple(_prepared(cell, data, soc0, len(records) > 1) for data in records)
+
+
+def _prepared(cell: Cell, data: Measurement, soc0: float | None, shared: bool) -> Prepared:
+    window_s = max(1.0, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
+    thin = thinned(data, cell.capacity_ah, window_s)
+    start = initial_state(cell, data, soc0, data.hold or "backward", shared=shared)
+    sd = start.sd if start.basis == "given" else max(start.sd, SOC_SD)
+    temperature = thin.data.temperature_degc
+    current = np.abs(thin.data.current_a)
+    return Prepared(
+        data=data,
+        rows=thin.data,
+        hold=data.hold if data.hold is not None and thin.data is data else thin.hold,
+        longest_s=thin.longest_s,
+        kelvin=None if temperature is None else np.ascontiguousarray(temperature + ZERO_CELSIUS_K),
+        start=start,
+        soc_sd=sd,
+        slow=float(np.quantile(current, 0.95)) <= SLOW_C_RATE * cell.nominal_capacity_ah,
+        trusted=thin.trusted,
+        flows=flowing(thin.data.current_a).astype(float),
+    )
+
+
+def with_temperatures(
+    records: Sequence[Measurement], degc: Mapping[str, float]
+) -> tuple[tuple[Measurement, ...], tuple[str, ...]]:
+    """The records with given temperatures (by name) where they have no column, and sentences on what is used.
+
+    Raises DataError for a temperature of a record that is not among them, or that has a column of its own.
+    """
+    known = {r.name for r in records}
+    for name in degc:
+        if name not in known:
+            raise DataError(
+                f"--temperature {name}=...: there is no such record; there are {', '.join(sorted(known))}."
+            )
+    out, notes = [], []
+    for record in records:
+        given = degc.get(record.name)
+        if given is not None and record.temperature_degc is not None:
+            raise DataError(
+                f"--temperature {record.name}={given:g}: this record has a measured temperature of its own; leave the "
+                "option out, or the column (--column temperature_degc=)."
+            )
+        if given is not None:
+            record = replace(record, temperature_degc=np.full(len(record), float(given)))
+            notes.append(f"{record.name}: at {given:g} degC, as given.")
+        elif record.temperature_degc is not None:
+            low, high = float(record.temperature_degc.min()), float(record.temperature_degc.max())
+            notes.append(f"{record.name}: at its measured temperature, {low:.1f} to {high:.1f} degC.")
+        else:
+            notes.append(f"{record.name}: no temperature; taken at that of the cell file.")
+        out.append(record)
+    return tuple(out), tuple(notes)

@@ -1,0 +1,65 @@
+"""Impedance spectra on disk: one row a frequency, several spectra in one file."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from aesi.data.readers import open_table
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+from aesi.records import Spectrum
+
+NEEDED = ("frequency_hz", "z_real_ohm", "z_imag_ohm")
+STATES = ("soc", "discharged_ah")
+DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
+
+
+def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
+    """The spectra of a CSV with frequency_hz, z_real_ohm, z_imag_ohm, and soc or discharged_ah.
+
+    Rows belong to one spectrum as long as these states (and `spectrum`, where there is one of numbers) stay the same;
+    the imaginary part is negative where capacitive. voltage_v and temperature_degc are kept where they are there.
+    Raises DataError naming file and column.
+    """
+    table = open_table(path)
+    file, header = table.path.name, list(table.header)
+    missing = [name for name in NEEDED if name not in header]
+    if missing or not any(name in header for name in STATES):
+        wanted = ", ".join(missing) if missing else " or ".join(STATES)
+        raise DataError(
+            f"{file} has no column {wanted}; a file of spectra needs {', '.join(NEEDED)} and a state."
+        )
+    names = [name for name in (*NEEDED, *DESCRIBED) if name in header]
+    columns = dict(zip(names, table.read(tuple(header.index(name) for name in names)), strict=True))
+    for name, values in columns.items():
+        if not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values))[0])
+            raise DataError(f"{file}, row {row + 2}, column {name}: not a number.")
+    if not (columns["frequency_hz"] > 0.0).all():
+        raise DataError(f"{file}, column frequency_hz: a frequency has to be positive.")
+    return tuple(_spectrum(file, k, columns, rows) for k, rows in enumerate(_pieces(columns)))
+
+
+def _pieces(columns: dict[str, Array]) -> list[slice]:
+    state = columns["soc"] if "soc" in columns else columns["discharged_ah"]
+    cuts = [0, *(np.flatnonzero(np.diff(state) != 0.0) + 1).tolist(), len(state)]
+    return [slice(a, b) for a, b in pairwise(cuts)]
+
+
+def _spectrum(file: str, number: int, columns: dict[str, Array], rows: slice) -> Spectrum:
+    def first(name: str) -> float | None:
+        return float(columns[name][rows][0]) if name in columns else None
+
+    temperature = columns["temperature_degc"][rows].mean() if "temperature_degc" in columns else None
+    return Spectrum(
+        name=f"{file.split('.')[0]} {number + 1}",
+        frequency_hz=columns["frequency_hz"][rows],
+        z_ohm=columns["z_real_ohm"][rows] + 1j * columns["z_imag_ohm"][rows],
+        soc=first("soc"),
+        discharged_ah=first("discharged_ah"),
+        voltage_v=first("voltage_v"),
+        temperature_degc=None if temperature is None else float(temperature),
+    )

@@ -1,0 +1,94 @@
+"""Why a simulation cannot go on, in one sentence that names the true cause.
+
+Three causes look alike in a voltage and ask for different remedies: more charge than the cell has, a current that solid
+diffusion cannot follow, and one that the electrolyte cannot carry; the latter two grow with the cold.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.constants import FARADAY_C_MOL, ZERO_CELSIUS_K
+from aesi.numerics.typing import Array
+from aesi.physics.espm.plain import arrhenius, stack_of
+from aesi.physics.model import EspmModel
+
+LAYERS = {1: "negative electrode", 2: "positive electrode"}
+SALT, NO_SOLUTION = 3, 4
+
+
+def sentence(
+    model: EspmModel, time_s: Array, current_a: Array, kelvin: float, rows: Array, at: int, what: int
+) -> str:
+    """rows : of `run_plain`.  at : the first faulty row.  what : 1 or 2, an electrode's surface; 3, the salt;
+    4, no reaction carries the current."""
+    cell = model.cell
+    head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
+    where = f"at {time_s[at]:.6g} s (row {at})"
+    degc = kelvin - ZERO_CELSIUS_K
+    tail = 'or use on_depletion="clip".'
+    if what == SALT:
+        here, there = (carried_a(model, t) for t in (kelvin, cell.reference_temperature_k))
+        cause = (
+            f"{head}the electrolyte ran out of salt {where}: at {degc:.3g} degC it carries {here:.3g} A for long, and "
+            f"the record asks for {abs(current_a[at]):.3g} A"
+        )
+        if here < 0.9 * there:
+            cause += (
+                f" (at {cell.reference_temperature_k - ZERO_CELSIUS_K:.3g} degC it would carry {there:.3g} A); it is "
+                "too cold for this current. Check the electrolyte's diffusivity and its activation energy"
+            )
+        else:
+            cause += ". Check the unit of the current and the electrolyte's diffusivity"
+        return f"{cause}, {tail}"
+    if what == NO_SOLUTION:
+        return (
+            f"{head}no reaction was found that carries {abs(current_a[at]):.3g} A at {degc:.3g} degC, {where}; check "
+            f"the unit of the current, {tail}"
+        )
+    electrode = (cell.negative, cell.positive)[what - 1]
+    mean = float(rows[4 + what, at])
+    n = cell.negative
+    soc = (float(rows[5, at]) - n.theta_min) / (n.theta_max - n.theta_min)
+    surface = f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}"
+    if not 0.0 <= soc <= 1.0:
+        return (
+            f"{head}{surface}, at a state of charge of {100 * soc:.1f} %: the record asks for more charge than the "
+            f"cell has. Check soc0, the capacity and the sign of the current, {tail}"
+        )
+    slower = arrhenius(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
+    cause = f"{head}{surface}, while its particles hold {100 * mean:.1f} % in the mean: solid diffusion cannot follow "
+    cause += f"{abs(current_a[at]):.3g} A"
+    if slower < 0.9:
+        cause += f" at {degc:.3g} degC, where it is {1.0 / slower:.2g} times slower than at the reference temperature"
+    return f"{cause}. Check the diffusivity, its activation energy and the unit of the current, {tail}"
+
+
+def carried_a(model: EspmModel, kelvin: float) -> float:
+    """A, the steady current at which the salt of one electrode is used up, at a diffusivity as at rest."""
+    cell, stack = model.cell, stack_of(model)
+    e = cell.electrolyte
+    faster = arrhenius(e.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
+    rates = stack.lam[1:] * float(e.diffusivity(np.array([e.c0_mol_m3]))[0]) * faster
+    regions = model.regions
+    enters = stack.gain[:regions, 1:].mean(axis=0) - stack.gain[regions:, 1:].mean(axis=0)
+    moved = stack.to_nodes[:, 1:] @ (
+        enters * (1.0 - e.transference) / FARADAY_C_MOL / cell.total_area_m2 / rates
+    )
+    at_points = stack.gauss[: 6 * regions] @ moved
+    weights = np.tile([5.0, 8.0, 5.0], regions) / 18.0 / regions
+    means = [float(weights @ part) for part in np.split(at_points, 2)]
+    return e.c0_mol_m3 / max(abs(m) for m in means)
+
+
+def _cut_off(model: EspmModel, time_s: Array, voltage_v: Array, at: int) -> str:
+    """Where a cut-off voltage was passed before the fault: a cell is taken off there."""
+    cell = model.cell
+    low, high = voltage_v[: at + 1] < cell.lower_voltage_v, voltage_v[: at + 1] > cell.upper_voltage_v
+    for passed, name, limit in ((low, "lower", cell.lower_voltage_v), (high, "upper", cell.upper_voltage_v)):
+        if passed.any():
+            row = int(np.argmax(passed))
+            words = f"the voltage passed the {name} cut-off ({limit:g} V) at {time_s[row]:.6g} s "
+            words += "and the record goes on; "
+            return words
+    return ""

@@ -1,0 +1,203 @@
+"""What the compiled steps of the single particle know and what they change, by name.
+
+numba takes named tuples of arrays as they are, without cost. Units are particles: of one size, in one region of an
+electrode, those of the negative electrode first; regions are counted from the collector.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from aesi.numerics.typing import Array, IntArray
+
+
+class PlainSolid(NamedTuple):
+    """Constants of both particles.
+
+    rates, gains : (2, modes) 1/s and stoichiometry/(A s), mean excluded.  lump : (2,) of the means.
+    """
+
+    rates: Array
+    gains: Array
+    lump: Array
+
+
+class PlainSalt(NamedTuple):
+    """Constants of the electrolyte's modes.
+
+    rates : (modes,) 1/s.  gains : (modes,) mol/m3 per A s of cell current.
+    to_nodes, project : (nodes, modes) both ways.  gauss, mean : weights of Gauss points and of the mean over the nodes.
+    psi, strength : table and factor of the variable part of diffusion.  nonlinear : whether there is one.
+    substep, most : s and count of the steps in which it is taken explicitly.
+    """
+
+    rates: Array
+    gains: Array
+    to_nodes: Array
+    project: Array
+    gauss: Array
+    mean: Array
+    psi: Array
+    strength: float
+    nonlinear: bool
+    substep: float
+    most: int
+
+
+class PlainCell(NamedTuple):
+    """Tables and numbers of the voltage.
+
+    ocp_n, ocp_p : tables over stoichiometry.  kappa : S/m on [0, top].  area : m2.  c0, top : mol/m3.
+    reactive_n, reactive_p : reactive area per area of cell.  exchange_n, exchange_p : A/m2 at unit salt and occupancy.
+    thermal_v : R T / F.  salt_v : 2 (1 - t+) R T / F.  path : m, thickness over transport efficiency, all layers.
+    solid : ohm m2.  contact : ohm.
+    """
+
+    ocp_n: Array
+    ocp_p: Array
+    kappa: Array
+    area: float
+    c0: float
+    top: float
+    reactive_n: float
+    reactive_p: float
+    exchange_n: float
+    exchange_p: float
+    thermal_v: float
+    salt_v: float
+    path: float
+    solid: float
+    contact: float
+
+
+class Drive(NamedTuple):
+    """A record as the steps see it.
+
+    time, current : (n,) s, A.  temperature : K, (n,) where `given`, else (1,) at the start.
+    backward : a row's current holds since the row before.  substep, most : s and count of the steps within a row.
+    """
+
+    time: Array
+    current: Array
+    temperature: Array
+    given: bool
+    backward: bool
+    substep: float
+    most: int
+
+
+class Units(NamedTuple):
+    """Constants of the particles.
+
+    place : (units, 2) electrode and region.  rates, gains : (units, modes) 1/s and stoichiometry/(A/m2 s).
+    lump : (units,) of the means.  share, volume : (units,) of the electrode's reaction and material.
+    exchange : (units,) A/m2 of cell at unit salt and occupancy.
+    psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
+    """
+
+    place: IntArray
+    rates: Array
+    gains: Array
+    lump: Array
+    share: Array
+    volume: Array
+    exchange: Array
+    psi: Array
+    strength: Array
+    at: Array
+    project: Array
+
+
+class Salt(NamedTuple):
+    """Constants of the electrolyte.
+
+    rates : (modes,) 1/s.  gains : (2 regions, modes) mol/m3 per A/m2 s.  to_nodes, project : (nodes, modes) both ways.
+    gauss, mean : weights of Gauss points and of the mean over the nodes.
+    psi, strength, top : of the variable part of diffusion.  c0 : mol/m3.  kappa : S/m on [0, top].
+    supply : 1 - t+.  contrast : factor of what differs between regions.
+    """
+
+    rates: Array
+    gains: Array
+    to_nodes: Array
+    project: Array
+    gauss: Array
+    mean: Array
+    psi: Array
+    strength: float
+    top: float
+    c0: float
+    kappa: Array
+    supply: float
+    contrast: float
+
+
+class Surfaces(NamedTuple):
+    """Constants of both electrodes' surfaces.
+
+    ocp, entropic : (2, table) V and V/K.  alpha : (2,) transfer coefficients.  capacity : (2,) F/m2 of cell a region.
+    plating : rate, A/m2 of cell, and transfer coefficient.  plating_to_c : mol/m3 per C/m2.
+    solid : (2, regions, regions) ohm m2.  salt : the same times the conductivity, by region crossed.
+    """
+
+    ocp: Array
+    entropic: Array
+    alpha: Array
+    capacity: Array
+    plating: Array
+    plating_to_c: float
+    solid: Array
+    salt: Array
+
+
+class Whole(NamedTuple):
+    """Numbers of the whole cell.
+
+    energies : (7,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
+    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact, film : ohm.
+    reference_k : K.
+    """
+
+    energies: Array
+    heat: Array
+    area: float
+    separator: float
+    contact: float
+    film: float
+    reference_k: float
+
+
+class Memory(NamedTuple):
+    """What a step of the reaction reads and changes.
+
+    y, theta, pred, give : (units,) A/m2 of cell; surface stoichiometry, that if each unit carried its share, and what
+    one unit of deviating current takes from it.  ohm : (regions, regions) ohm m2.
+    salt, log_salt, region_salt : at Gauss points over rest; by region its mean logarithm and mean, mol/m3.
+    delta, layer : (2 regions,) V and A/m2 of the double layers.  total : (2 regions,) A/m2.
+    plated, plating : (regions,) mol/m3 and A/m2.  work : scratch.
+    """
+
+    y: Array
+    theta: Array
+    pred: Array
+    give: Array
+    ohm: Array
+    salt: Array
+    log_salt: Array
+    region_salt: Array
+    delta: Array
+    layer: Array
+    total: Array
+    plated: Array
+    plating: Array
+    work: Array
+
+
+class SaltMemory(NamedTuple):
+    """What a step of the electrolyte changes.  q, forcing, before : (modes,).  c, rest : (nodes,)."""
+
+    q: Array
+    c: Array
+    rest: Array
+    forcing: Array
+    before: Array

@@ -1,0 +1,202 @@
+"""The model in the frequency domain: its own equations, linearised about rest.
+
+    V(w) = -Z(w) I(w)     about a cell at rest, I > 0 on discharge
+
+A particle of stoichiometry x answers to a current y with its surface, through the modes of solid diffusion; the salt
+answers with the modes of the electrolyte; kinetics are a resistance R T/(F j0), with a double layer where one is in:
+
+    x_u = -(lump/(jw) + sum gains/(jw + rates)) y_u,      phi_u = U' x_u + R_u y_u,      i_r = sum_u y_u + jw C phi_r
+
+All regions of an electrode see one potential, as in time. Leaves out what has no linear answer at rest: hysteresis (a
+small sine turns within it), plating, and the heat of a current, which is of second order.
+
+Source: Meddings et al., J. Power Sources 480 (2020) 228742, doi:10.1016/j.jpowsour.2020.228742, for the practice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
+from aesi.errors import DataError, SimulationError
+from aesi.numerics.typing import Array, ComplexArray
+from aesi.physics.cell import Cell
+from aesi.physics.cell.relations import Relation
+from aesi.physics.effect import ActiveEffect, Record, Trace
+from aesi.physics.espm.extended import interface_capacity, ohmic_drops, particle_units
+from aesi.physics.espm.layout import Units
+from aesi.physics.espm.plain import arrhenius, shifted_ocp, stack_of
+from aesi.physics.espm.tables import solid_diffusion
+from aesi.physics.model import EspmModel
+from aesi.physics.simulation import model_with
+
+SLOPE_STEP = 1e-4
+"""Of stoichiometry: tables of potentials have steps of 1.2e-4."""
+SMALL_A = 1e-6
+
+
+def impedance(
+    cell: Cell,
+    frequency_hz: Array,
+    soc: float,
+    temperature_degc: float = 25.0,
+    effects: Iterable[ActiveEffect] = (),
+) -> ComplexArray:
+    """Impedance of `cell` at rest.
+
+    frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows.  effects : as in `simulate`.
+    Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
+    Raises DataError for frequencies or a state that have none.
+    """
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    if frequency.ndim != 1 or not (np.isfinite(frequency).all() and (frequency > 0.0).all()):
+        raise DataError("frequency_hz has to be one row of positive numbers.")
+    active = tuple(effects)
+    kelvin = _shifted(active, temperature_degc + ZERO_CELSIUS_K)
+    if not np.isfinite(kelvin) or kelvin <= 0.0:
+        raise DataError("temperature_degc has to be a number above -273.15 degC.")
+    model = model_with(cell, active)
+    rest = np.array(model.cell.stoichiometries(soc))
+    if not ((rest > 0.0) & (rest < 1.0)).all():
+        raise DataError(
+            f"{cell.name} has no state of charge of {soc:g}: a stoichiometry leaves (0, 1) there."
+        )
+    if model.negative.plating is not None:
+        raise SimulationError("lithium plating has no linear answer at rest; leave the effect out.")
+    return _Linear(model, rest, kelvin).impedance(2.0 * np.pi * frequency) + _series(model, active)
+
+
+@dataclass(frozen=True, eq=False)
+class _Linear:
+    """A model about rest at stoichiometries `rest` (2,), at `kelvin`."""
+
+    model: EspmModel
+    rest: Array
+    kelvin: float
+
+    def impedance(self, omega: Array) -> ComplexArray:
+        """(n,) ohm.  The currents of all units and the two potentials, per ampere, from one system a frequency."""
+        cell = self.model.cell
+        units = particle_units(self.model)
+        side_of, within = units.place.T
+        n, regions = len(side_of), self.model.regions
+        region = side_of * regions + within
+        s: ComplexArray = np.asarray(1j * omega, dtype=np.complex128)
+        local = self._local(units, s)
+        salt = self._salt(s)
+        ohm = self._ohm()
+        belongs = (region[None, :] == np.arange(2 * regions)[:, None]).astype(float)
+        # Current of each region: its particles', and its double layer's, which is charged by the first one's potential.
+        into = np.broadcast_to(belongs.astype(complex), (len(s), 2 * regions, n)).copy()
+        for r in range(2 * regions):
+            first = int(np.flatnonzero(region == r)[0])
+            capacity = interface_capacity(self.model, int(side_of[first]))
+            into[:, r, first] += s * capacity * local[:, first]
+        drop = ohm[None] + salt
+        matrix = np.zeros((len(s), n + 2, n + 2), dtype=complex)
+        right = np.zeros((len(s), n + 2), dtype=complex)
+        matrix[:, :n, :n] = drop[:, region] @ into
+        matrix[:, np.arange(n), np.arange(n)] += local
+        for side in range(2):
+            matrix[:, np.flatnonzero(side_of == side), n + side] = -1.0
+            of_side = np.arange(2 * regions) // regions == side
+            matrix[:, n + side, :n] = into[:, of_side].sum(axis=1)
+            right[:, n + side] = (1.0 if side == 0 else -1.0) / cell.total_area_m2
+        solved = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
+        warmer = arrhenius(cell.electrolyte.conductivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+        gap = cell.separator.thickness_m / cell.separator.transport_efficiency / (self._kappa() * warmer)
+        film = cell.film_resistance_ohm / arrhenius(
+            cell.film_ea_j_mol, self.kelvin, cell.reference_temperature_k
+        )
+        contact = cell.contact_resistance_ohm + film
+        return cast(ComplexArray, solved[:, n] - solved[:, n + 1] + gap / cell.total_area_m2 + contact)
+
+    def _local(self, units: Units, s: ComplexArray) -> ComplexArray:
+        """(frequencies, units) ohm m2: kinetics, and open-circuit slope times what the surface loses."""
+        cell = self.model.cell
+        out = np.zeros((len(s), len(units.place)), dtype=complex)
+        for side, electrode in enumerate((cell.negative, cell.positive)):
+            at = self.rest[side]
+            here = np.flatnonzero(units.place[:, 0] == side)
+            slope = _slope(shifted_ocp(electrode, self.kelvin - cell.reference_temperature_k), at)
+            kinetic = arrhenius(electrode.rate_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+            thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
+            faster = arrhenius(electrode.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+            faster *= (
+                float(electrode.diffusivity(np.array([at]))[0]) / solid_diffusion(electrode.diffusivity).d0
+            )
+            for u in here:
+                answer = units.lump[u] / s
+                answer = answer + (units.gains[u] / (s[:, None] + faster * units.rates[u])).sum(axis=1)
+                resistance = thermal / (units.exchange[u] * kinetic * np.sqrt(at * (1.0 - at)))
+                out[:, u] = resistance - slope * answer
+        return out
+
+    def _salt(self, s: ComplexArray) -> ComplexArray:
+        """(frequencies, 2 regions, 2 regions) ohm m2: potential of a region's salt per current that enters a region."""
+        cell, regions = self.model.cell, self.model.regions
+        e, stack = cell.electrolyte, stack_of(self.model)
+        faster = arrhenius(e.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+        rates = stack.lam * float(e.diffusivity(np.array([e.c0_mol_m3]))[0]) * faster
+        enters = (1.0 - e.transference) / FARADAY_C_MOL * stack.gain[:, 1:]
+        gauss = stack.gauss[: 6 * regions].reshape(2 * regions, 3, -1)
+        seen = (np.array([5.0, 8.0, 5.0]) / 18.0 @ gauss) @ stack.to_nodes[:, 1:] / e.c0_mol_m3
+        for side in range(2):
+            own = slice(side * regions, (side + 1) * regions)
+            middle = seen[own].mean(axis=0)
+            seen[own] = middle + self.model.region_contrast * (seen[own] - middle)
+        thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
+        chi = 2.0 * (1.0 - e.transference) * thermal
+        modes = 1.0 / (s[:, None] + rates[None, 1:])
+        return cast(ComplexArray, chi * np.einsum("rk,fk,vk->frv", seen, modes, enters))
+
+    def _ohm(self) -> Array:
+        """(2 regions, 2 regions) ohm m2, as in time."""
+        regions = self.model.regions
+        e = self.model.cell.electrolyte
+        warmer = arrhenius(e.conductivity_ea_j_mol, self.kelvin, self.model.cell.reference_temperature_k)
+        solid, salt = ohmic_drops(self.model)
+        out = np.zeros((2 * regions, 2 * regions))
+        for side in range(2):
+            own = slice(side * regions, (side + 1) * regions)
+            block = solid[side] + salt[side].sum(axis=1) / (self._kappa() * warmer)
+            middle = block.mean(axis=0)
+            out[own, own] = middle + self.model.region_contrast * (block - middle)
+        return out
+
+    def _kappa(self) -> float:
+        e = self.model.cell.electrolyte
+        return float(e.conductivity(np.array([e.c0_mol_m3]))[0])
+
+
+def _slope(relation: Relation, at: float) -> float:
+    low, high = max(at - SLOPE_STEP, 1e-6), min(at + SLOPE_STEP, 1.0 - 1e-6)
+    values = relation(np.array([low, high]))
+    return float((values[1] - values[0]) / (high - low))
+
+
+def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
+    """The temperature that the cell really has."""
+    record = Record(np.zeros(1), np.zeros(1), np.array([kelvin]))
+    for active in effects:
+        if active.effect.on_record is not None:
+            record = active.effect.on_record(record, **active.parameters)
+    return float(cast(Array, record.temperature_k)[0])
+
+
+def _series(model: EspmModel, effects: tuple[ActiveEffect, ...]) -> float:
+    """Ohm of effects that act on the voltage: what they answer to a small current at once."""
+    time, current = np.array([0.0, 1e-9]), np.full(2, SMALL_A)
+    ohm = 0.0
+    for active in effects:
+        if active.effect.on_voltage is not None:
+            driven = [
+                active.effect.on_voltage(Trace(model, time, i, np.zeros(2), {}, True), **active.parameters)
+                for i in (current, 0.0 * current)
+            ]
+            ohm -= float(driven[0].voltage_v[-1] - driven[1].voltage_v[-1]) / SMALL_A
+    return ohm

@@ -1,0 +1,1 @@
+"""Many cells, one discovery each: the plan, one job, and the summary."""

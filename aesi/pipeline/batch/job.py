@@ -1,0 +1,138 @@
+"""One job of a batch: a discovery, and for a check-up the state of health; a row of the summary."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from aesi.data.reading import Reading
+from aesi.errors import AesiError
+from aesi.physics import Cell
+from aesi.pipeline.batch.plan import Job
+from aesi.pipeline.calibrate import Request, calibrate_files
+from aesi.pipeline.discovery.cases import case_of_files
+from aesi.pipeline.discovery.discover import run_case, write_discovery
+from aesi.pipeline.report.sizes import finding_line
+
+ROW = "row.json"
+MILLI = 1e3
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What all jobs of a batch share."""
+
+    holdout: float = 0.3
+    max_effects: int = 3
+    seed: int = 0
+    reading: Reading | None = None
+
+    @property
+    def key(self) -> str:
+        """The settings as text."""
+        return repr(self)
+
+
+@dataclass(frozen=True)
+class Health:
+    """State of one check-up, from the calibrated cell.
+
+    resistance_mohm : of contacts and films, beyond the electrolyte and the electrodes.  inventory_ah : cyclable
+    lithium, in both electrodes.  negative_ah, positive_ah : charge that the active material of each can hold.
+    """
+
+    resistance_mohm: float
+    inventory_ah: float
+    negative_ah: float
+    positive_ah: float
+    capacity_ah: float
+
+
+def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
+    """Run one job below `out/<name>`, or take what it gave before from there; a row of the summary.
+
+    A job that cannot be done is a row with its reason, so that one bad file does not stop a hundred cells.
+    """
+    folder = out / job.name
+    try:
+        key = job.key(settings.key)
+        known = _known(folder, key)
+        if known is not None:
+            return known
+        row = _row(job, folder, settings)
+    except AesiError as error:
+        return {
+            "name": job.name,
+            "specimen": job.specimen,
+            "at": job.at,
+            "status": "failed",
+            "reason": str(error),
+        }
+    except OSError as error:
+        reason = f"{error.filename or 'a file'}: {error.strerror or error}"
+        return {
+            "name": job.name,
+            "specimen": job.specimen,
+            "at": job.at,
+            "status": "failed",
+            "reason": reason,
+        }
+    (folder / ROW).write_text(json.dumps({"key": key, "row": row}, indent=1) + "\n", encoding="utf-8")
+    return row
+
+
+def health_of(cell: Cell) -> Health:
+    """What a calibrated cell says of resistance, inventory and active material."""
+    negative, positive = (cell.electrode_capacity_ah(e) for e in (cell.negative, cell.positive))
+    theta_n, theta_p = cell.stoichiometries(1.0)
+    return Health(
+        resistance_mohm=MILLI * cell.contact_resistance_ohm,
+        inventory_ah=negative * theta_n + positive * theta_p,
+        negative_ah=negative,
+        positive_ah=positive,
+        capacity_ah=cell.capacity_ah,
+    )
+
+
+def _known(folder: Path, key: str) -> dict[str, Any] | None:
+    try:
+        kept = json.loads((folder / ROW).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return kept["row"] if kept.get("key") == key else None
+
+
+def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
+    started = time.monotonic()
+    case = case_of_files(
+        job.cell,
+        job.data,
+        job.tests,
+        settings.reading,
+        job.soc0,
+        settings.holdout,
+        settings.max_effects,
+        settings.seed,
+    )
+    content = write_discovery(folder, case, run_case(case, folder))
+    row: dict[str, Any] = {
+        "name": job.name,
+        "specimen": job.specimen,
+        "at": job.at,
+        "status": "done",
+        "verdict": content["verdict"],
+        "effects": ", ".join(content["effects"]),
+        "finding": finding_line(content),
+        **{
+            f"{state}_test_mv": content[state]["test"].get("rmse_mv")
+            for state in ("before", "recalibrated", "after")
+        },
+        "report": f"{job.name}/report.html",
+    }
+    if job.specimen:
+        calibrate_files(job.cell, case.measurements, folder / "calibrated.bpx.json", Request(soc0=job.soc0))
+        row |= asdict(health_of(Cell.from_bpx(folder / "calibrated.bpx.json")))
+    return row | {"seconds": round(time.monotonic() - started, 1)}

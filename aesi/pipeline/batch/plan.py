@@ -1,0 +1,126 @@
+"""Which cells with which records: from a folder, or from a table.
+
+A folder holds one subfolder a cell with its records, and a BPX file in it (or one for all, given). A table is a CSV
+with the columns `name` and `data` (several files separated by `;`), and where wanted `cell` (BPX file), `test`, `soc0`,
+`specimen` and `at`: rows of one specimen are check-ups of one cell, at a time or throughput of any unit.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from aesi.errors import InputError
+
+CELL_FILES = ("*.bpx.json", "*.json")
+RECORDS = (".csv", ".gz", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax", ".txt")
+COLUMNS = ("name", "data", "cell", "test", "soc0", "specimen", "at")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One cell and its records.
+
+    specimen, at : which physical cell a check-up is of, and when; empty and None where there is one alone.
+    """
+
+    name: str
+    cell: Path
+    data: tuple[Path, ...]
+    tests: tuple[Path, ...] = ()
+    soc0: float | None = None
+    specimen: str = ""
+    at: float | None = None
+
+    def key(self, settings: str) -> str:
+        """What identifies the job: the content of its files and the settings it is run with."""
+        sha = hashlib.sha256(f"{settings}|{self.soc0}|{bool(self.specimen)}".encode())
+        for path in (self.cell, *self.data, *self.tests):
+            files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
+            for file in files:
+                sha.update(file.read_bytes())
+        return sha.hexdigest()[:16]
+
+
+def read_plan(source: Path, cell: Path | None = None) -> tuple[Job, ...]:
+    """The jobs of a folder or a table.
+
+    cell : the BPX file (or model folder) of every job that names none.
+    Raises InputError, one sentence, for what is missing.
+    """
+    if not source.exists():
+        raise InputError(f"There is no folder or table {source}.")
+    jobs = _of_folder(source, cell) if source.is_dir() else _of_table(source, cell)
+    names = [job.name for job in jobs]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(f"{source}: two rows are named {twice!r}; names tell the folders of results apart.")
+    if not jobs:
+        raise InputError(f"{source} holds no cell: one subfolder each with its records, or a table of them.")
+    return jobs
+
+
+def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
+    jobs = []
+    for each in sorted(path for path in folder.iterdir() if path.is_dir()):
+        data = tuple(sorted(p for p in each.iterdir() if p.suffix.lower() in RECORDS))
+        if data:
+            jobs.append(Job(each.name, _cell_in(each, cell), data))
+    return tuple(jobs)
+
+
+def _cell_in(folder: Path, given: Path | None) -> Path:
+    for pattern in CELL_FILES:
+        found = sorted(folder.glob(pattern))
+        if len(found) > 1:
+            raise InputError(f"{folder} holds {len(found)} files {pattern}; leave one, the cell's.")
+        if found:
+            return found[0]
+    if given is None:
+        raise InputError(f"{folder} holds no BPX file (*.bpx.json); put one in, or give --cell for all.")
+    return given
+
+
+def _of_table(table: Path, cell: Path | None) -> tuple[Job, ...]:
+    with table.open(encoding="utf-8-sig", newline="") as stream:
+        reader = csv.DictReader(stream)
+        header = tuple(reader.fieldnames or ())
+        unknown = [name for name in header if name not in COLUMNS]
+        if unknown or not {"name", "data"} <= set(header):
+            raise InputError(
+                f"{table} needs the columns name and data and may have {', '.join(COLUMNS[2:])}; it has: "
+                f"{', '.join(header) or 'none'}."
+            )
+        return tuple(_job(table, row, number, cell) for number, row in enumerate(reader, start=2))
+
+
+def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | None) -> Job:
+    def files(column: str) -> tuple[Path, ...]:
+        names = [name.strip() for name in (row.get(column) or "").split(";") if name.strip()]
+        return tuple(table.parent / name for name in names)
+
+    def number(column: str) -> float | None:
+        text = (row.get(column) or "").strip()
+        try:
+            return float(text) if text else None
+        except ValueError:
+            raise InputError(f"{table}, line {line}: {column} = {text!r} is no number.") from None
+
+    own = files("cell")
+    if not own and cell is None:
+        raise InputError(
+            f"{table}, line {line}: no cell is named; add the column cell, or give --cell for all."
+        )
+    name, data = (row.get("name") or "").strip(), files("data")
+    if not name or not data:
+        raise InputError(f"{table}, line {line}: name and data have to be given.")
+    missing = [path for path in (*own, *data, *files("test")) if not path.exists()]
+    if missing:
+        raise InputError(f"{table}, line {line}: there is no file {missing[0]}.")
+    specimen = (row.get("specimen") or "").strip()
+    return Job(
+        name, own[0] if own else cell or Path(), data, files("test"), number("soc0"), specimen, number("at")
+    )

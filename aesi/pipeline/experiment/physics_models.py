@@ -1,0 +1,77 @@
+"""The physics models that a correction stands beside, each from the training rows alone.
+
+    ESPM                          as declared
+    ESPM, one resistor            one contact resistance fitted
+    ESPM, initial state fitted    one shift of the state of charge at the start
+    ESPM recalibrated             all of `aesi.pipeline.experiment.recalibrate`
+
+The correction is learned on one of them (`cell.start`). Errors that calibrate bands, and the validation figure, have
+to come from drives that the physics had not seen either, so everything is fitted once more without each training drive.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.physics import ActiveEffect, Cell
+from aesi.pipeline.experiment.recalibrate import (
+    ALL,
+    INITIAL_STATE,
+    RESISTOR,
+    FitRecord,
+    PhysicsStart,
+    recalibrate,
+)
+from aesi.pipeline.product.error_series import error_series
+from aesi.records import ErrorSeries, Hold, Measurement
+
+DECLARED = "ESPM"
+RECALIBRATED = "ESPM recalibrated"
+FREE = {"ESPM, one resistor": RESISTOR, "ESPM, initial state fitted": INITIAL_STATE, RECALIBRATED: ALL}
+"""Name -> the knobs that are fitted."""
+PHYSICS_NAMES = (DECLARED, *FREE)
+
+
+@dataclass(frozen=True, eq=False)
+class PhysicsModels:
+    """by_name : the physics of each name.  start : the name of the one that is corrected."""
+
+    by_name: Mapping[str, PhysicsStart]
+    start: str
+
+    @property
+    def chosen(self) -> PhysicsStart:
+        """What the correction is learned on."""
+        return self.by_name[self.start]
+
+    def series(self, record: Measurement, soc0: float, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
+        """The error of the chosen physics along a record, what the others say beside it, and whether it ran empty."""
+        runs = {name: each.simulate(record, soc0, hold) for name, each in self.by_name.items()}
+        run = runs[self.start]
+        series = error_series(record, run, dt_s)
+        others = {name: each.voltage_v for name, each in runs.items()}
+        return replace(series, physics=others), bool(run.series["depleted"].any())
+
+
+def physics_models(
+    cell: Cell, effects: tuple[ActiveEffect, ...], records: Mapping[str, FitRecord], hold: Hold, start: str
+) -> PhysicsModels:
+    """All of them, fitted to the rows that the records admit; start : "declared" or "recalibrated"."""
+    fitted = {name: recalibrate(cell, effects, records, hold, free) for name, free in FREE.items()}
+    by_name = {DECLARED: PhysicsStart(cell, cell, effects), **fitted}
+    return PhysicsModels(by_name, RECALIBRATED if start == "recalibrated" else DECLARED)
+
+
+def without(records: Mapping[str, FitRecord], name: str, rows: slice) -> dict[str, FitRecord]:
+    """The records with the given rows of one of them kept from the fit."""
+    seen = records[name].rows.copy()
+    seen[rows] = False
+    return {**records, name: replace(records[name], rows=seen)}
+
+
+def no_rows(measurement: Measurement, soc0: float) -> FitRecord:
+    """A record of which no fit sees anything yet."""
+    return FitRecord(measurement, soc0, np.zeros(len(measurement), dtype=bool))

@@ -1,0 +1,93 @@
+"""`aesi impedance` as plain functions, and measured spectra held against a cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from aesi.data.readers import open_table
+from aesi.errors import DataError, InputError
+from aesi.numerics.typing import Array, ComplexArray
+from aesi.physics import Cell, impedance
+from aesi.physics.effect import ActiveEffect
+from aesi.physics.effects import activated
+from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.simulation import write_table
+from aesi.records import Spectrum
+
+BAND_HZ = (0.01, 100.0)
+"""Between them spectra are judged: above, leads and sensors; below, an open-circuit potential's slope."""
+
+
+def impedance_file(
+    cell: Path,
+    soc: float,
+    frequencies: str,
+    out: Path,
+    temperature_degc: float = 25.0,
+    effects: Sequence[tuple[str, Mapping[str, float]]] = (),
+    effect_files: Sequence[Path] = (),
+) -> ComplexArray:
+    """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
+
+    cell : a BPX file, or a folder of a saved model, whose effects are taken.  frequencies : LOW:HIGH:N in Hz,
+    log-spaced, or a CSV with a column frequency_hz.
+    """
+    model = declared_model(cell)
+    hz = read_frequencies(frequencies)
+    z = impedance(model.cell, hz, soc, temperature_degc, (*model.effects, *activated(effects, effect_files)))
+    write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
+    return z
+
+
+def read_frequencies(text: str) -> Array:
+    """Hz, of LOW:HIGH:N or of a file.  Raises InputError or DataError for what is neither."""
+    parts = text.split(":")
+    if len(parts) == 3:
+        try:
+            low, high, n = float(parts[0]), float(parts[1]), int(parts[2])
+        except ValueError:
+            raise InputError(f"--frequencies {text}: has to read LOW:HIGH:N, as in 0.001:1000:61.") from None
+        if not 0.0 < low < high < np.inf or n < 2:
+            raise InputError(f"--frequencies {text}: needs 0 < LOW < HIGH in Hz and at least two of them.")
+        return np.geomspace(low, high, n)
+    table = open_table(text)
+    if "frequency_hz" not in table.header:
+        raise DataError(f"{table.path.name} has no column frequency_hz; it has {', '.join(table.header)}.")
+    return table.read((list(table.header).index("frequency_hz"),))[0]
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumError:
+    """A measured spectrum beside the model's.
+
+    soc : at which the model was taken.  z_ohm : (n,) the model's.  off : root mean square of |Z_model|/|Z| - 1 within
+    `BAND_HZ`.
+    """
+
+    measured: Spectrum
+    soc: float
+    z_ohm: ComplexArray
+    off: float
+
+
+def held_against(
+    cell: Cell, spectra: Sequence[Spectrum], effects: Sequence[ActiveEffect] = ()
+) -> tuple[SpectrumError, ...]:
+    """Each spectrum beside the cell's; one below empty or above full is left out."""
+    out = []
+    for spectrum in spectra:
+        soc = spectrum.soc
+        if soc is None:
+            soc = 1.0 - (spectrum.discharged_ah or 0.0) / cell.capacity_ah
+        if not 0.0 <= soc <= 1.0:
+            continue
+        degc = 25.0 if spectrum.temperature_degc is None else spectrum.temperature_degc
+        z = impedance(cell, spectrum.frequency_hz, soc, degc, effects)
+        seen = (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
+        ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
+        out.append(SpectrumError(spectrum, soc, z, float(np.sqrt(np.mean(ratio**2)))))
+    return tuple(out)

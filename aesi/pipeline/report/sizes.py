@@ -1,0 +1,95 @@
+"""A finding with its size: '8.0 mohm [7.9, 8.1] more series resistance', from the content of discovery.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import floor, log10
+from typing import Any
+
+from aesi.parameters import Parameter
+from aesi.physics.effects import CATALOGUE
+
+SAME_SHARE = 0.98
+"""An error after that is not below this share of the recalibrated one is no better than a refit."""
+MOST_PARAMETERS = 3
+ADDED = "added to what"
+"""How a parameter's description says that it comes on top of the declared value."""
+PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
+SMALL = 0.5
+"""In its own unit; what is less is written in thousandths."""
+
+
+def sized(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
+    """The effect's name with its fitted parameters and their 90 % intervals; the name alone where there are none."""
+    name = title or effect.replace("_", " ")
+    row = next((c for c in discovery["candidates"] if c["effect"] == effect), None)
+    known = CATALOGUE[effect].parameters if effect in CATALOGUE else {}
+    fitted = dict(row.get("parameters", {})) if row else {}
+    told = {key: value for key, value in fitted.items() if _tells(value, known.get(key))} or fitted
+    if not told:
+        return name
+    ((key, value), *others) = told.items()
+    if not others and value["unit"] != "dimensionless":
+        if row and row["kind"] != "physics":  # what is off, or lies, is not had more or less of
+            return f"{name} ({quantity(value)})"
+        parameter = known.get(key)
+        more = " more" if parameter is not None and ADDED in parameter.description else " of"
+        return f"{quantity(value)}{more} {name}"
+    parts = [_part(key, value, known.get(key)) for key, value in list(told.items())[:MOST_PARAMETERS]]
+    rest = ", ..." if len(told) > MOST_PARAMETERS else ""
+    return f"{name} ({', '.join(parts)}{rest})"
+
+
+def quantity(value: Mapping[str, Any]) -> str:
+    """A value with its interval and unit: '8.0 mohm [7.9, 8.1]'."""
+    unit, factor = value["unit"], 1.0
+    largest = max(abs(value[key]) for key in ("value", "low", "high"))
+    if unit in PREFIXES and largest < SMALL:
+        unit, factor = PREFIXES[unit]
+    digits = _digits(factor * (value["high"] - value["low"]), factor * value["value"])
+    middle, low, high = (f"{factor * value[key]:.{digits}f}" for key in ("value", "low", "high"))
+    shown = "" if unit == "dimensionless" else f" {unit}"
+    return f"{middle}{shown} [{low}, {high}]"
+
+
+def finding_line(discovery: Mapping[str, Any]) -> str:
+    """The verdict in one line, with what was found and how much of it; a confidence where it belongs to a name."""
+    effects = [sized(effect, discovery) for effect in discovery["effects"]]
+    verdict = discovery["verdict"]
+    if verdict == "none":
+        return "none: nothing is missing that these data could show"
+    if verdict == "unknown":
+        left = "something real is left that no effect of the catalogue explains"
+        return f"unknown: {left}" + (f"; so far {', '.join(effects)}" if effects else "")
+    own, after = (discovery[state]["test"].get("rmse_mv") for state in ("recalibrated", "after"))
+    if own is not None and after is not None and after > SAME_SHARE * own:
+        return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit does as well"
+    return f"found: {', '.join(effects)}"
+
+
+def _tells(value: Mapping[str, Any], parameter: Parameter | None) -> bool:
+    """Whether a parameter differs from the value at which it does nothing, and is not all of its range."""
+    if parameter is None:
+        return True
+    low, high = parameter.bounds
+    if parameter.neutral is None:
+        return False
+    return not value["low"] <= parameter.neutral <= value["high"] and (value["low"], value["high"]) != (
+        low,
+        high,
+    )
+
+
+def _part(key: str, value: Mapping[str, Any], parameter: Parameter | None) -> str:
+    words = key.rsplit("_", 1)[0].replace("_", " ") if key.endswith(("_v", "_a", "_k", "_s", "_ohm")) else key
+    words = words.replace("_factor", "").replace("_", " ")
+    times = " times" if parameter is not None and parameter.neutral == 1.0 else ""
+    return f"{words} {quantity(value)}{times}"
+
+
+def _digits(width: float, value: float) -> int:
+    """Decimals that show the interval's width to two digits, or the value to three where it has none."""
+    scale = width if width > 0 else abs(value) / 10.0
+    if scale <= 0:
+        return 1
+    return max(0, min(6, 1 - floor(log10(scale))))

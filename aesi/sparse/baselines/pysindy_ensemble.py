@@ -1,0 +1,68 @@
+"""PySINDy's own ensemble: STLSQ on rows drawn one by one with replacement, and the median of its coefficients.
+
+The library, the scaling and the rows are those of the search; the ridge and the extent of the library come from a
+small grid, judged as candidates of the search are, by single fits. Rows are thinned to `MOST_ROWS`: neighbours say the
+same.
+Fasel et al., Proc. R. Soc. A 478 (2022) 20210904, doi:10.1098/rspa.2021.0904.
+"""
+
+from __future__ import annotations
+
+import warnings
+from itertools import product
+
+import numpy as np
+
+from aesi.errors import FitError
+from aesi.sparse.baselines.single import Single, evaluate_single
+from aesi.sparse.model import SparseModel
+from aesi.sparse.search.evaluate import FitnessWeights, sparse_model
+from aesi.sparse.search.genome import Genome
+from aesi.sparse.search.problem import Problem
+from aesi.sparse.stridge import STRidge
+
+NAME = "PySINDy ensemble"
+MEMBERS = 20
+MOST_ROWS = 20_000
+THRESHOLD = 1e-3
+_RIDGES = (1.0, 10.0, 100.0, 1000.0)
+
+
+def pysindy_ensemble(problem: Problem, seed: int = 0) -> SparseModel:
+    """The median of the ensemble. Raises FitError where no setting of the grid runs freely."""
+    best = _setting(problem)
+    active = np.flatnonzero(best.active(problem.library))
+    every = -(-len(problem.target) // MOST_ROWS)
+    root = np.sqrt(problem.row_weights[::every])[:, None]
+    theta = problem.theta(active).T[::every] * root
+    coefficients = _median(theta, problem.target[::every, None] * root, best.lambda1 / every, seed)
+    if not coefficients.any():
+        raise FitError(f"{NAME}: every coefficient is below the threshold of {THRESHOLD:g}.")
+    return sparse_model(problem, active, coefficients, 0.0, NAME)
+
+
+def _median(theta: np.ndarray, target: np.ndarray, ridge: float, seed: int) -> np.ndarray:
+    import pysindy
+
+    np.random.seed(seed)  # PySINDy draws its rows by the global generator  # noqa: NPY002
+    ensemble = pysindy.EnsembleOptimizer(
+        pysindy.STLSQ(threshold=THRESHOLD, alpha=ridge, unbias=False), bagging=True, n_models=MEMBERS
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        ensemble.fit(theta, target)
+    return np.asarray(np.median([member[0] for member in ensemble.coef_list], axis=0), dtype=float)
+
+
+def _setting(problem: Problem) -> Genome:
+    singles = []
+    top = int(problem.library.degrees.max())
+    for d, ridge in product(range(1, min(2, top) + 1), _RIDGES):
+        genome = Genome.whole(problem.library, ridge, THRESHOLD, d=d, feedback=False)
+        fit = STRidge(ridge, THRESHOLD).fit_factor
+        single = evaluate_single(problem, genome, fit, NAME, FitnessWeights(0.5, 0.5, 0.0))
+        if isinstance(single, Single):
+            singles.append(single)
+    if not singles:
+        raise FitError(f"{NAME}: no setting of its grid runs freely without diverging.")
+    return max(singles, key=lambda single: single.fitness).genome

@@ -1,0 +1,44 @@
+"""What a search is worth on a drive that chose nothing: selection repeated without each drive in turn.
+
+For each left-out drive the candidate, and its amplitude, are chosen by the other drives; what that leaves of the drive
+is what a search tells of the next one. The terms' coefficients come from fits without the drive as well. What a search
+reports of its own pick is better than that: the pick is the luckiest of many.
+Varma & Simon, BMC Bioinformatics 7 (2006) 91, doi:10.1186/1471-2105-7-91.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.sparse.fade import shrunken
+from aesi.sparse.search.evaluate import Candidate
+from aesi.sparse.search.problem import Problem
+
+ENSEMBLES = (0, 1)
+
+
+def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: int) -> Array:
+    """(n_folds,) the share of each fold's squared error that is left by what the other folds chose.
+
+    ensemble : 0 for AESI I, 1 for AESI II.  1 everywhere where there are fewer than two folds.
+    """
+    folds = len(problem.folds)
+    known = [c.fold_sums[ensemble] for c in candidates if np.isfinite(c.fold_sums).all()]
+    if folds < 2 or not known:
+        return np.ones(folds)
+    weights = np.array([problem.row_weights[a] for a, _ in problem.folds])
+    sums = np.stack(known) * weights[:, None]
+    shares = np.empty(folds)
+    for d in range(folds):
+        others = np.delete(sums, d, axis=1)
+        amplitudes = np.array([shrunken(each) if problem.options.fade else 1.0 for each in others])
+        pick = int(np.argmin([_left(each, a).sum() for each, a in zip(others, amplitudes, strict=True)]))
+        shares[d] = _left(sums[pick, d], amplitudes[pick]) / sums[pick, d, 0]
+    return shares
+
+
+def _left(sums: Array, amplitude: float) -> Array:
+    return np.asarray(sums[..., 0] - 2.0 * amplitude * sums[..., 1] + amplitude**2 * sums[..., 2])

@@ -1,0 +1,43 @@
+#!/bin/sh
+# Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
+#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc] [OUT_FOLDER]
+# Without arguments all four, into this folder. Each takes some minutes.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+which=${1:-all}
+out=${2:-$here}
+data=${AESI_DATA:?say where the measured records are}/measured
+start=$here/lg_m50_chen2020.bpx.json
+
+panasonic() {
+    p=$data/panasonic_ncr18650pf
+    aesi calibrate --cell "$start" --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_hppc.csv.gz" "$p/10degC_hppc.csv.gz" "$p/0degC_hppc.csv.gz" \
+        "$p/n10degC_hppc.csv.gz" --until n10degC_hppc=78611 \
+        --impedance "$p/25degC_eis.csv" --impedance "$p/10degC_eis.csv" \
+        --out "$out/panasonic_ncr18650pf.bpx.json"
+}
+panasonic_25degc() {
+    p=$data/panasonic_ncr18650pf
+    aesi calibrate --cell "$start" --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated at 25 degC alone" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_hppc.csv.gz" \
+        --out "$out/panasonic_ncr18650pf_25degc.bpx.json"
+}
+hg2() {
+    p=$data/lg_18650hg2
+    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
+        --data "$p/25degC_c20_ocv.csv" "$p/0degC_c20_ocv.csv" "$p/40degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" \
+        "$p/25degC_mixed1.csv.gz" \
+        --out "$out/lg_18650hg2.bpx.json"
+}
+hg2_25degc() {
+    p=$data/lg_18650hg2
+    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated at 25 degC alone" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
+        --out "$out/lg_18650hg2_25degc.bpx.json"
+}
+case $which in
+all) panasonic && panasonic_25degc && hg2 && hg2_25degc ;;
+panasonic | panasonic_25degc | hg2 | hg2_25degc) "$which" ;;
+*) echo "there is no cell $which" >&2 && exit 2 ;;
+esac

@@ -1,0 +1,92 @@
+"""`aesi batch`: one discovery a cell, over processes here or a Dask cluster; what is done is not done again."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+from aesi.pipeline.batch.job import Settings, run_job
+from aesi.pipeline.batch.plan import Job, read_plan
+from aesi.pipeline.batch.summary import write_summary
+from flows.base import environment
+from flows.base.console import Console, duration
+
+Runner = Literal["local", "dask"]
+
+
+def batch(
+    source: Path,
+    out: Path,
+    cell: Path | None = None,
+    settings: Settings | None = None,
+    workers: int = 2,
+    runner: Runner = "local",
+    address: str | None = None,
+) -> list[dict[str, Any]]:
+    """Run the jobs of a folder or table; the rows of the summary, which is written anew after each.
+
+    Raises InputError for a plan that cannot be read; a job that fails is a row with its reason.
+    """
+    environment.prepare()
+    console = Console()
+    started = time.monotonic()
+    jobs = read_plan(source, cell)
+    out.mkdir(parents=True, exist_ok=True)
+    console.say(f"{len(jobs)} cells from {source}, {workers} at a time; results in {out}")
+    rows: dict[str, dict[str, Any]] = {}
+    for row in _rows(jobs, out, settings or Settings(), workers, runner, address):
+        rows[row["name"]] = row
+        told = row["finding"] if row["status"] == "done" else f"failed: {row['reason']}"
+        console.say(f"{len(rows)}/{len(jobs)} {row['name']}: {told}")
+        page = write_summary(out, _ordered(jobs, rows), f"{source.name}: what the models of these cells lack")
+    failed = sum(row["status"] == "failed" for row in rows.values())
+    console.say(f"Finished in {duration(time.monotonic() - started)}; {failed} failed. Summary: {page}")
+    return _ordered(jobs, rows)
+
+
+def _ordered(jobs: Sequence[Job], rows: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
+    return [rows[job.name] for job in jobs if job.name in rows]
+
+
+def _rows(
+    jobs: Sequence[Job], out: Path, settings: Settings, workers: int, runner: Runner, address: str | None
+) -> Iterator[dict[str, Any]]:
+    """Rows as they are done."""
+    if runner == "dask":
+        yield from _on_dask(jobs, out, settings, workers, address)
+        return
+    import multiprocessing
+    from concurrent.futures import ProcessPoolExecutor, as_completed
+
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context, initializer=_quietly) as pool:
+        for future in as_completed([pool.submit(run_job, job, out, settings) for job in jobs]):
+            yield future.result()
+
+
+def _on_dask(
+    jobs: Sequence[Job], out: Path, settings: Settings, workers: int, address: str | None
+) -> Iterator[dict[str, Any]]:
+    from flows.evaluation.dask_pool import connect
+
+    client, cluster = connect(address, workers)
+    from distributed import as_completed
+
+    try:
+        futures = [client.submit(run_job, job, out.resolve(), settings, pure=False) for job in jobs]
+        for future in as_completed(futures):
+            yield future.result()
+    finally:
+        client.close(timeout=5)
+        if cluster is not None:
+            cluster.close(timeout=10)
+
+
+def _quietly() -> None:
+    """A worker leaves Ctrl-C to its parent, which ends it."""
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    environment.prepare()

@@ -1,0 +1,99 @@
+"""Calibration over temperatures: recovery, the temperature as an input, intervals, what stays open."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.calibration import calibrate
+from aesi.calibration.fit import problem
+from aesi.calibration.posterior import sampled
+from aesi.errors import DataError, InputError
+from aesi.physics import simulate
+
+
+@pytest.fixture(scope="module")
+def found(start, records):
+    return calibrate(start, records)
+
+
+def test_the_records_of_both_temperatures_are_followed(found):
+    assert [e.name for e in found.errors] == ["at_25", "at_0"]
+    assert all(e.after_v < 2e-3 < 0.2 * e.before_v for e in found.errors)
+
+
+def test_a_temperature_between_those_that_were_fitted_is_predicted(found, truth, records):
+    data = records[0]
+    true, ours, before = (
+        simulate(cell, data.time_s, data.current_a, 1.0, (), 12.0, "backward").voltage_v
+        for cell in (truth, found.cell, found.declared)
+    )
+    off, off_before = (float(np.sqrt(np.mean((v - true) ** 2))) for v in (ours, before))
+    assert off < 0.25 * off_before
+
+
+def test_every_parameter_has_an_interval_and_a_source(found):
+    assert {"negative.rate_energy", "positive.diffusivity_energy", "film.energy"} <= set(found.parameters)
+    for interval in found.parameters.values():
+        assert interval.low <= interval.value <= interval.high
+        assert interval.source
+
+
+def test_what_the_records_leave_open_is_named_with_its_weights(found):
+    assert found.undetermined
+    for combination in found.undetermined:
+        assert 0.0 < combination.narrowed <= 1.0
+        assert all(name in found.parameters for name, _ in combination.weights)
+        assert combination.weights[0][0] in combination.sentence
+
+
+def test_the_temperature_column_alone_changes_the_answer(start, records, found):
+    warmer = [replace(r, temperature_degc=r.temperature_degc + 10.0) for r in records]
+    other = calibrate(start, warmer, evaluations=8)
+    here, there = (c.parameters["negative.rate"].value for c in (found, other))
+    assert abs(np.log(here / there)) > 0.1
+
+
+def test_a_record_without_the_column_takes_the_temperature_that_is_given_for_it(start, records, found):
+    bare = [replace(r, temperature_degc=None) for r in records]
+    given = problem(start, bare, None, {"at_25": 25.0, "at_0": 0.0})[0]
+    measured = problem(start, records, None, {})[0]
+    x = np.linspace(-0.2, 0.2, given.layout.size)
+    assert given.residual(x) == pytest.approx(measured.residual(x), abs=1e-9)
+    without = problem(start, bare, None, {})
+    assert len(without[0].free) < len(given.free)  # nothing tells energies
+    assert any("taken at that of the cell file" in note for note in without[1])
+
+
+def test_a_temperature_that_cannot_be_used_is_refused(start, records):
+    with pytest.raises(DataError, match="no such record"):
+        calibrate(start, records, temperatures_degc={"elsewhere": 5.0})
+    with pytest.raises(DataError, match="measured temperature of its own"):
+        calibrate(start, records, temperatures_degc={"at_0": 5.0})
+
+
+def test_the_slopes_are_those_of_the_residual(start, records):
+    model = problem(start, records, None, {})[0]
+    x = 0.1 * np.sin(np.arange(model.layout.size))
+    jacobian = model.jacobian(x)
+    for j in (0, 4, model.layout.shapes.start + 5, model.layout.soc(1), model.layout.age(0)):
+        step = np.zeros_like(x)
+        step[j] = 1e-3
+        slope = (model.residual(x + step) - model.residual(x - step)) / 2e-3
+        assert np.abs(jacobian[:, j] - slope).max() < 0.05 * np.abs(slope).max()
+
+
+@pytest.mark.slow
+def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
+    pytest.importorskip("emcee")
+    posterior = sampled(found, 12, seed=1)
+    assert set(posterior.intervals) == set(found.parameters)
+    assert "times as wide as the linear ones" in posterior.sentence
+    assert "too short" in posterior.sentence
+    assert posterior.accepted > 0.05
+
+
+def test_a_posterior_of_too_few_steps_is_refused(found):
+    pytest.importorskip("emcee")
+    with pytest.raises(InputError, match="four steps"):
+        sampled(found, 2)

@@ -1,0 +1,89 @@
+"""Over a cell's envelope a simulation ends at its cut-off voltage, or with a sentence that names the true cause."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aesi.errors import SimulationError
+from aesi.physics import Cell, simulate
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+RATED_C = {
+    "lg_18650hg2": 20.0 / 3.0,
+    "panasonic_ncr18650pf": 10.0 / 2.9,
+    "lg_m50_chen2020": 3.0,
+    "nmc_30ah": 3.0,
+}
+"""Continuous discharge in the data sheets (the pouch cell has none: what its drive cycles ask for)."""
+CAUSES = ("more charge than the cell has", "solid diffusion cannot follow", "the electrolyte ran out of salt")
+
+
+@cache
+def cell_of(name: str) -> Cell:
+    return Cell.from_bpx(CELLS / f"{name}.bpx.json")
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    name=st.sampled_from(sorted(RATED_C)),
+    degc=st.floats(-20.0, 40.0),
+    share=st.floats(-1.0, 1.0).filter(lambda s: abs(s) > 0.01),
+    soc0=st.floats(0.0, 1.0),
+)
+def test_over_the_envelope_a_simulation_ends_at_its_cut_off_or_says_why_not(name, degc, share, soc0):
+    cell = cell_of(name)
+    rate = share * RATED_C[name] if share > 0 else share
+    current = rate * cell.nominal_capacity_ah
+    room_ah = cell.capacity_ah * (soc0 if current > 0 else 1.0 - soc0)
+    time = np.linspace(0.0, max(1.15 * room_ah / abs(current) * 3600.0, 5.0), 400)
+    run = simulate(cell, time, np.full(400, current), soc0, (), degc, on_depletion="clip")
+    assert np.isfinite(run.voltage_v).all()
+    passed = (run.voltage_v < cell.lower_voltage_v) | (run.voltage_v > cell.upper_voltage_v)
+    depleted = run.series["depleted"] > 0
+    ends = int(np.argmax(passed)) if passed.any() else len(time)
+    fails = int(np.argmax(depleted)) if depleted.any() else len(time)
+    if fails < len(time):
+        with pytest.raises(SimulationError) as caught:
+            simulate(cell, time, np.full(400, current), soc0, (), degc)
+        said = str(caught.value)
+        assert any(cause in said for cause in CAUSES)
+        soc = float(run.series["soc"][fails])
+        assert ("more charge than the cell has" in said) == (not 0.0 <= soc <= 1.0 and "salt" not in said)
+        assert ("cut-off" in said) == (ends <= fails)
+    if current > 0 and ends == len(time) and fails == len(time):
+        assert run.series["soc"][-1] < 0.02  # a rest voltage below the cut-off is beyond what is asked
+
+
+def test_an_electrolyte_that_is_too_cold_is_named_and_not_the_charge():
+    cell = cell_of("nmc_30ah")
+    time = np.arange(200.0)
+    with pytest.raises(SimulationError, match="too cold for this current") as caught:
+        simulate(cell, time, np.full(200, 3.0 * cell.nominal_capacity_ah), 1.0, (), -20.0)
+    assert "soc0" not in str(caught.value)
+    assert "-20 degC" in str(caught.value)
+
+
+def test_a_current_asked_of_an_empty_cell_is_named_as_charge():
+    cell = cell_of("lg_m50_chen2020")
+    time = np.arange(0.0, 8000.0, 10.0)
+    with pytest.raises(SimulationError, match="more charge than the cell has") as caught:
+        simulate(cell, time, np.full(len(time), 5.0), 0.9)
+    assert "passed the lower cut-off (2.5 V)" in str(caught.value)
+    assert "soc0" in str(caught.value)
+
+
+def test_the_salt_of_a_drive_in_the_cold_stays_near_that_of_a_porous_electrode():
+    """A wall that a uniform reaction would dry is one from which the reaction withdraws."""
+    cell = cell_of("nmc_30ah")
+    time = np.arange(0.0, 120.0)
+    current = np.where(time % 60 < 40, 3.0, 0.3) * cell.nominal_capacity_ah
+    single, porous = (
+        simulate(cell, time, current, 0.8, (), -20.0, on_depletion="clip", model=name)
+        for name in ("espm", "dfn")
+    )
+    assert single.series["c_eL"].min() < 0.0 < porous.series["c_eL"].min()
+    assert np.abs(single.voltage_v - porous.voltage_v).max() < 0.12

@@ -1,0 +1,119 @@
+"""The plan of a batch, what a job leaves, and what the summary makes of it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import aesi
+from aesi.errors import InputError
+from aesi.physics.effects import CATALOGUE
+from aesi.physics.folded import folded
+from aesi.pipeline.batch.job import Settings, health_of, run_job
+from aesi.pipeline.batch.plan import Job, read_plan
+from aesi.pipeline.batch.summary import trends, write_summary
+
+CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
+
+
+def touched(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("x")
+    return path
+
+
+def test_a_folder_is_one_cell_a_subfolder(tmp_path):
+    touched(tmp_path / "a" / "1.csv")
+    touched(tmp_path / "a" / "2.csv.gz")
+    own = touched(tmp_path / "b" / "b.bpx.json")
+    touched(tmp_path / "b" / "1.mpt")
+    touched(tmp_path / "notes" / "readme.md")
+    jobs = read_plan(tmp_path, CELL)
+    assert [(job.name, job.cell, len(job.data)) for job in jobs] == [("a", CELL, 2), ("b", own, 1)]
+    with pytest.raises(InputError, match="--cell"):
+        read_plan(tmp_path)
+
+
+def test_a_table_names_cells_tests_and_check_ups(tmp_path):
+    for name in ("s.csv", "d.csv", "t.csv"):
+        touched(tmp_path / name)
+    table = tmp_path / "plan.csv"
+    table.write_text(
+        "name,data,test,soc0,specimen,at\nc0,s.csv;d.csv,t.csv,0.9,cell 1,0\nc1,d.csv,,,cell 1,200\n"
+    )
+    first, second = read_plan(table, CELL)
+    assert first == Job(
+        "c0", CELL, (tmp_path / "s.csv", tmp_path / "d.csv"), (tmp_path / "t.csv",), 0.9, "cell 1", 0.0
+    )
+    assert (second.tests, second.soc0, second.at) == ((), None, 200.0)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("name\na\n", "columns name and data"),
+        ("name,data,mass\na,s.csv,3\n", "columns name and data"),
+        ("name,data\na,nowhere.csv\n", "line 2: there is no file"),
+        ("name,data\na,s.csv\na,s.csv\n", "named 'a'"),
+        ("name,data,at\na,s.csv,old\n", "is no number"),
+        ("name,data\n,s.csv\n", "have to be given"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_one_sentence(tmp_path, content, words):
+    touched(tmp_path / "s.csv")
+    table = tmp_path / "plan.csv"
+    table.write_text(content)
+    with pytest.raises(InputError, match=words):
+        read_plan(table, CELL)
+
+
+def test_a_job_that_cannot_be_done_is_a_row_with_its_reason(tmp_path):
+    row = run_job(Job("bad", CELL, (touched(tmp_path / "bad.csv"),)), tmp_path / "out", Settings())
+    assert row["status"] == "failed"
+    assert "bad.csv" in row["reason"]
+
+
+def test_what_is_done_is_taken_again_until_a_file_or_a_setting_changes(tmp_path):
+    data = touched(tmp_path / "a.csv")
+    job, settings = Job("a", CELL, (data,)), Settings()
+    folder = tmp_path / "out" / "a"
+    folder.mkdir(parents=True)
+    kept = {"name": "a", "status": "done", "verdict": "none"}
+    (folder / "row.json").write_text(json.dumps({"key": job.key(settings.key), "row": kept}))
+    assert run_job(job, tmp_path / "out", settings) == kept
+    assert run_job(job, tmp_path / "out", Settings(seed=1))["status"] == "failed"
+    data.write_text("y")
+    assert run_job(job, tmp_path / "out", settings)["status"] == "failed"
+
+
+def test_health_shows_what_was_lost():
+    cell = aesi.Cell.from_bpx(CELL)
+    aged = folded(
+        cell,
+        [
+            CATALOGUE["lithium_inventory_loss"].activate(loss=0.1),
+            CATALOGUE["series_resistance"].activate(resistance_ohm=5e-3),
+        ],
+    ).cell
+    fresh, old = health_of(cell), health_of(aged)
+    assert old.inventory_ah == pytest.approx(fresh.inventory_ah - 0.1 * cell.capacity_ah, rel=1e-6)
+    assert old.resistance_mohm - fresh.resistance_mohm == pytest.approx(5.0)
+    assert old.negative_ah == pytest.approx(fresh.negative_ah)
+    assert old.positive_ah == pytest.approx(fresh.positive_ah)
+    assert old.capacity_ah < fresh.capacity_ah
+
+
+def test_the_summary_has_every_cell_and_the_trend_in_order(tmp_path):
+    def row(name, at, resistance):
+        health = {"inventory_ah": 7.0, "negative_ah": 5.0, "positive_ah": 8.0, "capacity_ah": 4.0}
+        done = {"status": "done", "verdict": "none", "effects": "", "finding": "none: nothing is missing"}
+        return {"name": name, "specimen": "cell 1", "at": at, **done, "resistance_mohm": resistance, **health}
+
+    failed = {"name": "x", "specimen": "", "at": None, "status": "failed", "reason": "x.csv is empty & <odd>"}
+    rows = [row("late", 200.0, 3.0), row("early", 0.0, 1.0), failed]
+    assert [each["resistance_mohm"] for each in trends(rows)["cell 1"]] == [1.0, 3.0]
+    page = write_summary(tmp_path, rows, "plan").read_text(encoding="utf-8")
+    assert "2 of 3 cells done" in page
+    assert "x.csv is empty &amp; &lt;odd&gt;" in page
+    assert "Resistance of contacts and films" in page
+    assert len((tmp_path / "summary.csv").read_text().splitlines()) == 4

@@ -1,0 +1,76 @@
+"""The physics models beside a correction: fitted to the training rows alone, and refitted without each drive."""
+
+import numpy as np
+import pytest
+from small_experiment import NOISE_V, experiment, write_record
+
+from aesi.pipeline.experiment.evaluate import evaluate
+from aesi.pipeline.experiment.fit import Fitted, build_problem
+from aesi.pipeline.experiment.load import load
+from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
+from aesi.pipeline.experiment.validation import validation_mser
+from aesi.sparse import Candidate, Genome
+from aesi.sparse import evaluate as evaluate_genome
+from aesi.sparse.yardsticks import Bare
+
+
+@pytest.fixture(scope="module")
+def config(tmp_path_factory):
+    record = write_record(tmp_path_factory.mktemp("record"))
+    small = experiment(record)
+    return small.model_copy(update={"cell": small.cell.model_copy(update={"start": "recalibrated"})})
+
+
+@pytest.fixture(scope="module")
+def loaded(config):
+    return load(config)
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def test_one_fitted_resistor_is_all_that_this_cell_lacks(loaded):
+    for series in (*loaded.split.test, *(each.series for each in loaded.left_out)):
+        assert rms(series.left_by(DECLARED)) > 20 * NOISE_V
+        assert rms(series.left_by("ESPM, one resistor")) < 2.0 * NOISE_V
+        assert rms(series.left_by(RECALIBRATED)) < 2.0 * NOISE_V
+        np.testing.assert_array_equal(series.left_by(RECALIBRATED), series.error_v)
+
+
+def test_the_saved_cell_is_the_one_that_is_corrected(loaded):
+    assert loaded.cell.contact_resistance_ohm == pytest.approx(1.5e-3, rel=0.15)
+
+
+def test_halves_of_training_repeats_are_left_out_under_physics_of_their_own(loaded):
+    assert len(loaded.left_out) == 2 * len(loaded.split.train)
+    for i, left in enumerate(loaded.left_out):
+        seen = loaded.split.train[i // 2]
+        assert left.series.name == seen.name
+        assert left.rows == (slice(0, 300), slice(300, 600))[i % 2]
+        np.testing.assert_array_equal(left.series.left_by(DECLARED), seen.left_by(DECLARED))
+        assert not np.array_equal(left.series.error_v, seen.error_v)
+
+
+def test_every_table_tells_both_reductions(loaded, config):
+    rows = evaluate([Fitted(Bare(name), 0, 0.0) for name in PHYSICS_NAMES], loaded.split).rows
+    figures = {row["name"]: row["free_run"] for row in rows}
+    assert figures[DECLARED]["test_mser_pct"] == pytest.approx(0.0, abs=1e-9)
+    assert figures[RECALIBRATED]["test_mser_pct"] > 99.0
+    assert figures[RECALIBRATED]["test_mser_recalibrated_pct"] == pytest.approx(0.0, abs=1e-9)
+    assert figures[DECLARED]["test_mser_recalibrated_pct"] < -1000.0
+
+
+def test_validation_comes_from_drives_that_chose_nothing(loaded, config):
+    problem = build_problem(loaded, config)
+    candidate = evaluate_genome(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))
+    assert isinstance(candidate, Candidate)
+    figures = validation_mser(loaded, problem, [candidate])
+    assert figures[DECLARED] == pytest.approx(0.0, abs=1e-9)
+    assert 99.0 < figures[RECALIBRATED] <= 100.0
+    assert set(figures) == {*PHYSICS_NAMES, "AESI I", "AESI II"}
+
+
+def test_a_found_model_may_be_named_as_the_cell(config):
+    content = config.model_dump(mode="json") | {"cell": "found/model"}
+    assert type(config).model_validate({**content, "base": config.base}).cell.bpx == "found/model"

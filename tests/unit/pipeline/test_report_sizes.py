@@ -1,0 +1,62 @@
+"""A finding is told with its size."""
+
+import pytest
+
+from aesi.pipeline.report.sizes import finding_line, quantity, sized
+
+
+def value(middle, low, high, unit):
+    return {"value": middle, "low": low, "high": high, "unit": unit}
+
+
+def discovery(effect, kind, parameters, verdict="found", recalibrated=5.0):
+    errors = {
+        state: {"test": {"rmse_mv": mv}} for state, mv in (("recalibrated", recalibrated), ("after", 1.0))
+    }
+    row = {"effect": effect, "kind": kind, "score": 9.0, "parameters": parameters}
+    return {"verdict": verdict, "effects": [effect], "candidates": [row], **errors}
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        (value(8.0e-3, 7.93e-3, 8.12e-3, "ohm"), "8.00 mohm [7.93, 8.12]"),
+        (value(-14.1, -15.2, -12.9, "K"), "-14.1 K [-15.2, -12.9]"),
+        (value(0.6, 0.5, 0.7, "dimensionless"), "0.60 [0.50, 0.70]"),
+        (value(1250.0, 900.0, 1600.0, "J/K"), "1250 J/K [900, 1600]"),
+    ],
+)
+def test_a_quantity_has_its_interval_and_the_digits_that_it_deserves(given, text):
+    assert quantity(given) == text
+
+
+def test_physics_is_had_and_what_is_off_has_a_size():
+    ohms = {"resistance_ohm": value(8e-3, 7.9e-3, 8.1e-3, "ohm")}
+    assert sized("series_resistance", discovery("series_resistance", "physics", ohms)) == (
+        "8.00 mohm [7.90, 8.10] more series resistance"
+    )
+    kelvin = {"shift_k": value(-14.1, -15.2, -12.9, "K")}
+    assert sized("ambient_temperature", discovery("ambient_temperature", "parameter", kelvin)) == (
+        "ambient temperature (-14.1 K [-15.2, -12.9])"
+    )
+
+
+def test_only_what_differs_from_nothing_is_told():
+    factors = {
+        "negative_factor": value(0.6, 0.58, 0.62, "dimensionless"),
+        "positive_factor": value(1.01, 0.9, 1.1, "dimensionless"),
+    }
+    text = sized("solid_diffusivity", discovery("solid_diffusivity", "parameter", factors))
+    assert text == "solid diffusivity (negative 0.600 [0.580, 0.620] times)"
+
+
+def test_the_line_of_a_verdict():
+    ohms = {"resistance_ohm": value(8e-3, 7.9e-3, 8.1e-3, "ohm")}
+    found = discovery("series_resistance", "physics", ohms)
+    assert finding_line(found) == "found: 8.00 mohm [7.90, 8.10] more series resistance"
+    same = discovery("series_resistance", "physics", ohms, recalibrated=1.0)
+    assert finding_line(same).startswith("one of two explanations: 8.00 mohm")
+    assert finding_line({**found, "verdict": "none", "effects": []}).startswith("none: nothing is missing")
+    unknown = finding_line({**found, "verdict": "unknown", "effects": []})
+    assert unknown.startswith("unknown: something real is left")
+    assert "%" not in unknown

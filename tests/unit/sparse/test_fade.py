@@ -1,0 +1,92 @@
+"""The correction gives way to the physics outside its range and where left-out drives do not bear it out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from sparse_records import make_record
+
+from aesi.records import Split
+from aesi.sparse import Candidate, Genome, Options, Problem, SparseModel, evaluate
+from aesi.sparse.baselines.dmd_c import dmd_with_control
+from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
+from aesi.sparse.fade import DOUBT, range_weight, shrunken
+from aesi.sparse.search.nested import nested_shares
+
+OPTIONS = Options(p_c=2, d=2, special=False, mixed=False, resamples=20, block=60, fade=True)
+
+
+def drives(seeds, **changes):
+    return tuple(replace(make_record(600, seed=seed), name=f"drive {seed}", **changes) for seed in seeds)
+
+
+def fitted(records) -> tuple[Problem, Candidate]:
+    problem = Problem.build(Split(records, (), ()), OPTIONS)
+    candidate = evaluate(problem, Genome.whole(problem.library, 1e-1, 1e-3, 0.5, p_c=2, d=2, feedback=False))
+    assert isinstance(candidate, Candidate)
+    return problem, candidate
+
+
+def test_the_weight_is_one_inside_and_a_half_at_the_stated_distance():
+    scaled = np.array([[0.0, 0.0], [1.0, -1.0], [1.1, 0.0], [3.0, 0.0]])
+    weight = range_weight(scaled, np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
+    np.testing.assert_allclose(weight, [1.0, 1.0, 0.5, 1.0 / 401.0])
+
+
+def sums(slopes, size=1.0):
+    """(n_drives, 3) of corrections of that size relative to the error."""
+    return np.array([[1.0, slope * size, size] for slope in slopes])
+
+
+def test_an_amplitude_that_drives_agree_on_is_kept_and_one_they_dispute_is_not():
+    assert shrunken(sums([0.8] * 4)) == pytest.approx(0.8 / (1.0 + DOUBT))
+    assert shrunken(sums([2.0, -1.8, 2.0, -1.8])) == 0.0
+    assert shrunken(sums([-1.0] * 4)) == 0.0
+
+
+def test_what_left_out_drives_hardly_see_is_not_believed():
+    assert shrunken(sums([1.0] * 4, size=1e-3)) < 0.05
+
+
+def test_records_are_the_folds_and_a_true_error_is_kept():
+    problem, candidate = fitted(drives(range(4)))
+    assert problem.folds == problem.spans
+    assert candidate.bagging.fade.amplitude > 0.85
+    assert nested_shares(problem, [candidate], 0).max() < 0.2
+
+
+def test_an_error_that_no_other_drive_has_is_left_to_the_physics():
+    rng = np.random.default_rng(0)
+    # Each drive has an error of its own sign: nothing carries over.
+    records = tuple(
+        replace(record, error_v=sign * record.error_v + 1e-4 * rng.normal(size=len(record)))
+        for record, sign in zip(drives(range(4)), (1, -1, 1, -1), strict=True)
+    )
+    problem, candidate = fitted(records)
+    assert candidate.bagging.fade.amplitude == 0.0
+    fresh = make_record(300, seed=9)
+    np.testing.assert_allclose(candidate.bagging.free_run(fresh, 0.0).error_v, 0.0, atol=1e-12)
+    np.testing.assert_allclose(nested_shares(problem, [candidate], 0), 1.0)
+
+
+def test_far_outside_the_range_little_of_the_correction_is_left():
+    _, candidate = fitted(drives(range(3)))
+    model = candidate.bagging
+    record = make_record(300, seed=9)
+    shifted = replace(record, inputs=record.inputs + 5.0 * np.ptp(record.inputs, axis=0))
+    assert np.abs(model.free_run(shifted, 0.0).error_v).max() < 0.01 * np.abs(record.error_v).max()
+    again = SparseModel.from_dict(model.to_dict())
+    np.testing.assert_array_equal(again.free_run(record).error_v, model.free_run(record).error_v)
+
+
+def test_peers_fit_the_same_rows():
+    problem, _ = fitted(drives(range(3)))
+    record = make_record(300, seed=9)
+    bare = np.mean(record.error_v**2)
+    ensemble = pysindy_ensemble(problem, seed=0)
+    assert np.mean((record.error_v - ensemble.free_run(record).error_v) ** 2) < 0.5 * bare
+    linear = dmd_with_control(problem)
+    assert linear.has_feedback
+    assert set(linear.terms) <= {"1", *(f"T1({name})" for name in problem.library.variables)}
