@@ -14,20 +14,20 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Hold, Measurement, Run
-from aesi.tracer.candidate_effects import CandidateEffect, ranking
+from aesi.tracer.case.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.case.reduction import with_fine_numerics
-from aesi.tracer.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.decide.archive import Archive, context_of
 from aesi.tracer.decide.evidence import Evidence, gathered
 from aesi.tracer.decide.verdict import Thresholds, Verdict
-from aesi.tracer.explain import explain
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.outcome import FileOutcome, States, outcomes, test_rmse_v
-from aesi.tracer.states import ModelState
-from aesi.tracer.tell_apart import experiment
-from aesi.tracer.yardstick import Yardstick, measure
+from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
+from aesi.tracer.report.explain import explain
+from aesi.tracer.report.outcome import FileOutcome, States, outcomes, test_rmse_v
+from aesi.tracer.report.tell_apart import experiment
+from aesi.tracer.report.yardstick import Yardstick, measure
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import values_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.states import ModelState
+from aesi.tracer.likelihood.model_state import ModelState
 
 WORSE = 1.05
 """A hypothesis may leave so much more than the better of the declared and the recalibrated model on a part left out."""

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from aesi.errors import DataError
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
@@ -14,7 +16,7 @@ from aesi.tracer.decide.search import Path, Report, base_of, refitted, searched,
 from aesi.tracer.decide.verdict import Thresholds, Verdict, judged, noise_v, structured_v, tolerance_v
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.states import ModelState
+from aesi.tracer.likelihood.model_state import ModelState
 
 AS_DECLARED_NATS = 5.0
 """Own parameters as declared are believed where freeing them says no more than this."""
@@ -77,7 +79,7 @@ def gathered(
         exact = path_of("exact")
         path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
     verdict = _with_confidence(verdict)
-    recalibrated = _recalibrated(problem, archive)
+    recalibrated = _recalibrated(problem, paths["tight"], archive)
     if verdict.word != "unknown":
         return _adopted(path, paths, verdict, recalibrated)
     loose = path_of("loose") if len(problem.records) > 1 else None
@@ -127,10 +129,23 @@ def _with_confidence(verdict: Verdict) -> Verdict:
 
 
 def _recalibrated(
-    problem: InverseProblem, archive: Archive
+    problem: InverseProblem, tight: Path, archive: Archive
 ) -> tuple[InverseProblem, FittedHypothesis] | None:
+    """The declared model with all of its own parameters open; with fewer where that fits better, and none where not even
+    those do better than the declared ones on what they were fitted to."""
     based = base_of(replace(problem, trust="loose"), archive)
-    return None if based is None else (based[0], based[2])
+    tried = (
+        [(tight.problem, tight.base)]
+        if based is None
+        else [(based[0], based[2]), (tight.problem, tight.base)]
+    )
+    best = min(tried, key=lambda one: one[1].rmse_v)
+    declared = ModelState(problem)
+    errors = [
+        (record.thin.voltage_v - declared.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
+        for k, record in enumerate(problem.records)
+    ]
+    return best if best[1].rmse_v <= float(np.sqrt(np.mean(np.concatenate(errors) ** 2))) else None
 
 
 def _adopted(

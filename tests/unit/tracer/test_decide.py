@@ -13,7 +13,7 @@ from aesi.tracer.decide.carry_over import left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
 from aesi.tracer.decide.search import searched
 from aesi.tracer.decide.verdict import Thresholds, judged, structured_v
-from aesi.tracer.states import ModelState
+from aesi.tracer.likelihood.model_state import ModelState
 
 NEVER = Archive(None, "")
 
