@@ -131,8 +131,8 @@ def _with_confidence(verdict: Verdict) -> Verdict:
 def _recalibrated(
     problem: InverseProblem, tight: Path, archive: Archive
 ) -> tuple[InverseProblem, FittedHypothesis] | None:
-    """The declared model with all of its own parameters open; with fewer where that fits better, and none where not even
-    those do better than the declared ones on what they were fitted to."""
+    """The declared model with all of its own parameters open; with fewer where that fits better, and none where not
+    even those do better than the declared ones on what they were fitted to."""
     based = base_of(replace(problem, trust="loose"), archive)
     tried = (
         [(tight.problem, tight.base)]
