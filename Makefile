@@ -24,7 +24,7 @@ $(DEVSTAMP): $(STAMP)
 	touch $@
 
 test: $(DEVSTAMP)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile -rs
 
 test-slow: $(DEVSTAMP)
 	$(BIN)/python -m pytest -m slow

@@ -19,6 +19,8 @@ from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
 BLOCK_S = 100.0
+CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
+"""Intervals one step ahead are not judged here."""
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")
 
 
@@ -71,6 +73,7 @@ def _config(
     ]
     if settings.get("dt_s") is not None:
         laid += [f"data.dt_s={settings['dt_s']}", f"search.block={round(BLOCK_S / settings['dt_s'])}"]
+    laid += CHEAP
     return read_experiment(folder / case.experiment, [*laid, *overrides])
 
 
@@ -92,8 +95,8 @@ def _row(case: SplitCase, seed: int, config: ExperimentConfig) -> dict[str, Any]
 
 def _judged(case: SplitCase, config: ExperimentConfig) -> dict[str, Any]:
     from aesi.pipeline.experiment.candidate import genome_space, weights
-    from aesi.pipeline.experiment.conformalise import conformalise
     from aesi.pipeline.experiment.fit import build_problem, final_models
+    from aesi.pipeline.experiment.intervals.conformalise import conformalise
     from aesi.pipeline.experiment.load import load
     from aesi.pipeline.experiment.validation import validation_mser
     from aesi.sparse import Candidate

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.physics import ActiveEffect, Cell
+from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.pipeline.experiment.recalibrate import (
     ALL,
     INITIAL_STATE,
@@ -57,11 +57,24 @@ class PhysicsModels:
 
 
 def physics_models(
-    cell: Cell, effects: tuple[ActiveEffect, ...], records: Mapping[str, FitRecord], hold: Hold, start: str
+    cell: Cell,
+    effects: tuple[ActiveEffect, ...],
+    records: Mapping[str, FitRecord],
+    hold: Hold,
+    start: str,
+    begin: PhysicsModels | None = None,
+    model: ModelName = "espm",
 ) -> PhysicsModels:
-    """All of them, fitted to the rows that the records admit; start : "declared" or "recalibrated"."""
-    fitted = {name: recalibrate(cell, effects, records, hold, free) for name, free in FREE.items()}
-    by_name = {DECLARED: PhysicsStart(cell, cell, effects), **fitted}
+    """All of them, fitted to the rows that the records admit; start : "declared" or "recalibrated".
+
+    begin : fitted to nearly the same rows.
+    """
+    known = {} if begin is None else begin.by_name
+    fitted = {
+        name: recalibrate(cell, effects, records, hold, free, known.get(name), model)
+        for name, free in FREE.items()
+    }
+    by_name = {DECLARED: PhysicsStart(cell, cell, effects, model=model), **fitted}
     return PhysicsModels(by_name, RECALIBRATED if start == "recalibrated" else DECLARED)
 
 

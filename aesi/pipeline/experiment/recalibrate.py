@@ -23,7 +23,7 @@ import numpy as np
 from aesi.errors import AesiError
 from aesi.numerics.bounded import descend
 from aesi.numerics.typing import Array, BoolArray
-from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics import ActiveEffect, Cell, ModelName, simulate
 from aesi.physics.balance import same_rest
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import model_with
@@ -34,6 +34,7 @@ MEMORY_S = 100.0
 EVERY_S = 5.0
 """Rows closer than this say the same to the fit."""
 ROUNDS = 8
+ROUNDS_AGAIN = 3
 GAIN = 0.05
 STEP = 0.05
 """Of a difference quotient, in deviations."""
@@ -86,12 +87,17 @@ class FitRecord:
 
 @dataclass(frozen=True)
 class PhysicsStart:
-    """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell."""
+    """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
+
+    deviations : of the knobs that were free, where the fit ended.
+    """
 
     declared: Cell
     cell: Cell
     effects: tuple[ActiveEffect, ...] = ()
     shift: float = 0.0
+    deviations: tuple[float, ...] = ()
+    model: ModelName = "espm"
 
     def soc0(self, soc0: float) -> float:
         """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""
@@ -108,6 +114,7 @@ class PhysicsStart:
             record.temperature_degc,
             hold,
             on_depletion="clip",
+            model=self.model,
         )
 
 
@@ -117,18 +124,28 @@ def recalibrate(
     records: Mapping[str, FitRecord],
     hold: Hold,
     free: Sequence[int] = ALL,
+    begin: PhysicsStart | None = None,
+    model: ModelName = "espm",
 ) -> PhysicsStart:
     """The declared physics with the free knobs where the rows of the records, and what was known of them, want them.
 
+    begin : a fit of the same knobs to nearly the same rows, from which few rounds are enough.
     Where no row may be looked at, or nothing can be simulated, it is the declared one.
     """
     fit = _Fit(
-        declared, tuple(effects), tuple(r for r in records.values() if r.rows.any()), hold, np.array(free)
+        declared,
+        tuple(effects),
+        tuple(r for r in records.values() if r.rows.any()),
+        hold,
+        np.array(free),
+        model,
     )
     if not fit.records:
         return fit.physics(np.zeros(len(free)))
     low, high = fit.bounds()
-    found = descend(fit.linearised, fit.cost, np.zeros(len(free)), low, high, ROUNDS, GAIN)
+    first = np.array(begin.deviations) if begin and begin.deviations else np.zeros(len(free))
+    rounds = ROUNDS if begin is None else ROUNDS_AGAIN
+    found = descend(fit.linearised, fit.cost, first, low, high, rounds, GAIN)
     return fit.physics(found.x if np.isfinite(found.cost) else np.zeros(len(free)))
 
 
@@ -139,6 +156,7 @@ class _Fit:
     records: tuple[FitRecord, ...]
     hold: Hold
     free: Array
+    model: ModelName
 
     def bounds(self) -> tuple[Array, Array]:
         low, high = np.full(len(KNOBS), -REACH), np.full(len(KNOBS), REACH)
@@ -159,7 +177,8 @@ class _Fit:
         volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
         cell = model_with(self.declared, _activated(values)).cell
         ohm = self.declared.contact_resistance_ohm + volts_at_1c / self.declared.nominal_capacity_ah
-        return PhysicsStart(self.declared, replace(cell, contact_resistance_ohm=ohm), self.effects, shift)
+        cell = replace(cell, contact_resistance_ohm=ohm)
+        return PhysicsStart(self.declared, cell, self.effects, shift, tuple(z.tolist()), self.model)
 
     def cost(self, z: Array) -> float:
         left = self._left(z)

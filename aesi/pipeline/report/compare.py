@@ -152,7 +152,9 @@ def _figure(run: ComparedRun, name: str) -> ComparedCell:
     if value is None:
         return ComparedCell(ABSENT)
     model = run.settings.get("chosen_model", "")
-    ends = run.comparison.get("intervals", {}).get(model, {}).get(name.rpartition("/")[2])
+    regime, _, figure = name.partition("/")
+    known = run.comparison.get("intervals", {}).get(model, {}) if regime == "free_run" else {}
+    ends = known.get(figure)
     return ComparedCell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
 
 
@@ -221,7 +223,7 @@ def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
     )
     shared = len(count) - len(differing)
     caption = (
-        f"Coefficients of the terms that not all runs hold; {shared} terms are in all {len(having)} runs."
+        f"Coefficients of the terms that not all runs hold; the other {shared} are in all {len(having)} runs."
     )
     if len(having) > MOST_COLUMNS:
         counted = tuple(
