@@ -4,8 +4,8 @@
 
 a (n,) and w (n,) are the standard deviations of the model error and of the white noise in each row. Equal shares over
 correlation lengths a factor of thirty apart stand for a spectrum that falls as one over the frequency between them.
-The Kalman filter of (1) is linear in y, so that it whitens a residual and its sensitivities alike. The process starts afresh at
-each block, so that blocks are independent and any of them can be left out in closed form.
+The Kalman filter of (1) is linear in y, so that it whitens a residual and its sensitivities alike. The process starts
+afresh at each block, so that blocks are independent and any of them can be left out in closed form.
 Kennedy & O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, for the model error; Durbin & Koopman, Time Series Analysis by
 State Space Methods, 2nd ed. (2012), chapters 4 and 7, for the filter.
 """
