@@ -22,7 +22,7 @@ from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
-from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
+from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors, Unseen
 from aesi.records import Failed, Split
 from aesi.sparse import Genome, Options, Problem, evaluate
 from aesi.sparse.search.fold_models import fold_models, with_leverage

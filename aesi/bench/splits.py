@@ -22,8 +22,8 @@ import numpy as np
 
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
-from aesi.pipeline.experiment.bands import reach
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.intervals.bands import reach
 from aesi.pipeline.experiment.physics_models import DECLARED
 from aesi.pipeline.experiment.sections import RepeatsConfig
 from aesi.records import ErrorSeries

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebval
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.profile import Bench, Profile, paper_profiles
+from aesi.data.profiles.profile import Bench, Profile, paper_profiles
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, simulate

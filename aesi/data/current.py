@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from aesi.data.checks import check_finite, check_time
-from aesi.data.columns import map_columns
-from aesi.data.load_columns import load_columns
+from aesi.data.channels.checks import check_finite, check_time
+from aesi.data.channels.columns import map_columns
+from aesi.data.channels.load_columns import load_columns
 from aesi.data.read import read
 from aesi.data.readers import open_table
 from aesi.data.reading import Reading

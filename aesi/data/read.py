@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from aesi.data.checks import (
+from aesi.data.channels.checks import (
     Columns,
     Context,
     check_alive,
@@ -17,9 +17,9 @@ from aesi.data.checks import (
     gap_error,
     is_rest,
 )
-from aesi.data.columns import REQUIRED, Mapped
-from aesi.data.implausible import check_scale, check_signed
-from aesi.data.load_columns import load_columns
+from aesi.data.channels.columns import REQUIRED, Mapped
+from aesi.data.channels.implausible import check_scale, check_signed
+from aesi.data.channels.load_columns import load_columns
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
 from aesi.data.reading import Duplicates, Reading

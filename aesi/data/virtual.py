@@ -15,7 +15,7 @@ import numpy as np
 from aesi.data.laboratory.changes import find_change
 from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, run
-from aesi.data.profile import OTHER_LOAD, PULSE_C, Profile, paper_profiles
+from aesi.data.profiles.profile import OTHER_LOAD, PULSE_C, Profile, paper_profiles
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import Measurement

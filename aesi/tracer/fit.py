@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from aesi.numerics.bounded import descend
-from aesi.numerics.coloured import ColouredNoise, fit_noise
+from aesi.numerics.noise.coloured import ColouredNoise, fit_noise
 from aesi.numerics.typing import Array
 from aesi.tracer.knobs import SOC0, Knob, starts, values_by_owner
 from aesi.tracer.problem import Hypothesis, Problem

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aesi.errors import AesiError
-from aesi.numerics.coloured import ColouredNoise, whiten
+from aesi.numerics.noise.coloured import ColouredNoise, whiten
 from aesi.numerics.typing import Array
 from aesi.parameters import Parameter
 from aesi.physics import simulate

@@ -19,7 +19,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
-from aesi.pipeline.report.decimate import envelope
+from aesi.pipeline.report.arrays.decimate import envelope
 from aesi.pipeline.report.plots.timeline import OUTSIDE
 
 WIDTH, HEIGHT = 860, 300

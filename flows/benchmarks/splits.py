@@ -95,8 +95,8 @@ def _row(case: SplitCase, seed: int, config: ExperimentConfig) -> dict[str, Any]
 
 def _judged(case: SplitCase, config: ExperimentConfig) -> dict[str, Any]:
     from aesi.pipeline.experiment.candidate import genome_space, weights
-    from aesi.pipeline.experiment.conformalise import conformalise
     from aesi.pipeline.experiment.fit import build_problem, final_models
+    from aesi.pipeline.experiment.intervals.conformalise import conformalise
     from aesi.pipeline.experiment.load import load
     from aesi.pipeline.experiment.validation import validation_mser
     from aesi.sparse import Candidate

@@ -49,9 +49,9 @@ def _stages(
     started: float,
 ) -> Path:
     from aesi.pipeline.experiment.comparison import comparison
-    from aesi.pipeline.experiment.conformalise import conformalise
     from aesi.pipeline.experiment.evaluate import evaluate
     from aesi.pipeline.experiment.fit import build_problem, final_models
+    from aesi.pipeline.experiment.intervals.conformalise import conformalise
     from aesi.pipeline.experiment.load import load
     from aesi.pipeline.experiment.outputs import Result, write_outputs
     from aesi.pipeline.experiment.validation import validation_mser

@@ -20,8 +20,8 @@ from typing import Any
 from aesi.errors import AesiError, FitError, InputError
 from aesi.pipeline.experiment.candidate import weights
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
-from aesi.pipeline.experiment.conformalise import conformalise
 from aesi.pipeline.experiment.fit import build_problem, final_models
+from aesi.pipeline.experiment.intervals.conformalise import conformalise
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Failed
@@ -95,6 +95,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         dt_s=rebuilt.config.data.dt_s,
         hold=rebuilt.config.data.hold,
         soc0=rebuilt.declared.soc0,
+        model=rebuilt.declared.model,
     )
     model.save(out / "model")
     content = {

@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.blind.case import RecordKind
-from aesi.data.profile import Bench, Profile
+from aesi.data.profiles.profile import Bench, Profile
 from aesi.numerics.typing import Array
 
 SCHEDULES = ("udds", "hwfet", "us06", "wltc_3b", "artemis_urban", "sc03", "nedc")

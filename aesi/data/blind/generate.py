@@ -17,7 +17,7 @@ from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, run
-from aesi.data.profile import Profile
+from aesi.data.profiles.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError
 from aesi.numerics.typing import Array

@@ -20,7 +20,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.cache import key_of, remember
 from aesi.data.laboratory.changes import CONTACT_RESISTANCE, Change, find_change
-from aesi.data.profile import Profile
+from aesi.data.profiles.profile import Profile
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array
 

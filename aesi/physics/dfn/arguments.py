@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL
-from aesi.numerics.collocation import gauss_layer, lobatto_to
-from aesi.numerics.galerkin import gauss_lobatto, sphere_modes, stack_modes
+from aesi.numerics.modes.collocation import gauss_layer, lobatto_to
+from aesi.numerics.modes.galerkin import gauss_lobatto, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table, solid_diffusion

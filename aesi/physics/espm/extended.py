@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL
-from aesi.numerics.galerkin import ohmic_shares, sphere_modes
+from aesi.numerics.modes.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
 from aesi.physics.espm.layout import Drive, Salt, Surfaces, Units, Whole
 from aesi.physics.espm.plain import stack_of

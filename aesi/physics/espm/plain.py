@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
-from aesi.numerics.galerkin import StackModes, sphere_modes, stack_modes
+from aesi.numerics.modes.galerkin import StackModes, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.relations import Constant, Relation, Scaled, Sum

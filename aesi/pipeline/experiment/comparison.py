@@ -8,7 +8,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.outputs import PHYSICS, Result, published
-from aesi.pipeline.report.binning import error_map
+from aesi.pipeline.report.arrays.binning import error_map
 from aesi.pipeline.report.views import RecordTrace
 
 SCHEMA = "aesi.comparison/1"

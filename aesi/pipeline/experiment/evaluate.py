@@ -18,8 +18,8 @@ from aesi.conformal.free_run import HorizonBand
 from aesi.conformal.scores import score
 from aesi.numerics.metrics import rmse
 from aesi.numerics.typing import Array
-from aesi.pipeline.experiment.bands import error_ahead, reach
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.intervals.bands import error_ahead, reach
 from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.report.embed import ArrayStore, Embedded, embed
+from aesi.pipeline.report.arrays.embed import ArrayStore, Embedded, embed
 from aesi.pipeline.report.table_formats import ABSENT
 
 if TYPE_CHECKING:

@@ -40,7 +40,7 @@
     return figure;
   }
 
-  // The same rule as aesi/pipeline/report/decimate.py, over the samples from `low` to `high`.
+  // The same rule as aesi/pipeline/report/arrays/decimate.py, over the samples from `low` to `high`.
   function envelope(x, y, low, high, limit, keep) {
     const rows = [];
     if (high - low <= limit) {

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from aesi.numerics.discrepancy import whiten
+from aesi.numerics.noise.discrepancy import whiten
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem

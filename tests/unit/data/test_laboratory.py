@@ -9,7 +9,7 @@ import pytest
 from aesi.data.laboratory.changes import CHANGES, find_change
 from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, edges, run
-from aesi.data.profile import Bench, Profile
+from aesi.data.profiles.profile import Bench, Profile
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
 

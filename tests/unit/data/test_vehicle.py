@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from aesi.data.drive import TITLES, Schedule, schedule
-from aesi.data.profile import AFTER_PULSE_S, Bench, paper_profiles
-from aesi.data.vehicle import Pack, Vehicle
+from aesi.data.profiles.drive import TITLES, Schedule, schedule
+from aesi.data.profiles.profile import AFTER_PULSE_S, Bench, paper_profiles
+from aesi.data.profiles.vehicle import Pack, Vehicle
 from aesi.errors import DataError
 
 

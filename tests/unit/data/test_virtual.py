@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.data.profile import Bench
+from aesi.data.profiles.profile import Bench
 from aesi.data.virtual import DEFAULT_MIX, STRENGTHS, Laboratory, paper_experiment, voltage_window_v
 from aesi.errors import DataError
 

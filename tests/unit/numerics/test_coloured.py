@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.numerics.coloured import ColouredNoise, fit_noise, log_likelihood, whiten
+from aesi.numerics.noise.coloured import ColouredNoise, fit_noise, log_likelihood, whiten
 
 
 def dense(time_s, noise):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from aesi.numerics.galerkin import ohmic_shares, sphere_modes, stack_modes
+from aesi.numerics.modes.galerkin import ohmic_shares, sphere_modes, stack_modes
 
 PI = np.pi
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
-from aesi.pipeline.experiment.conformalise import conformalise
 from aesi.pipeline.experiment.fit import build_problem, final_models
+from aesi.pipeline.experiment.intervals.conformalise import conformalise
 from aesi.pipeline.experiment.load import Loaded, load
 from aesi.sparse import Candidate, Genome, evaluate
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE
-from aesi.pipeline.experiment.bands import WHOLE, HonestErrors
+from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors
 from aesi.records import ErrorSeries, FreeRun
 
 N, DT = 400, 1.0

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.pipeline.report.binning import LEAST_SAMPLES, error_map, profile
+from aesi.pipeline.report.arrays.binning import LEAST_SAMPLES, error_map, profile
 
 
 def test_map_puts_the_mean_where_the_samples_are():

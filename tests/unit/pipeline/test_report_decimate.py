@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aesi.pipeline.report.decimate import envelope
+from aesi.pipeline.report.arrays.decimate import envelope
 
 
 def test_short_series_are_left_alone():

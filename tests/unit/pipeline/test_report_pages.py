@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from aesi.pipeline.report import write_discovery_report, write_figures, write_run_report
-from aesi.pipeline.report.embed import STORED, ArrayStore, embed
+from aesi.pipeline.report.arrays.embed import STORED, ArrayStore, embed
 from aesi.pipeline.report.plots import records
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.numerics.discrepancy import CORRELATION_LENGTHS_S, draw, whiten
+from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, draw, whiten
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums
 

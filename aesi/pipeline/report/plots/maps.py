@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
-from aesi.pipeline.report.binning import ErrorMap, error_map, profile
+from aesi.pipeline.report.arrays.binning import ErrorMap, error_map, profile
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

@@ -13,10 +13,10 @@ import numpy as np
 
 from aesi.conformal import COMPARED, Calibrated, Method, RefittedForest, RefittedIntervals
 from aesi.errors import FitError
-from aesi.pipeline.experiment.bands import WHOLE, HonestErrors, Unseen
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors, Unseen
 from aesi.records import HeldOutDrive
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage

@@ -7,8 +7,8 @@ from functools import partial
 import numpy as np
 
 from aesi.data import units
-from aesi.data.checks import Columns, Context
-from aesi.data.columns import QUANTITIES, Mapped, map_columns
+from aesi.data.channels.checks import Columns, Context
+from aesi.data.channels.columns import QUANTITIES, Mapped, map_columns
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, bounds
 from aesi.data.state import signs

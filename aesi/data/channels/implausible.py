@@ -13,8 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.checks import STEP_SHARE, Columns, Context, find_gaps, steps
-from aesi.data.headers import nearest
+from aesi.data.channels.checks import STEP_SHARE, Columns, Context, find_gaps, steps
+from aesi.data.channels.headers import nearest
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.drive import schedule
-from aesi.data.vehicle import Pack, Vehicle
+from aesi.data.profiles.drive import schedule
+from aesi.data.profiles.vehicle import Pack, Vehicle
 from aesi.numerics.typing import Array
 
 

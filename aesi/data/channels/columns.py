@@ -13,7 +13,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from aesi.data import headers, units
+from aesi.data import units
+from aesi.data.channels import headers
 from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.table import TableFile
 from aesi.errors import DataError

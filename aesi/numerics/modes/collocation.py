@@ -12,7 +12,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.polynomial import legendre
 
-from aesi.numerics.galerkin import gauss_lobatto
+from aesi.numerics.modes.galerkin import gauss_lobatto
 from aesi.numerics.typing import Array
 
 

@@ -2,7 +2,7 @@
 each check passes, or raises a DataError that names file, column and first row.
 
 The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC. What only the
-columns together tell (a unit, a sign that was left out) is in `aesi.data.implausible`.
+columns together tell (a unit, a sign that was left out) is in `aesi.data.channels.implausible`.
 """
 
 from __future__ import annotations

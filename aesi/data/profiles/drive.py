@@ -11,7 +11,7 @@ from aesi.data.readers.schedule import read_speed
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
-FOLDER = Path(__file__).parent / "schedules"
+FOLDER = Path(__file__).parents[1] / "schedules"
 
 TITLES = {
     "udds": "UDDS",

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from aesi.numerics.typing import AnyArray
-from aesi.pipeline.report.decimate import Keep, envelope
+from aesi.pipeline.report.arrays.decimate import Keep, envelope
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

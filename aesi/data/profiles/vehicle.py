@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.data.drive import Schedule
+from aesi.data.profiles.drive import Schedule
 from aesi.numerics.typing import Array
 
 GRAVITY_M_S2 = 9.81

@@ -1,0 +1,1 @@
+"""Spectral discretisations: Galerkin modes of particles and layers, collocation within electrodes."""

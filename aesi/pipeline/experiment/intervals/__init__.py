@@ -1,0 +1,1 @@
+"""Prediction intervals and free-run bands of the models of an experiment."""

@@ -1,0 +1,1 @@
+"""Arrays on their way into a page: binned, thinned, and embedded once."""
