@@ -139,7 +139,7 @@ def test_an_interrupted_write_leaves_the_old_report(views, tmp_path, monkeypatch
     assert path.read_text() == "old"
 
 
-def test_a_further_section_is_a_file_a_line_and_a_test(monkeypatch, tmp_path):
+def test_a_further_section_is_a_file_a_line_and_a_test(views, monkeypatch, tmp_path):
     added = sections.ReportSection(
         "caveats",
         "What to keep in mind",
