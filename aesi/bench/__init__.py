@@ -7,6 +7,7 @@ CaseRow = dict[str, Any]
 
 BENCHMARKS = {
     "espm": "aesi.bench.espm",
+    "dfn": "aesi.bench.dfn",
     "ensemble": "aesi.bench.ensemble",
     "design": "aesi.bench.design",
     "spci": "aesi.bench.spci",

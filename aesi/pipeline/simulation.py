@@ -38,7 +38,7 @@ def simulate_file(
     hold: Hold | None = None,
     reading: Reading | None = None,
     say_notes: SayNotes | None = None,
-    model: ModelName = "espm",
+    model: ModelName | None = None,
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
@@ -46,7 +46,7 @@ def simulate_file(
     soc0 : None takes it from the file's voltage, where it has one (see `initial_state`), else from the saved model.
     hold : None takes straight lines for a profile alone, and what `assumed_hold` says for a measurement.
     say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
-    model : "espm" or "dfn".
+    model : "espm" or "dfn"; None takes that of a saved model, else "espm".
     Raises DataError where a measurement cannot be of this cell.
     """
     say = say_notes or _silent
@@ -67,7 +67,7 @@ def simulate_file(
         active,
         profile.temperature_degc,
         taken,
-        model=model,
+        model=model or declared.model,
     )
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out)

@@ -39,6 +39,9 @@ RATE = 0.03
 
 WATCHED = {
     "espm": Watch(("case",), higher={"ratio": TIMING}, lower={"rmse_mv": RESULT}),
+    "dfn": Watch(
+        ("load", "who", "across", "in_particle"), higher={"ratio": TIMING}, lower={"rmse_mv": RESULT}
+    ),
     "ensemble": Watch(("terms", "lambda1", "rows", "candidates", "resamples"), higher={"ratio": TIMING}),
     "design": Watch(("setting", "cells", "candidates"), higher={"aesi_i_mean_pct": RATE}),
     "spci": Watch(

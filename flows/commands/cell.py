@@ -22,7 +22,7 @@ def simulate(
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
-    model: options.ModelOption = "espm",
+    model: options.ModelOption = None,
 ) -> None:
     """The physics model alone, under a current profile."""
     from aesi.pipeline.simulation import simulate_file

@@ -37,10 +37,8 @@ HoldOption = Annotated[
 ]
 
 ModelOption = Annotated[
-    Literal["espm", "dfn"],
-    typer.Option(
-        "--model", help="Single particle with electrolyte, or porous electrode (Doyle-Fuller-Newman)."
-    ),
+    Literal["espm", "dfn"] | None,
+    typer.Option("--model", help="Single particle (espm, the default) or porous electrode (dfn)."),
 ]
 
 PrefectOption = Annotated[

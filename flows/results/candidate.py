@@ -95,6 +95,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         dt_s=rebuilt.config.data.dt_s,
         hold=rebuilt.config.data.hold,
         soc0=rebuilt.declared.soc0,
+        model=rebuilt.declared.model,
     )
     model.save(out / "model")
     content = {

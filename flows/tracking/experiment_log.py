@@ -42,9 +42,8 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
     tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
     write_atomically(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
-    HybridModel(loaded.cell, loaded.effects, soc0=next(iter(loaded.soc0.values()), None)).save(
-        folder / INPUTS / DECLARED
-    )
+    soc0 = next(iter(loaded.soc0.values()), None)
+    HybridModel(loaded.cell, loaded.effects, soc0=soc0, model=loaded.model).save(folder / INPUTS / DECLARED)
     tracker.files(folder / INPUTS, INPUTS)
     tracker.datasets(
         [

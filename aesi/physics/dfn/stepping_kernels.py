@@ -24,6 +24,8 @@ prediction, conductivity and the variable part of diffusion, is then known to 0.
 SURFACE_TOLERANCE = 1e-6
 """Of stoichiometry: the same of a surface whose diffusivity varies."""
 PASSES = 6
+LARGEST_GROWTH = 4.0
+"""Of a step over the last one: beyond it nothing is extrapolated."""
 
 
 @compiled
@@ -105,7 +107,8 @@ def advance(  # type: ignore[no-untyped-def]
 @njit(inline="always", fastmath=FASTMATH)
 def predict(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-untyped-def]
     """Start values at the end of the step: each share of the current and its trend; salt and forcing as last moved."""
-    half, ahead = s.at.shape[0] // 2, dt / last_dt if last_dt > 0.0 else 0.0
+    half = s.at.shape[0] // 2
+    ahead = dt / last_dt if dt < LARGEST_GROWTH * last_dt else 0.0
     for r in range(2 * half):
         t.given_start[r] = state.given[r]
         t.salt[r] = state.salt[r] + ahead * (state.salt[r] - t.salt_before[r])
@@ -115,7 +118,8 @@ def predict(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-u
         t.forcing_before[j] = state.forcing[j]
     for u in range(p.place.shape[0]):
         t.y_start[u] = state.y[u]
-        state.y[u] += p.share[u] * change[0 if p.place[u] < half else 1] + state.trend[u] * dt
+        trend = state.trend[u] * dt if ahead > 0.0 else 0.0
+        state.y[u] += p.share[u] * change[0 if p.place[u] < half else 1] + trend
         t.give[u] = p.scale[u] * taken[p.kind[u]]
 
 

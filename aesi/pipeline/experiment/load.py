@@ -20,7 +20,7 @@ from aesi.data.read import read
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError
-from aesi.physics import ActiveEffect, Cell, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
@@ -33,6 +33,11 @@ from aesi.sparse import with_inputs
 
 if TYPE_CHECKING:
     from aesi.data.virtual import VirtualExperiment
+
+
+DFN_NOTE = (
+    "The physics model is the porous electrode (dfn); tables and figures call it ESPM as they call the other."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,7 @@ class Loaded:
     notes: tuple[str, ...]
     config: ExperimentConfig
     fallback: str = ""
+    model: ModelName = "espm"
 
     @property
     def setting(self) -> str:
@@ -131,6 +137,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
     given = declared_model(path)
     cell, effects = given.cell, (*given.effects, *_effects(config))
+    model = config.cell.model or given.model
     sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
     soc0: dict[str, float] = {}
     notes: list[str] = []
@@ -148,7 +155,9 @@ def _load(config: ExperimentConfig) -> Loaded:
     for name, rows in drives:
         records[name].rows[rows] = True
     hold = config.data.hold
-    physics = physics_models(cell, effects, records, hold, config.cell.start)
+    physics = physics_models(cell, effects, records, hold, config.cell.start, model=model)
+    if model == "dfn":
+        notes.append(DFN_NOTE)
     series, empty = _series(physics, records, config)
     for name in empty:
         if name not in sources.roles["test"]:
@@ -174,6 +183,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
+        model=model,
     )
 
 
@@ -203,6 +213,7 @@ def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:
         chosen.effects,
         data.temperature_degc,
         hold,
+        model=chosen.model,
     )
 
 
@@ -251,7 +262,7 @@ def _without(
     others = without(records, name, unseen)
     declared = fitted.by_name[DECLARED]
     physics = physics_models(
-        declared.cell, declared.effects, others, config.data.hold, config.cell.start, fitted
+        declared.cell, declared.effects, others, config.data.hold, config.cell.start, fitted, declared.model
     )
     series, _ = _series(physics, {name: records[name]}, config)
     return series[name].take(rows, called)

@@ -117,6 +117,7 @@ def hybrid(result: Result) -> HybridModel:
         dt_s=result.loaded.config.data.dt_s,
         hold=result.loaded.config.data.hold,
         soc0=next(iter(result.loaded.soc0.values()), None),
+        model=result.loaded.model,
     )
 
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.physics import ActiveEffect, Cell
+from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.pipeline.experiment.recalibrate import (
     ALL,
     INITIAL_STATE,
@@ -63,6 +63,7 @@ def physics_models(
     hold: Hold,
     start: str,
     begin: PhysicsModels | None = None,
+    model: ModelName = "espm",
 ) -> PhysicsModels:
     """All of them, fitted to the rows that the records admit; start : "declared" or "recalibrated".
 
@@ -70,9 +71,10 @@ def physics_models(
     """
     known = {} if begin is None else begin.by_name
     fitted = {
-        name: recalibrate(cell, effects, records, hold, free, known.get(name)) for name, free in FREE.items()
+        name: recalibrate(cell, effects, records, hold, free, known.get(name), model)
+        for name, free in FREE.items()
     }
-    by_name = {DECLARED: PhysicsStart(cell, cell, effects), **fitted}
+    by_name = {DECLARED: PhysicsStart(cell, cell, effects, model=model), **fitted}
     return PhysicsModels(by_name, RECALIBRATED if start == "recalibrated" else DECLARED)
 
 

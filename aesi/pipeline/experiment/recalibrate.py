@@ -23,7 +23,7 @@ import numpy as np
 from aesi.errors import AesiError
 from aesi.numerics.bounded import descend
 from aesi.numerics.typing import Array, BoolArray
-from aesi.physics import ActiveEffect, Cell, simulate
+from aesi.physics import ActiveEffect, Cell, ModelName, simulate
 from aesi.physics.balance import same_rest
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import model_with
@@ -97,6 +97,7 @@ class PhysicsStart:
     effects: tuple[ActiveEffect, ...] = ()
     shift: float = 0.0
     deviations: tuple[float, ...] = ()
+    model: ModelName = "espm"
 
     def soc0(self, soc0: float) -> float:
         """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""
@@ -113,6 +114,7 @@ class PhysicsStart:
             record.temperature_degc,
             hold,
             on_depletion="clip",
+            model=self.model,
         )
 
 
@@ -123,6 +125,7 @@ def recalibrate(
     hold: Hold,
     free: Sequence[int] = ALL,
     begin: PhysicsStart | None = None,
+    model: ModelName = "espm",
 ) -> PhysicsStart:
     """The declared physics with the free knobs where the rows of the records, and what was known of them, want them.
 
@@ -130,7 +133,12 @@ def recalibrate(
     Where no row may be looked at, or nothing can be simulated, it is the declared one.
     """
     fit = _Fit(
-        declared, tuple(effects), tuple(r for r in records.values() if r.rows.any()), hold, np.array(free)
+        declared,
+        tuple(effects),
+        tuple(r for r in records.values() if r.rows.any()),
+        hold,
+        np.array(free),
+        model,
     )
     if not fit.records:
         return fit.physics(np.zeros(len(free)))
@@ -148,6 +156,7 @@ class _Fit:
     records: tuple[FitRecord, ...]
     hold: Hold
     free: Array
+    model: ModelName
 
     def bounds(self) -> tuple[Array, Array]:
         low, high = np.full(len(KNOBS), -REACH), np.full(len(KNOBS), REACH)
@@ -169,7 +178,7 @@ class _Fit:
         cell = model_with(self.declared, _activated(values)).cell
         ohm = self.declared.contact_resistance_ohm + volts_at_1c / self.declared.nominal_capacity_ah
         cell = replace(cell, contact_resistance_ohm=ohm)
-        return PhysicsStart(self.declared, cell, self.effects, shift, tuple(z.tolist()))
+        return PhysicsStart(self.declared, cell, self.effects, shift, tuple(z.tolist()), self.model)
 
     def cost(self, z: Array) -> float:
         left = self._left(z)

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from aesi.data.reading import Reading
+from aesi.physics import ModelName
 from aesi.records import Hold
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -108,6 +109,7 @@ class CellConfig(Section):
     belongs to the data set.
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
+    model : espm, one particle an electrode, or dfn, the porous electrode; None takes that of a saved model, else espm.
     effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
     the user's own; they are run, so name only files that you trust.
     start : the physics that the correction is learned on: the cell as declared, or recalibrated on the training
@@ -116,6 +118,7 @@ class CellConfig(Section):
 
     bpx: str = "catalogue"
     soc0: Annotated[float, Field(ge=0, le=1)] | None = None
+    model: ModelName | None = None
     effects: dict[str, dict[str, float]] = {}
     effect_files: tuple[str, ...] = ()
     start: Literal["declared", "recalibrated"] = "recalibrated"

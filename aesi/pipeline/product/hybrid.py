@@ -16,7 +16,7 @@ from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
-from aesi.physics import ActiveEffect, Cell, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
@@ -27,8 +27,9 @@ from aesi.sparse import SparseModel
 
 @dataclass(frozen=True, eq=False)
 class HybridModel:
-    """ESPM + effects + correction + intervals; the last two may be absent.
+    """Physics + effects + correction + intervals; the last two may be absent.
 
+    model : of the physics, "espm" or "dfn".
     dt_s : s, the step of the correction; records sampled otherwise are brought to it and back.
     """
 
@@ -40,6 +41,7 @@ class HybridModel:
     dt_s: float = 1.0
     hold: Hold = "linear"
     soc0: float | None = None
+    model: ModelName = "espm"
 
     def __repr__(self) -> str:
         parts = [f"cell {self.cell.name!r}", *(repr(effect) for effect in self.effects)]
@@ -94,7 +96,9 @@ class HybridModel:
             part = getattr(self, name)
             if part is not None:
                 parts[name] = part.to_dict()
-        write_model(folder, {"dt_s": self.dt_s, "hold": self.hold, "soc0": self.soc0}, parts)
+        write_model(
+            folder, {"dt_s": self.dt_s, "hold": self.hold, "soc0": self.soc0, "model": self.model}, parts
+        )
         return folder
 
     @staticmethod
@@ -113,6 +117,7 @@ class HybridModel:
                 dt_s=float(head["dt_s"]),
                 hold=head["hold"],
                 soc0=head["soc0"],
+                model=head.get("model", "espm"),
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"{folder} is not a whole model: {error}; save it again.") from None
@@ -134,7 +139,14 @@ class HybridModel:
 
     def _series(self, record: Measurement, soc0: float) -> ErrorSeries:
         run = simulate(
-            self.cell, record.time_s, record.current_a, soc0, self.effects, record.temperature_degc, self.hold
+            self.cell,
+            record.time_s,
+            record.current_a,
+            soc0,
+            self.effects,
+            record.temperature_degc,
+            self.hold,
+            model=self.model,
         )
         return error_series(record, run, self.dt_s)
 
