@@ -20,8 +20,8 @@ from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
-from aesi.tracer.outcome import Errors, Part, State
-from aesi.tracer.yardstick import POINTS_TO, Pointer
+from aesi.tracer.report.outcome import Errors, Part, State
+from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
