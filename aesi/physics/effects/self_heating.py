@@ -63,4 +63,17 @@ def of_file(cell: Cell) -> ActiveEffect:
     return active
 
 
-EFFECT = Effect("self_heating", "physics", __doc__, PARAMETERS, on_model=warm, infers="temperature")
+EFFECT = Effect(
+    "self_heating",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=warm,
+    infers="temperature",
+    experiment="a thermocouple on the case",
+    told_apart={
+        "ambient_temperature": (
+            "a thermocouple on the case: one rises with load and the other stands off from the start"
+        ),
+    },
+)
