@@ -116,6 +116,7 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         "explainable_mv": MV * found.after.yardstick.explained_v,
         "structured_mv": MV * verdict.structured_v,
         "tolerance_mv": MV * verdict.tolerance_v,
+        "margin": verdict.margin,
         "candidates": [
             {
                 "effect": c.effect,
