@@ -39,7 +39,7 @@ app.add_typer(data.app, name="data", help="Bundled and downloadable data sets.")
 app.command("worker", short_help="One more process on a shared study.")(experiment.worker)
 app.command("compare", short_help="Tracked runs side by side on one page.")(experiment.compare)
 app.command("candidate", short_help="A tracked candidate made again, with its model.")(experiment.candidate)
-app.command("ui")(experiment.ui)
+app.command("ui", short_help="MLflow, Optuna or Prefect in a browser.")(experiment.ui)
 app.command("bench", short_help="Time the project against its peers.")(bench.bench)
 
 

@@ -97,7 +97,7 @@ MISSED: dict[str, Any] = {
 
 
 def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
-    kept = ("verdict", "effects", "indistinguishable", "confidence", "noise_floor_mv")
+    kept = ("verdict", "effects", "indistinguishable", "confidence", "margin", "noise_floor_mv")
     row = {key: content[key] for key in kept}
     for state in ("before", "recalibrated", "after"):
         row[f"{state}_test_mv"] = content[state]["test"]["rmse_mv"]

@@ -6,9 +6,13 @@ of lowest degree. Ours is everything a search does, one-off work included: libra
 matrices of all resamples, and for each candidate the fits, the out-of-bag errors in free run, and both
 ensembles. The peer is timed on a few resamples and scaled: STLSQ alone, without building the library,
 without out-of-bag errors. Both run in one thread, and seconds are those of the processor, so that other work on
-the machine moves them little. `failed` counts candidates that a search would prune: with
-hardly any ridge most of them diverge on the left-out pieces, which is found after all fits are done and both
-ensembles are made, so they cost what the others cost.
+the machine moves them little. `failed` counts candidates that a search would prune: with hardly any ridge most of them
+diverge on the left-out pieces, which is found after all fits are done and both ensembles are made, so they cost what
+the others cost; one whose threshold is above every coefficient is seen at once and costs nothing.
+
+The ratio of a small library depends on how many candidates share the one-off work, and on how many come to nothing
+at once. At 60 terms the one-off work took 1.27 s of processor, a candidate that is fitted 0.35 to 0.48 s, one whose
+threshold leaves nothing 0.01 s: four runs with three candidates gave 21.5 to 23.7, earlier ones with twenty 93 and 211.
 """
 
 from __future__ import annotations

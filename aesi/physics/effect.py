@@ -70,6 +70,7 @@ class Effect:
     say and does not compete.
     refines : the approximation of the model itself that the effect takes back; it is settled before anything is sought
     in the cell.
+    experiment : which one shows it.  told_apart : id of another effect -> which one tells the two apart.
     """
 
     id: str
@@ -83,6 +84,8 @@ class Effect:
     file: str | None = None
     infers: Measurable | None = None
     refines: Refinement | None = None
+    experiment: str = ""
+    told_apart: Mapping[str, str] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f"Effect({self.id!r}, {self.kind}, parameters {', '.join(self.parameters) or 'none'})"

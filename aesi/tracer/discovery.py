@@ -14,20 +14,20 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Hold, Measurement, Run
-from aesi.tracer.candidate_effects import CandidateEffect, ranking
+from aesi.tracer.case.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.case.reduction import with_fine_numerics
-from aesi.tracer.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.decide.archive import Archive, context_of
 from aesi.tracer.decide.evidence import Evidence, gathered
 from aesi.tracer.decide.verdict import Thresholds, Verdict
-from aesi.tracer.explain import explain
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.outcome import FileOutcome, States, outcomes, test_rmse_v
-from aesi.tracer.states import ModelState
-from aesi.tracer.tell_apart import experiment
-from aesi.tracer.yardstick import Yardstick, measure
+from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
+from aesi.tracer.report.explain import explain
+from aesi.tracer.report.outcome import FileOutcome, States, outcomes, test_rmse_v
+from aesi.tracer.report.tell_apart import experiment
+from aesi.tracer.report.yardstick import Yardstick, measure
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +171,6 @@ def _told(
     declared = ModelState(problem)
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
-    kinds = {name: str(effect.kind) for name, effect in problem.effects.items()}
     cell, model_effects, soc0 = evidence.after.settled()
 
     def test_error(one: Explanation) -> float:
@@ -189,7 +188,7 @@ def _told(
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,
-        experiments=tuple((g, experiment(g, kinds)) for g in verdict.groups),
+        experiments=tuple((g, experiment(g, problem.effects)) for g in verdict.groups),
         notes=_notes(evidence, tested),
         warnings=_warnings(files),
         seconds=seconds,
@@ -205,6 +204,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, .
             "the declared porous electrode moves the voltage by more than a tenth of the noise against the single "
             "particle, and every hypothesis could use it."
         )
+    notes += evidence.limits
     if evidence.fault is not None:
         notes.append(f"not adopted: {evidence.fault}.")
     return tuple(dict.fromkeys(notes))

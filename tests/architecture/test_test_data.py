@@ -26,7 +26,7 @@ MAY = {
     "aesi/pipeline/discovery/finding.py": "tells what a reader did to them",
     "aesi/pipeline/discovery/discover.py": "hands them to the tracer",
     "aesi/tracer/discovery.py": "hands them to the outcome",
-    "aesi/tracer/outcome.py": "judges the finding",
+    "aesi/tracer/report/outcome.py": "judges the finding",
     "flows/commands/cell.py": "takes --test from the command line",
     "flows/jobs/discovery.py": "logs their names",
     "flows/tracking/experiment_log.py": "logs names and digests of the records",

@@ -26,8 +26,8 @@ from aesi.numerics.typing import Array
 
 CHECKSUM = "checksum"
 SHIPPED = Path(__file__).with_name("shipped")
-"""Entries that come with the package: the virtual cell that `make run` falls back to without data, whose making takes
-a minute and a half of its five. `docs/hooks/ship.py` writes them; they are met by content like any other."""
+"""Entries that come with the package, once `docs/hooks/ship.py` has put an experiment's virtual records there; they are
+met by content like any other. Without them they are made."""
 
 
 def cache_folder() -> Path:

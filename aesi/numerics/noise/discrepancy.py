@@ -3,9 +3,9 @@
     y_k = a_k sum_j x_j(t_k) + w_k v_k,   x_j Ornstein-Uhlenbeck of unit variance / m and correlation length tau_j   (1)
 
 a (n,) and w (n,) are the standard deviations of the model error and of the white noise in each row. Equal shares over
-correlation lengths a decade apart stand for a spectrum that falls as one over the frequency between them. The Kalman
-filter of (1) is linear in y, so that it whitens a residual and its sensitivities alike. The process starts afresh at
-each block, so that blocks are independent and any of them can be left out in closed form.
+correlation lengths a factor of thirty apart stand for a spectrum that falls as one over the frequency between them.
+The Kalman filter of (1) is linear in y, so that it whitens a residual and its sensitivities alike. The process starts
+afresh at each block, so that blocks are independent and any of them can be left out in closed form.
 Kennedy & O'Hagan, J. R. Stat. Soc. B 63 (2001) 425, for the model error; Durbin & Koopman, Time Series Analysis by
 State Space Methods, 2nd ed. (2012), chapters 4 and 7, for the filter.
 """
@@ -17,7 +17,7 @@ from numba import njit
 
 from aesi.numerics.typing import Array, IntArray
 
-CORRELATION_LENGTHS_S = (30.0, 300.0, 3000.0)
+CORRELATION_LENGTHS_S = (2.0, 60.0, 1800.0)
 
 
 @njit(cache=True, nogil=True)

@@ -41,4 +41,11 @@ def lose_material(model: EspmModel, *, loss: float, lost_at_soc: float) -> EspmM
     return model.of(with_active_material(model.cell, 1.0 - loss, 1.0, lost_at_soc))
 
 
-EFFECT = Effect("active_material_loss_negative", "parameter", __doc__, PARAMETERS, on_model=lose_material)
+EFFECT = Effect(
+    "active_material_loss_negative",
+    "parameter",
+    __doc__,
+    PARAMETERS,
+    on_model=lose_material,
+    experiment="a full C/20 discharge between the voltage limits and the coulombs that go back in, read as dV/dQ",
+)

@@ -61,4 +61,5 @@ EFFECT = Effect(
     on_model=shift_cell,
     on_record=shift_record,
     infers="temperature",
+    experiment="the same profile in a climate chamber at two temperatures",
 )

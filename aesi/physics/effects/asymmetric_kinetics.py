@@ -37,4 +37,11 @@ def make_asymmetric(model: EspmModel, *, negative_alpha: float, positive_alpha: 
     )
 
 
-EFFECT = Effect("asymmetric_kinetics", "physics", __doc__, PARAMETERS, on_model=make_asymmetric)
+EFFECT = Effect(
+    "asymmetric_kinetics",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=make_asymmetric,
+    experiment="charge and discharge pulses of the same size, from C/10 to 5C",
+)

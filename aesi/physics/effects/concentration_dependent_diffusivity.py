@@ -69,5 +69,10 @@ def _varied(electrode: Electrode, slope: float, curvature: float) -> Electrode:
 
 
 EFFECT = Effect(
-    "concentration_dependent_diffusivity", "physics", __doc__, PARAMETERS, on_model=vary_diffusivities
+    "concentration_dependent_diffusivity",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=vary_diffusivities,
+    experiment="GITT over the whole range of state of charge",
 )

@@ -31,4 +31,20 @@ def undo_gain(record: Record, *, gain: float) -> Record:
     return replace(record, current_a=record.current_a / gain)
 
 
-EFFECT = Effect("current_sensor_gain", "instrument", __doc__, PARAMETERS, on_record=undo_gain)
+EFFECT = Effect(
+    "current_sensor_gain",
+    "instrument",
+    __doc__,
+    PARAMETERS,
+    on_record=undo_gain,
+    told_apart={
+        "active_material_loss_negative": (
+            "a second current sensor in series, or a full C/20 discharge between the voltage limits and "
+            "the coulombs that go back in: a gain scales all charges, a loss moves the steps of dV/dQ"
+        ),
+        "active_material_loss_positive": (
+            "a second current sensor in series, or a full C/20 discharge between the voltage limits and "
+            "the coulombs that go back in: a gain scales all charges, a loss moves the steps of dV/dQ"
+        ),
+    },
+)

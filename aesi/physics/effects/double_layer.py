@@ -30,4 +30,11 @@ def add_capacity(model: EspmModel, *, negative_f_m2: float, positive_f_m2: float
     )
 
 
-EFFECT = Effect("double_layer", "physics", __doc__, PARAMETERS, on_model=add_capacity)
+EFFECT = Effect(
+    "double_layer",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=add_capacity,
+    experiment="impedance from 1 Hz to 10 kHz, or pulses sampled at 1 ms",
+)

@@ -54,4 +54,11 @@ def scale_transport(model: EspmModel, *, conductivity_factor: float, diffusivity
     )
 
 
-EFFECT = Effect("electrolyte_transport", "parameter", __doc__, PARAMETERS, on_model=scale_transport)
+EFFECT = Effect(
+    "electrolyte_transport",
+    "parameter",
+    __doc__,
+    PARAMETERS,
+    on_model=scale_transport,
+    experiment="a discharge above 3C, where the electrolyte is depleted, and its relaxation",
+)

@@ -43,4 +43,11 @@ def film_drop(trace: Trace, *, per_throughput_ohm_ah: float, per_root_time_ohm: 
     return Contribution(-trace.current_a * resistance, {"film_ohm": resistance})
 
 
-EFFECT = Effect("film_growth", "physics", __doc__, PARAMETERS, on_voltage=film_drop)
+EFFECT = Effect(
+    "film_growth",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_voltage=film_drop,
+    experiment="the same pulse before and after some hundred hours or cycles",
+)

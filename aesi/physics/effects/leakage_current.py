@@ -31,4 +31,17 @@ def leak(record: Record, *, leakage_a: float) -> Record:
     return replace(record, current_a=record.current_a + leakage_a)
 
 
-EFFECT = Effect("leakage_current", "physics", __doc__, PARAMETERS, on_record=leak)
+EFFECT = Effect(
+    "leakage_current",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_record=leak,
+    experiment="a rest of some days at open circuit",
+    told_apart={
+        "current_sensor_offset": (
+            "a rest of some days: a leak lowers the voltage of the open cell, an offset of the sensor "
+            "does not; or a second current sensor in series"
+        ),
+    },
+)

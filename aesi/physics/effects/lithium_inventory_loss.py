@@ -35,4 +35,11 @@ def lose_lithium(model: EspmModel, *, loss: float) -> EspmModel:
     return model.of(without_lithium(model.cell, loss))
 
 
-EFFECT = Effect("lithium_inventory_loss", "parameter", __doc__, PARAMETERS, on_model=lose_lithium)
+EFFECT = Effect(
+    "lithium_inventory_loss",
+    "parameter",
+    __doc__,
+    PARAMETERS,
+    on_model=lose_lithium,
+    experiment="a full C/20 discharge between the voltage limits and the coulombs that go back in",
+)

@@ -36,4 +36,11 @@ def plate(model: EspmModel, *, rate_m_s: float) -> EspmModel:
     return replace(model, negative=replace(model.negative, plating=Plating(rate_m_s, TRANSFER_COEFFICIENT)))
 
 
-EFFECT = Effect("lithium_plating", "physics", __doc__, PARAMETERS, on_model=plate)
+EFFECT = Effect(
+    "lithium_plating",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=plate,
+    experiment="a charge pulse at low temperature and the voltage plateau of the rest after it",
+)

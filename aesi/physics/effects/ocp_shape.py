@@ -86,4 +86,11 @@ def _corrected(electrode: Electrode, change_v: Array) -> Electrode:
     return replace(electrode, ocp=Sum(electrode.ocp, table))
 
 
-EFFECT = Effect("ocp_shape", "parameter", __doc__, PARAMETERS, on_model=reshape)
+EFFECT = Effect(
+    "ocp_shape",
+    "parameter",
+    __doc__,
+    PARAMETERS,
+    on_model=reshape,
+    experiment="C/50 discharge and charge, or GITT",
+)

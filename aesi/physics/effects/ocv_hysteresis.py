@@ -62,4 +62,11 @@ def hysteresis(
     return Contribution(magnitude * state, {"hysteresis": state})
 
 
-EFFECT = Effect("ocv_hysteresis", "physics", __doc__, PARAMETERS, on_voltage=hysteresis)
+EFFECT = Effect(
+    "ocv_hysteresis",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_voltage=hysteresis,
+    experiment="rests of some hours at the same state of charge, reached by charge and by discharge",
+)

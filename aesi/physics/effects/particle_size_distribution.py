@@ -55,4 +55,11 @@ def lognormal_bins(sd: float, sizes: int = SIZES) -> tuple[tuple[float, float], 
     return tuple(zip(share.tolist(), radius.tolist(), strict=True))
 
 
-EFFECT = Effect("particle_size_distribution", "physics", __doc__, PARAMETERS, on_model=spread_sizes)
+EFFECT = Effect(
+    "particle_size_distribution",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=spread_sizes,
+    experiment="relaxation after a long pulse, sampled over hours",
+)

@@ -39,5 +39,11 @@ def cut_into_regions(model: EspmModel, *, strength: float) -> EspmModel:
 
 
 EFFECT = Effect(
-    "reaction_nonuniformity", "physics", __doc__, PARAMETERS, on_model=cut_into_regions, refines="reduction"
+    "reaction_nonuniformity",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=cut_into_regions,
+    refines="reduction",
+    experiment="discharges at 2C and above beside a full porous-electrode simulation",
 )

@@ -51,4 +51,17 @@ def warm(model: EspmModel, *, heat_transfer_w_k: float, heat_capacity_factor: fl
     return replace(model, heat=HeatBalance(declared * heat_capacity_factor, heat_transfer_w_k))
 
 
-EFFECT = Effect("self_heating", "physics", __doc__, PARAMETERS, on_model=warm, infers="temperature")
+EFFECT = Effect(
+    "self_heating",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=warm,
+    infers="temperature",
+    experiment="a thermocouple on the case",
+    told_apart={
+        "ambient_temperature": (
+            "a thermocouple on the case: one rises with load and the other stands off from the start"
+        ),
+    },
+)

@@ -30,4 +30,23 @@ def add_resistance(model: EspmModel, *, resistance_ohm: float) -> EspmModel:
     return model.with_cell(contact_resistance_ohm=model.cell.contact_resistance_ohm + resistance_ohm)
 
 
-EFFECT = Effect("series_resistance", "physics", __doc__, PARAMETERS, on_model=add_resistance)
+EFFECT = Effect(
+    "series_resistance",
+    "physics",
+    __doc__,
+    PARAMETERS,
+    on_model=add_resistance,
+    experiment="impedance at 1 kHz",
+    told_apart={
+        "electrolyte_transport": (
+            "impedance at 1 kHz at two temperatures: contacts hardly change, the electrolyte by 2 % a "
+            "kelvin; or pulses after a long discharge at high rate, where the electrolyte has been "
+            "depleted"
+        ),
+        "charge_transfer_kinetics": (
+            "pulses from C/10 to 5C with 10 ms sampling: an ohmic drop is linear and instant, a kinetic "
+            "one bends and takes milliseconds"
+        ),
+        "film_growth": "the same pulse at the same state of charge before and after some hundred hours or cycles",
+    },
+)

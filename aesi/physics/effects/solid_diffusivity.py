@@ -43,4 +43,17 @@ def scale_diffusivities(model: EspmModel, *, negative_factor: float, positive_fa
     return model.of(cell)
 
 
-EFFECT = Effect("solid_diffusivity", "parameter", __doc__, PARAMETERS, on_model=scale_diffusivities)
+EFFECT = Effect(
+    "solid_diffusivity",
+    "parameter",
+    __doc__,
+    PARAMETERS,
+    on_model=scale_diffusivities,
+    experiment="GITT: long pulses and long rests over the range of state of charge",
+    told_apart={
+        "particle_size_distribution": (
+            "GITT: a distribution relaxes over a spread of times, one radius with one time after each pulse"
+        ),
+        "concentration_dependent_diffusivity": "GITT over the whole range of state of charge",
+    },
+)

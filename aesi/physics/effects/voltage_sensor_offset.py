@@ -30,4 +30,17 @@ def add_offset(trace: Trace, *, offset_v: float) -> Array:
     return trace.voltage_v + offset_v
 
 
-EFFECT = Effect("voltage_sensor_offset", "instrument", __doc__, PARAMETERS, on_reading=add_offset)
+EFFECT = Effect(
+    "voltage_sensor_offset",
+    "instrument",
+    __doc__,
+    PARAMETERS,
+    on_reading=add_offset,
+    told_apart={
+        "ocp_shape": "a second voltmeter on the terminals at rest",
+        "lithium_inventory_loss": (
+            "a second voltmeter at rest, or a full C/20 discharge between the voltage limits and the "
+            "coulombs that go back in"
+        ),
+    },
+)

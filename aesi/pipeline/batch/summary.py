@@ -89,7 +89,10 @@ def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
 
     from aesi.pipeline.report.style import MODEL_COLOURS, framed
 
-    fig = make_subplots(rows=len(TRENDS), cols=1, shared_xaxes=True, vertical_spacing=0.05)
+    titles = [words for words, _ in TRENDS.values()]  # above each panel: beside it they would not fit
+    fig = make_subplots(
+        rows=len(TRENDS), cols=1, shared_xaxes=True, vertical_spacing=0.07, subplot_titles=titles
+    )
     for line, (name, each) in enumerate(specimens.items()):
         for panel, key in enumerate(TRENDS, start=1):
             fig.add_scatter(
@@ -103,8 +106,8 @@ def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
                 row=panel,
                 col=1,
             )
-    for panel, (words, unit) in enumerate(TRENDS.values(), start=1):
-        fig.update_yaxes(title_text=f"{words}, {unit}", row=panel, col=1)
+    for panel, (_, unit) in enumerate(TRENDS.values(), start=1):
+        fig.update_yaxes(title_text=unit, row=panel, col=1)
     fig.update_xaxes(title_text="at", row=len(TRENDS), col=1)
     return framed(
         fig, "Ageing", "Each check-up calibrated on its own from the same cell file.", 170 * len(TRENDS)

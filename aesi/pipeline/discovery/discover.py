@@ -20,8 +20,8 @@ from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
-from aesi.tracer.outcome import Errors, Part, State
-from aesi.tracer.yardstick import POINTS_TO, Pointer
+from aesi.tracer.report.outcome import Errors, Part, State
+from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
@@ -116,6 +116,7 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         "explainable_mv": MV * found.after.yardstick.explained_v,
         "structured_mv": MV * verdict.structured_v,
         "tolerance_mv": MV * verdict.tolerance_v,
+        "margin": verdict.margin,
         "candidates": [
             {
                 "effect": c.effect,

@@ -13,7 +13,7 @@ import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
@@ -36,19 +36,13 @@ if TYPE_CHECKING:
 
 NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 
-ComparedModel = Literal[
-    "ESPM",
-    "ESPM, one resistor",
-    "ESPM, initial state fitted",
-    "ESPM recalibrated",
-    "AESI I",
-    "AESI II",
-    "SINDy-C",
-    "PySINDy ensemble",
-    "DMD with control",
-    "ridge",
-    "gradient boosting",
-]
+
+def model_names() -> tuple[str, ...]:
+    """Every model that an experiment can compare: the physics, the two ensembles, the baselines."""
+    from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
+    from aesi.sparse.baselines import BASELINES
+
+    return (*PHYSICS_NAMES, "AESI I", "AESI II", *BASELINES)
 
 
 class ExperimentConfig(Section):
@@ -63,11 +57,19 @@ class ExperimentConfig(Section):
     library: LibraryConfig = LibraryConfig()
     search: SearchConfig = SearchConfig()
     conformal: ConformalConfig = ConformalConfig()
-    models: tuple[ComparedModel, ...] = get_args(ComparedModel)
+    models: tuple[str, ...] = Field(default_factory=model_names)
     tracking: TrackingConfig = TrackingConfig()
     runner: RunnerConfig = RunnerConfig()
     discover: DiscoverConfig | None = None
     base: Path = Field(default_factory=Path.cwd, exclude=True)
+
+    @field_validator("models")
+    @classmethod
+    def _known(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+        unknown = [name for name in value if name not in model_names()]
+        if unknown:
+            raise ValueError(f"there is no model {unknown[0]!r}; known are {', '.join(model_names())}")
+        return value
 
     @model_validator(mode="after")
     def _has_something_to_do(self) -> ExperimentConfig:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.pipeline.report import tables, words
+from aesi.pipeline.report import sections, tables, words
 from aesi.pipeline.report.figures import paper_figures, predicted_models
 from aesi.pipeline.report.page import write_page
-from aesi.pipeline.report.plots import ensemble, hypotheses, maps, records
+from aesi.pipeline.report.plots import hypotheses, maps, records
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, RunView
 
 if TYPE_CHECKING:
@@ -25,11 +25,8 @@ TELLING_SHARE = 0.01
 def write_run_report(path: str | Path, view: RunView) -> Path:
     """Write the report of one run to `path` and return it."""
     figures = paper_figures(view)
-    if view.candidates:
-        figures["front"] = ensemble.front_figure(view.candidates)
-    coefficients = ensemble.coefficient_figure(view.terms)
-    if coefficients is not None:
-        figures["coefficients"] = coefficients
+    for section in sections.SECTIONS:
+        figures.update(section.figures(view))
     chosen = view.model(view.chosen) or {"name": view.chosen}
     return write_page(
         path,
@@ -47,6 +44,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         ],
         tables=tables.all_tables(view.models),
         models=predicted_models(view),
+        sections=sections.SECTIONS,
     )
 
 

@@ -14,6 +14,8 @@ from aesi.tracer.case.problem import InverseProblem
 BLOCKS = 24
 FEWEST = 4
 """Blocks of all records together, and the fewest of one."""
+SEEN_SHARE = 2.0 / 3.0
+"""Of a single record: what is fitted where its end is left out."""
 RANGES = 3
 """Ranges of rate, and of charge."""
 
@@ -61,6 +63,7 @@ def blocks_of(problem: InverseProblem) -> Blocks:
         )
     for name, size in (("rate", rate), ("charge", charge)):
         folds[name] = _ranges(size)
+    folds["end"] = (tuple(b for b in range(len(record)) if b >= round(SEEN_SHARE * len(record))),)
     return Blocks(bounds, np.array(record), folds)
 
 

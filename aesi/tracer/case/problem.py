@@ -24,7 +24,7 @@ from aesi.tracer.case.free_parameter import (
     state_of_charge,
 )
 from aesi.tracer.case.records import PreparedRecord
-from aesi.tracer.stepping import stepping
+from aesi.tracer.case.stepping import stepping
 
 Trust = Literal["exact", "tight", "loose"]
 """How far the declared parameters are believed: as fitted to this very cell by this very model, as a careful

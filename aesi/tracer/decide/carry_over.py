@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -12,20 +12,17 @@ from aesi.errors import AesiError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
-from aesi.tracer.case.blocks import blocks_of
-from aesi.tracer.case.free_parameter import coordinates_of
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.free_parameter import values_of
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.likelihood.fit import HypothesisFitter
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.states import ModelState
+from aesi.tracer.likelihood.model_state import ModelState
 
-REFIT_STEPS = 4
-SEEN_SHARE = 2.0 / 3.0
-"""Of a single record, in time: what is fitted where no other record can be left out."""
 WORSE = 1.05
 """A hypothesis may leave so much more than the better of the declared and the recalibrated model on a part left out."""
-RATES_C = (1.0, 2.0, 3.0)
-CHARGE_C = -0.5
+ORDINARY_C = (1.0, -0.5)
+FAST_C = (2.0, 3.0)
+"""Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
 STEP_S = 10.0
 
 
@@ -47,58 +44,36 @@ class LeftOut:
         )
 
 
-def left_out_errors(problem: InverseProblem, one: Explanation | None) -> LeftOut:
-    """What a hypothesis, refitted without each record in turn, leaves on it (of a single record: on its last third);
-    None: the model as declared, which nothing is fitted of."""
+def left_out_errors(problem: InverseProblem, blocks: Blocks, one: Explanation | None) -> LeftOut:
+    """What a hypothesis leaves on each record at the parameters that the others give (of a single record: on its last
+    third), simulated with the whole model at the change to first order; None: the model as declared."""
+    many = len(problem.records) > 1
     errors = []
-    for part, record, index in _parts(problem):
+    for k in range(len(problem.records)):
         try:
-            state = ModelState(problem) if one is None else _refitted(part, one)
-            run = None if state is None else state.simulated(record, index, thin=True)
+            if one is None:
+                state = ModelState(problem)
+            else:
+                x = one.point.x + one.score.shifts["record" if many else "end"][k]
+                state = ModelState(problem, values_of(one.free, x), tuple(one.hypothesis))
+            record = problem.records[k]
+            run = state.simulated(record, None if many and one is not None else k, thin=True)
         except AesiError:
-            run = None
-        if run is None:
             errors.append(np.inf)
             continue
-        seen = part.records[0].n_fit if index is not None else 0
-        rows = slice(seen, record.n_fit)
-        errors.append(float(np.sqrt(np.mean((record.thin.voltage_v - run.voltage_v)[rows] ** 2))))
+        rows = problem.slices[k]
+        residual = (record.thin.voltage_v - run.voltage_v)[: record.n_fit]
+        out = np.isin(blocks.of_row[rows], blocks.folds["record" if many else "end"][k])
+        errors.append(float(np.sqrt(np.mean(residual[out] ** 2))))
     return LeftOut(tuple(errors))
 
 
-def _parts(problem: InverseProblem):  # type: ignore[no-untyped-def]
-    records = problem.records
-    if len(records) > 1:
-        for k, record in enumerate(records):
-            rest = tuple(r for i, r in enumerate(records) if i != k)
-            yield _with(problem, rest, [i for i in range(len(records)) if i != k]), record, None
-        return
-    (record,) = records
-    seen = max(int(SEEN_SHARE * record.n_fit), 2)
-    yield _with(problem, (replace(record, n_fit=seen),), [0]), record, 0
-
-
-def _with(problem: InverseProblem, records: tuple, kept: Sequence[int]) -> InverseProblem:  # type: ignore[type-arg]
-    reduction = problem.reduction
-    if reduction is not None:
-        columns = tuple(reduction.columns_v[k][: r.n_fit] for k, r in zip(kept, records, strict=True))
-        reduction = replace(reduction, columns_v=columns)
-    return replace(problem, records=records, reduction=reduction)
-
-
-def _refitted(part: InverseProblem, one: Explanation) -> ModelState | None:
-    fitter = HypothesisFitter(part, blocks_of(part), one.hypothesis)
-    x = fitter.descend(coordinates_of(fitter.free, dict(one.placed)), one.score.delta_v, REFIT_STEPS)
-    fit = fitter.finished(x)
-    return None if fit is None else ModelState.of(part, fit)
-
-
-def range_fault(state: ModelState) -> str | None:
-    """Why the model cannot be simulated over the range that the cell declares, although the declared model can: a full
-    discharge at several rates and a charge, at the temperatures of the records; None where it can."""
+def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAST_C)) -> str | None:
+    """Why the model cannot be simulated over the range that the cell declares, although the declared model can: full
+    discharges and charges at these rates, at the temperatures of the records; None where it can."""
     declared = ModelState(state.problem)
     for temperature in _temperatures(state.problem):
-        for rate in (*RATES_C, CHARGE_C):
+        for rate in rates_c:
             fault = _fault(state, rate, temperature)
             if fault is not None and _fault(declared, rate, temperature) is None:
                 return fault

@@ -2,12 +2,18 @@
 
     p = 1 / (1 + exp(-(a + b m)))        m the margin of the verdict, a and b by kind of verdict
 
-`confidence.json` holds a and b with the number of cases behind them and the command that fits them.
+`confidence.json` holds a and b with the number of cases behind them; `confidence_cases.jsonl` holds those cases (of
+development, one a line with verdict, margin and whether it was right, look-alikes counted as right).
+
+    python -m aesi.tracer.decide.confidence CASES.jsonl > confidence.json
+
+fits it, also from the rows of `aesi bench blind --json`.
 """
 
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -56,3 +62,27 @@ def fitted_map(margins: Sequence[float], right: Sequence[bool]) -> FrequencyMap:
         weights = weights + np.linalg.solve(hessian, gradient)
         weights[1] = max(weights[1], 0.0)
     return FrequencyMap(float(weights[0]), float(weights[1]), len(margins))
+
+
+def maps_of(rows: Sequence[Mapping[str, object]]) -> dict[str, FrequencyMap]:
+    """Kind of verdict -> map, from rows with `verdict`, `margin` and `right`."""
+    out = {}
+    for word in ("found", "none", "unknown"):
+        of_kind = [row for row in rows if row.get("verdict") == word and "margin" in row]
+        margins = [float(str(row["margin"])) for row in of_kind]
+        out[word] = fitted_map(margins, [bool(row["right"]) for row in of_kind])
+    return out
+
+
+def _main(paths: Sequence[str]) -> None:
+    rows = []
+    for path in paths:
+        with open(path, encoding="utf-8") as file:
+            rows += [json.loads(line) for line in file if line.strip()]
+    maps = {word: vars(found) for word, found in maps_of(rows).items()}
+    command = "python -m aesi.tracer.decide.confidence confidence_cases.jsonl"
+    print(json.dumps({"command": command, "maps": maps}, indent=1))
+
+
+if __name__ == "__main__":
+    _main(sys.argv[1:])

@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from aesi.errors import DataError
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
-from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
+from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps
-from aesi.tracer.decide.search import Path, Report, base_of, refitted, searched
+from aesi.tracer.decide.search import Path, Report, base_of, refitted, searched, with_wrong_parameters
 from aesi.tracer.decide.verdict import Thresholds, Verdict, judged, noise_v, structured_v, tolerance_v
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.states import ModelState
+from aesi.tracer.likelihood.model_state import ModelState
 
+AS_DECLARED_NATS = 5.0
+"""Own parameters as declared are believed where freeing them says no more than this."""
 AS_MUCH_NATS = 0.5
 """Two hypotheses within this of each other say as much of unseen data."""
 
@@ -33,7 +37,7 @@ class Option:
 class Evidence:
     """path : the search that the verdict is about.  paths : all of them, by trust.  recalibrated : the declared model
     with all of its own parameters open.  after : the model that is written.  fault : why the chosen hypothesis was not
-    adopted, where it was not."""
+    adopted, where it was not.  limits : where the written model stops short of the declared one."""
 
     path: Path
     paths: dict[Trust, Path]
@@ -41,7 +45,7 @@ class Evidence:
     after: ModelState
     verdict: Verdict
     fault: str | None = None
-    simulations: int = 0
+    limits: tuple[str, ...] = ()
 
 
 def gathered(
@@ -65,13 +69,17 @@ def gathered(
 
     path = path_of("tight")
     verdict = judged(path, thresholds)
+    if verdict.word != "unknown":
+        wrong = with_wrong_parameters(path, archive)
+        if wrong is not path:
+            path, verdict = wrong, judged(wrong, thresholds)
     if verdict.word == "found":
         path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
-    elif verdict.word == "none":
+    elif verdict.word == "none" and not _as_declared(replace(problem, trust="exact"), path, archive):
         exact = path_of("exact")
         path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
     verdict = _with_confidence(verdict)
-    recalibrated = _recalibrated(problem, archive)
+    recalibrated = _recalibrated(problem, paths["tight"], archive)
     if verdict.word != "unknown":
         return _adopted(path, paths, verdict, recalibrated)
     loose = path_of("loose") if len(problem.records) > 1 else None
@@ -98,6 +106,12 @@ def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tupl
     return (exact, first) if ahead > -AS_MUCH_NATS else (tight, second)
 
 
+def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:
+    """Does the model say as much with its parameters all but as declared? Then no effect can stand in for them."""
+    based = base_of(exact, archive)
+    return based is not None and based[2].score.total > tight.chosen.score.total - AS_DECLARED_NATS
+
+
 def _sharpened(
     problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
@@ -115,10 +129,23 @@ def _with_confidence(verdict: Verdict) -> Verdict:
 
 
 def _recalibrated(
-    problem: InverseProblem, archive: Archive
+    problem: InverseProblem, tight: Path, archive: Archive
 ) -> tuple[InverseProblem, FittedHypothesis] | None:
+    """The declared model with all of its own parameters open; with fewer where that fits better, and none where not
+    even those do better than the declared ones on what they were fitted to."""
     based = base_of(replace(problem, trust="loose"), archive)
-    return None if based is None else (based[0], based[2])
+    tried = (
+        [(tight.problem, tight.base)]
+        if based is None
+        else [(based[0], based[2]), (tight.problem, tight.base)]
+    )
+    best = min(tried, key=lambda one: one[1].rmse_v)
+    declared = ModelState(problem)
+    errors = [
+        (record.thin.voltage_v - declared.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
+        for k, record in enumerate(problem.records)
+    ]
+    return best if best[1].rmse_v <= float(np.sqrt(np.mean(np.concatenate(errors) ** 2))) else None
 
 
 def _adopted(
@@ -130,9 +157,12 @@ def _adopted(
     """What was found, or the bare model; not where it cannot be simulated over the declared range."""
     chosen = ModelState.of(path.problem, path.chosen)
     other = ModelState(path.problem) if recalibrated is None else ModelState.of(*recalibrated)
-    fault = range_fault(chosen)
-    after = chosen if fault is None else ModelState(path.problem)
-    return Evidence(path, paths, other, after, verdict, fault)
+    fault = range_fault(chosen, ORDINARY_C)
+    if fault is not None:
+        return Evidence(path, paths, other, ModelState(path.problem), verdict, fault)
+    fast = range_fault(chosen, FAST_C)
+    limits = () if fast is None else (f"with what was found, {fast}; the declared model does not.",)
+    return Evidence(path, paths, other, chosen, verdict, None, limits)
 
 
 def _best_carried(
@@ -144,13 +174,13 @@ def _best_carried(
 ) -> Evidence:
     """Nothing explains the data: the model that leaves least on parts left out, and that can be simulated over the
     declared range, no worse on any of them than the declared and the recalibrated one."""
-    declared = Option(ModelState(path.problem), left_out_errors(path.problem, None), None)
+    declared = Option(ModelState(path.problem), left_out_errors(path.problem, path.blocks, None), None)
     basic = [declared]
     other = declared.state
     if recalibrated is not None:
         problem, fit = recalibrated
         other = ModelState.of(problem, fit)
-        basic.append(Option(other, left_out_errors(problem, fit), fit))
+        basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
     tried: list[tuple[InverseProblem, FittedHypothesis]] = [
         (path.problem, path.base),
         (path.problem, path.chosen),
@@ -158,7 +188,7 @@ def _best_carried(
     if loose is not None:
         tried.append((loose.problem, loose.chosen))
     more = [
-        Option(ModelState.of(problem, fit), left_out_errors(problem, fit), fit)
+        Option(ModelState.of(problem, fit), left_out_errors(problem, path.blocks, fit), fit)
         for problem, fit in dict.fromkeys(tried)
         if recalibrated is None or fit is not recalibrated[1]
     ]

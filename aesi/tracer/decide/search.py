@@ -7,19 +7,20 @@ whole model. What is kept of it is frozen evidence, from which a verdict follows
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.free_parameter import coordinates_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import with_reduction_error
 from aesi.tracer.decide.archive import Archive, fit_name
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter, held_out_residual
-from aesi.tracer.likelihood.growth import Explanation, Grown, Parent, grow
+from aesi.tracer.likelihood.growth import Explanation, Grown, Parent, grow, promise
 from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
 
 BASE_STEPS = 8
@@ -27,10 +28,16 @@ REFIT_STEPS = 3
 FINALISTS = 3
 FINALIST_NATS = 15.0
 """Effects that are fitted with the whole model: at most so many, within so much of the best."""
+PROMISING = 9
+"""Effects that are grown on a hypothesis with effects: those that say most to first order."""
 BEAM = 2
 """Hypotheses that a further effect is tried on."""
+WRONG_SDS = 2.0
+"""Of its spread: a declared parameter that the data put further off, with 95 % probability, is wrong and is named."""
 HOPELESS_SHARE = 0.7
 """Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
+ALIKE_NATS = 3.0
+"""Hypotheses within this of each other say as much."""
 ADMITTED_NATS = 15.0
 """What an effect has to say more of unseen data than the hypothesis without it."""
 LEAST_V = 1.5e-4
@@ -144,8 +151,10 @@ def searched(
     steps: list[Step] = []
     notes: list[str] = []
     parents, chosen = [base], base
+    slopes: dict[str, Array] = {}
     for _ in range(max_effects):
-        step, refused = _step(problem, blocks, parents, chosen, archive, report)
+        step, refused = _step(problem, blocks, parents, chosen, slopes, archive, report)
+        slopes = slopes or {g.hypothesis[-1]: g.slopes_v for g in step.grown}
         notes += refused
         steps.append(step)
         if step.admitted is None:
@@ -158,6 +167,28 @@ def searched(
         parents = [chosen, *others][:BEAM]
     chosen = _pruned(problem, blocks, chosen, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
+
+
+def with_wrong_parameters(path: Path, archive: Archive) -> Path:
+    """The path with those declared parameters as effects that the data put beyond what cell files are off by."""
+    chosen = path.chosen
+    sds = np.sqrt(np.diagonal(chosen.score.covariance))
+    beyond = {
+        f.owner: abs(float(x)) - 1.645 * float(sd)
+        for f, x, sd in zip(chosen.free, chosen.point.x, sds, strict=True)
+        if f.own and f.owner in path.problem.effects and path.problem.effects[f.owner].refines is None
+        if abs(float(x)) - 1.645 * float(sd) > WRONG_SDS
+    }
+    for owner in sorted(beyond, key=lambda name: -beyond[name]):
+        hypothesis = (*chosen.hypothesis, owner)
+        start, size = chosen.placed, chosen.score.delta_v
+        fit = _fitted(path.problem, path.blocks, hypothesis, start, size, 2 * REFIT_STEPS, archive)
+        if fit is not None and fit.score.total > chosen.score.total - ALIKE_NATS and not fit.at_bounds:
+            chosen = fit
+    if chosen is path.chosen:
+        return path
+    step = Step((path.chosen,), (), (chosen,), chosen)
+    return replace(path, steps=(*path.steps, step), chosen=chosen)
 
 
 def _pruned(
@@ -202,14 +233,14 @@ def _step(
     blocks: Blocks,
     parents: Sequence[FittedHypothesis],
     best: FittedHypothesis,
+    slopes: Mapping[str, Array],
     archive: Archive,
     report: Report,
 ) -> tuple[Step, list[str]]:
     wanted = [
-        (Parent(problem, blocks, parent), name)
-        for parent in parents
-        for name in problem.competing()
-        if name not in parent.hypothesis and _has_something_to_say(problem, name)
+        (parent, name)
+        for parent in (Parent(problem, blocks, fit) for fit in parents)
+        for name in _promising(parent, slopes)
     ]
     grown: dict[frozenset[str], Grown] = {}
     refused = []
@@ -241,6 +272,21 @@ def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis) 
     off = unseen_rmse_v(blocks, without) ** 2 - unseen_rmse_v(blocks, fit) ** 2
     says = fit.score.total - without.score.total
     return says > ADMITTED_NATS and off > LEAST_V**2 and not fit.at_bounds
+
+
+def _promising(parent: Parent, slopes: Mapping[str, Array]) -> list[str]:
+    """Effects to grow on a parent: all on the bare model, later those that say most with the slopes that they had."""
+    names = [
+        name
+        for name in parent.problem.competing()
+        if name not in parent.fit.hypothesis and _has_something_to_say(parent.problem, name)
+    ]
+    if not slopes:
+        return names
+    size = parent.fit.score.delta_v
+    said = {name: promise(parent, slopes[name], size) for name in names if name in slopes}
+    ranked = sorted(said, key=lambda name: -said[name])[:PROMISING]
+    return [name for name in names if name in ranked]
 
 
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:

@@ -26,12 +26,14 @@ class Thresholds:
     (which is itself estimated) and this much (V), added as squares.
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
     fewer nats, are not told apart.
+    alike_gain_nats : what a look-alike has to say more than the hypothesis without it.
     """
 
     noise_share: float = 0.45
     solver_v: float = 4e-4
     alike_sds: float = 1.64
     alike_nats: float = 3.0
+    alike_gain_nats: float = 7.5
 
 
 @dataclass(frozen=True)
@@ -114,6 +116,7 @@ def look_alikes(path: Path, thresholds: Thresholds) -> tuple[tuple[tuple[str, ..
     chosen = path.chosen
     allowed = tolerance_v(noise_v(path), thresholds)
     groups, margin = [], np.inf
+    tried = {frozenset(e.hypothesis): e for e in path.explanations()}
     for name in chosen.hypothesis:
         rest = set(chosen.hypothesis) - {name}
         alike = []
@@ -122,6 +125,9 @@ def look_alikes(path: Path, thresholds: Thresholds) -> tuple[tuple[tuple[str, ..
             if len(other.hypothesis) != len(chosen.hypothesis) or len(added) != 1 or name in other.hypothesis:
                 continue
             nats, deviation = lag(chosen, other)
+            without = tried.get(frozenset(rest))
+            if without is not None and other.score.total - without.score.total < thresholds.alike_gain_nats:
+                continue
             close = nats < max(thresholds.alike_nats, thresholds.alike_sds * deviation)
             if close and structured_v(path, other) <= 1.2 * allowed:
                 alike.append((nats, next(iter(added))))

@@ -176,5 +176,5 @@ class LinearForm(Protocol):
 
 def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
     """(n,) V: the residual of each block at the parameters that the other blocks give, linearly."""
-    shifts = fit.score.shifts[blocks.of_row]
+    shifts = fit.score.shifts["block"][blocks.of_row]
     return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)

@@ -158,14 +158,14 @@ class PredictiveScore:
 
     delta_v : that size.  log_density : by partition, (f,) nats of each fold.  total : half over blocks, half over the
     mean of the conditions, and the log prior of the size.  evidence : log marginal likelihood at that size.
-    shifts : (b, m) change of the parameters without each block.
+    shifts : by partition, (f, m) change of the parameters without each fold.
     """
 
     delta_v: float
     log_density: Mapping[str, Array]
     total: float
     evidence: float
-    shifts: Array
+    shifts: Mapping[str, Array]
     shift: Array
     covariance: Array
 
@@ -181,10 +181,10 @@ def score_at(
     parts = dict(zip(names, np.split(posterior.log_density, ends), strict=True))
     conditions = [float(parts[name].sum()) for name in PARTITIONS_OF_CONDITIONS if name in parts]
     total = 0.5 * float(parts["block"].sum()) + 0.5 * float(np.mean(conditions)) + log_prior
+    shifts = dict(zip(names, np.split(posterior.shifts, ends), strict=True))
     return PredictiveScore(
-        delta_v, parts, total, posterior.evidence, posterior.shifts[: len(blocks)], posterior.shift,
-        posterior.covariance,
-    )  # fmt: skip
+        delta_v, parts, total, posterior.evidence, shifts, posterior.shift, posterior.covariance
+    )
 
 
 def best_over_sizes(scores: Sequence[PredictiveScore]) -> PredictiveScore:

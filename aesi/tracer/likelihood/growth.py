@@ -66,6 +66,7 @@ class Grown:
     """A parent and one effect: its parameters fitted, the rest to first order.
 
     free, point : of what may move, on no bound.  on_bounds : value of what is.  u : coordinates of the effect alone.
+    slopes_v : (n, k) V, what its parameters do there.
     """
 
     hypothesis: tuple[str, ...]
@@ -75,6 +76,7 @@ class Grown:
     simulations: int
     on_bounds: Mapping[tuple[str, str], float]
     u: Array
+    slopes_v: Array
 
     @property
     def placed(self) -> dict[tuple[str, str], float]:
@@ -175,6 +177,19 @@ def grow(parent: Parent, effect: str, delta_v: float, known: Array | None = None
     return _scored(growth, u, e, jacobian)
 
 
+def promise(parent: Parent, slopes_v: Array, delta_v: float) -> float:
+    """What an effect would say of unseen data on top of a parent, nats up to a constant, to first order and with the
+    slopes that it had on another one: costs no simulation."""
+    fit = parent.fit
+    known, log_det = parent.white[delta_v]
+    own = np.column_stack([fit.point.residual_v, slopes_v])
+    new, _ = whitened(parent.problem, parent.blocks, own, delta_v)
+    table = np.column_stack([new[:, :1], known, new[:, 1:]])
+    x = np.concatenate([fit.point.x, np.zeros(slopes_v.shape[1])])
+    sums = block_sums(parent.blocks, table, log_det)
+    return score_at(parent.problem, parent.blocks, sums, x, delta_v, 0.0).total
+
+
 def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
     inside = (u > growth.low + 1e-9) & (u < growth.high - 1e-9)  # a linear form cannot see a bound
@@ -191,7 +206,7 @@ def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
     free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
     point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]]))
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
-    return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations, on_bounds, u)
+    return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations, on_bounds, u, jacobian)
 
 
 Explanation = FittedHypothesis | Grown

@@ -116,7 +116,7 @@ def test_effects_lists_and_shows(call):
     assert code == 0
     assert {"self_heating", "ocv_hysteresis", "clock_skew"} <= {line.split()[0] for line in out.splitlines()}
     code, out, _ = call("effects", "series_resistance")
-    assert "resistance_ohm = " in out
+    assert "resistance_ohm [ohm]" in out
     assert "Source: " in out
     assert (
         "\nLeaves out its dependence on temperature. Holds wherever" in out

@@ -109,6 +109,6 @@ def test_every_record_has_a_trace_of_every_model(evaluation):
 
 def test_other_methods_stand_beside_the_chosen_one(evaluation):
     by_method = row(evaluation, "AESI I")["intervals_by_method"]
-    assert set(by_method) == {"split", "enbpi", "spci_linear"}
+    assert set(by_method) == {"split", "enbpi", "spci_refitted", "spci_linear"}
     assert all(figures["average_width_v"] > 0 for figures in by_method.values())
     assert row(evaluation, "ESPM")["intervals_by_method"] == {}

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.pipeline.report import write_discovery_report, write_figures, write_run_report
+from aesi.pipeline.report import sections, write_discovery_report, write_figures, write_run_report
 from aesi.pipeline.report.arrays.embed import STORED, ArrayStore, embed
 from aesi.pipeline.report.plots import records
 
@@ -137,3 +137,18 @@ def test_an_interrupted_write_leaves_the_old_report(views, tmp_path, monkeypatch
     with pytest.raises(KeyboardInterrupt):
         write_figures(path, "t", {})
     assert path.read_text() == "old"
+
+
+def test_a_further_section_is_a_file_a_line_and_a_test(views, monkeypatch, tmp_path):
+    added = sections.ReportSection(
+        "caveats",
+        "What to keep in mind",
+        shows=("ranking", "a figure that no run has"),
+        sentences=lambda view: (f"{view.cell} was measured once.",),
+        pairs=lambda view: {"experiment": view.experiment},
+    )
+    monkeypatch.setattr(sections, "SECTIONS", (*sections.SECTIONS, added))
+    page = write_run_report(tmp_path / "report.html", views.run_view(600)).read_text()
+    assert '<section id="caveats">' in page
+    assert "was measured once." in page
+    assert '<section id="model">' in page

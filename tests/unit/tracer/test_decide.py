@@ -13,7 +13,7 @@ from aesi.tracer.decide.carry_over import left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
 from aesi.tracer.decide.search import searched
 from aesi.tracer.decide.verdict import Thresholds, judged, structured_v
-from aesi.tracer.states import ModelState
+from aesi.tracer.likelihood.model_state import ModelState
 
 NEVER = Archive(None, "")
 
@@ -48,14 +48,14 @@ def test_what_is_left_beyond_the_tolerance_is_unknown_and_names_nothing(path):
 
 
 def test_data_that_order_nothing_give_look_alikes(path):
-    (group,) = judged(path, Thresholds(alike_sds=1e6, solver_v=0.1)).groups
+    (group,) = judged(path, Thresholds(alike_sds=1e6, solver_v=0.1, alike_gain_nats=-1e6)).groups
     assert group[0] == "ocv_hysteresis"
     assert len(group) == 3
 
 
 def test_what_was_fitted_carries_to_a_part_left_out(path):
-    error = left_out_errors(path.problem, path.chosen)
-    assert error.pooled_v < 1.3e-3 < left_out_errors(path.problem, None).pooled_v
+    error = left_out_errors(path.problem, path.blocks, path.chosen)
+    assert error.pooled_v < 1.3e-3 < left_out_errors(path.problem, path.blocks, None).pooled_v
     assert range_fault(ModelState.of(path.problem, path.chosen)) is None
 
 

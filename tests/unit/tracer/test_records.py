@@ -1,14 +1,13 @@
-"""Thinning, noise floor, initial states and continuations."""
+"""Thinning, noise floor and continuations."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from aesi.errors import DataError
 from aesi.records import Measurement
-from aesi.tracer.checks import check_record
-from aesi.tracer.records import noise_floor_v, prepare, prepare_test, rest_voltage_v, thinned
+from aesi.tracer.case.checks import check_record
+from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test, thinned
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):
@@ -57,20 +56,6 @@ def test_a_long_discharge_needs_few_rows(cell):
     assert np.diff(record.thin.time_s).max() < 100.0
 
 
-def test_a_voltage_that_still_recovers_is_no_rest(cell, rng):
-    time = np.arange(600.0)
-    data = measured(cell, time, np.where(time < 40, 0.0, 5.0))
-    calm = replace(data, voltage_v=data.voltage_v + 1e-3 * rng.normal(size=600))
-    assert not prepare(cell, calm, None, 0.0).notes
-    moving = replace(calm, voltage_v=calm.voltage_v - 0.03 * np.exp(-time / 15.0))
-    record = prepare(cell, moving, None, 0.0)
-    assert "still moves" in record.notes[0]
-    assert "--soc0" in record.notes[0]
-    assert record.soc0_sd > prepare(cell, calm, None, 0.0).soc0_sd
-    assert rest_voltage_v(cell, moving) > float(moving.voltage_v[:40].mean()) + 4e-3
-    assert not prepare(cell, moving, 0.8, 0.0).notes, "a state that is given needs no doubt"
-
-
 def test_noise_floor_is_found_under_a_drive(rng):
     n = 5000
     current = np.repeat(rng.normal(0, 10, n // 50), 50)
@@ -81,37 +66,6 @@ def test_noise_floor_is_found_under_a_drive(rng):
 def test_quantised_data_have_at_least_the_noise_of_the_quantum():
     voltage = np.round(np.linspace(4.0, 3.9, 3000), 2)
     assert noise_floor_v(voltage, np.ones(3000)) >= 0.01 / np.sqrt(12) * 0.999
-
-
-def test_state_of_charge_is_read_from_the_rest_voltage(cell):
-    time = np.arange(600.0)
-    current = np.where(time < 30, 0.0, 5.0)
-    record = prepare(cell, measured(cell, time, current, soc0=0.62), None, 0.3)
-    assert record.soc0 == pytest.approx(0.62, abs=1e-3)
-    assert record.n_fit == 420
-    assert not record.soc0_given
-
-
-def test_a_record_that_starts_under_load_needs_a_state_of_charge(cell):
-    data = measured(cell, np.arange(600.0), np.full(600, 10.0))
-    with pytest.raises(DataError, match="not at rest"):
-        prepare(cell, data, None, 0.3)
-    assert prepare(cell, data, 0.8, 0.3).soc0 == 0.8
-
-
-def test_a_given_state_far_from_the_rest_voltage_is_not_believed(cell):
-    data = measured(cell, np.arange(600.0), np.zeros(600), soc0=0.5)
-    record = prepare(cell, data, 0.9, 0.0)
-    assert record.soc0 == pytest.approx(0.5, abs=1e-3)
-    assert "the voltage is believed" in record.notes[0]
-
-
-def test_a_state_given_for_another_record_is_not_that_of_a_slow_discharge_from_full(cell):
-    slow = np.full(600, 0.05 * cell.nominal_capacity_ah)
-    full = prepare(cell, measured(cell, np.arange(600.0), slow, soc0=0.98), 0.78, 0.0)
-    assert full.soc0 == pytest.approx(0.98, abs=1e-3)
-    assert "believed" in full.notes[0]
-    assert prepare(cell, measured(cell, np.arange(600.0), slow, soc0=0.75), 0.78, 0.0).soc0 == 0.78
 
 
 def test_a_continuation_is_judged_only_after_what_was_seen(cell):

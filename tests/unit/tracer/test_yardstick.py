@@ -7,7 +7,7 @@ import pytest
 
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.tracer.yardstick import POINTS_TO, measure
+from aesi.tracer.report.yardstick import POINTS_TO, measure
 
 CURRENT, ELECTROLYTE, SURFACES, RECENT, PAST = POINTS_TO
 

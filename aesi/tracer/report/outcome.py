@@ -11,7 +11,7 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import Run
 from aesi.tracer.case.records import PreparedRecord
-from aesi.tracer.states import ModelState
+from aesi.tracer.likelihood.model_state import ModelState
 
 State = Literal["before", "recalibrated", "after"]
 Part = Literal["fit", "test"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
@@ -11,8 +9,8 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
+from aesi.tracer.case.records import PreparedRecord
 
-RecordLike = Any
 VOLTAGE_MARGIN_V = 0.3
 SOC_MARGIN = 0.12
 FEWEST_SAMPLES = 200
@@ -38,7 +36,7 @@ def check_measurement(cell: Cell, data: Measurement) -> None:
         )
 
 
-def check_record(cell: Cell, record: RecordLike) -> None:
+def check_record(cell: Cell, record: PreparedRecord) -> None:
     """Raises DataError for a record that is too short, or that asks for more charge than the cell has."""
     thin = record.thin
     until = min(record.fit_until_s, thin.time_s[-1])
@@ -67,7 +65,7 @@ def check_record(cell: Cell, record: RecordLike) -> None:
         )
 
 
-def _discharged_ah(record: RecordLike) -> Array:
+def _discharged_ah(record: PreparedRecord) -> Array:
     """(n,) as the record's current is held: a pulse before a row minutes later is no triangle."""
     current = record.data.current_a
     mean = current[1:] if record.hold == "backward" else 0.5 * (current[1:] + current[:-1])

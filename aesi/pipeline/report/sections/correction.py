@@ -1,0 +1,32 @@
+"""What the sparse correction consists of: terms, their coefficients, and the search that found them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from aesi.pipeline.report.plots import ensemble
+from aesi.pipeline.report.sections.section import ReportSection
+from aesi.pipeline.report.views import RunView
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+def _figures(view: RunView) -> dict[str, Figure]:
+    figures = {"front": ensemble.front_figure(view.candidates)} if view.candidates else {}
+    coefficients = ensemble.coefficient_figure(view.terms)
+    return figures if coefficients is None else figures | {"coefficients": coefficients}
+
+
+def _settings(view: RunView) -> Mapping[str, Any]:
+    return view.settings
+
+
+SECTION = ReportSection(
+    "model",
+    "What the correction consists of",
+    shows=("ranking", "coefficients", "front", "bootstrap_coverage"),
+    figures=_figures,
+    pairs=_settings,
+)

@@ -1,0 +1,1 @@
+"""What a finished search tells: candidates, errors by file, what is left, which experiment comes next."""
