@@ -26,7 +26,6 @@ MAY = {
     "aesi/pipeline/discovery/cases.py": "reads the files",
     "aesi/pipeline/discovery/finding.py": "tells what a reader did to them",
     "aesi/pipeline/discovery/discover.py": "hands them to the tracer",
-    "aesi/pipeline/batch": "hands them from a table of cells to the discovery of each",
     "aesi/tracer/discovery.py": "hands them to the outcome",
     "aesi/tracer/report/outcome.py": "judges the finding",
     "flows/commands/cell.py": "takes --test from the command line",
