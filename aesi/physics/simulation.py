@@ -10,7 +10,7 @@ solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693, 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Literal
 
 import numpy as np
@@ -43,6 +43,7 @@ def simulate(
     rest_voltage_v: float | None = None,
     on_depletion: OnDepletion = "raise",
     model: ModelName = "espm",
+    profiles: bool = False,
 ) -> Run:
     """Terminal voltage and states of `cell` under a current.
 
@@ -58,6 +59,7 @@ def simulate(
     at 10 V per unit of stoichiometry, every value stays finite, and `series["depleted"]` is 1 from the first
     such sample on.
     model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both.
+    profiles : of "dfn" alone: what runs across the electrodes, see `Run.profiles`.
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
     Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated; InputError for
@@ -71,7 +73,8 @@ def simulate(
         check_soc(soc0)
     time, current = _checked_record(time_s, current_a)
     active = _instruments_first(checked_effects(effects))
-    solve = _solver(model)
+    across: dict[str, Array] | None = {} if profiles else None
+    solve = _solver(model, across)
     changed = model_with(cell, active)
     record = Record(time, current, _kelvin(temperature_degc, time))
     for effect in active:
@@ -93,7 +96,7 @@ def simulate(
     elif on_depletion == "clip":
         series["depleted"] = np.zeros(len(time))
     voltage = _voltage_effects(changed, active, record, rows[0], series, hold)
-    return Run(time, current, voltage, series)
+    return Run(time, current, voltage, series, across or {})
 
 
 def model_with(cell: Cell, effects: Iterable[ActiveEffect]) -> EspmModel:
@@ -129,14 +132,16 @@ Solver = Callable[
 first fault and what it was."""
 
 
-def _solver(name: str) -> Solver:
+def _solver(name: str, profiles: dict[str, Array] | None) -> Solver:
     """The model of that name; it is imported, and its compiled code read, when it is first used."""
     if name == "espm":
+        if profiles is not None:
+            raise InputError("profiles across the electrodes are of the porous electrode; use model='dfn'.")
         return _run_espm
     if name == "dfn":
         from aesi.physics.dfn.run import run_porous_electrode
 
-        return run_porous_electrode
+        return partial(run_porous_electrode, profiles=profiles)
     raise InputError(
         f"there is no model {name!r}; give 'espm' (single particle) or 'dfn' (porous electrode)."
     )

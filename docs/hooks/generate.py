@@ -7,6 +7,7 @@ import sys
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
+from runpy import run_path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -96,6 +97,17 @@ def benchmarks() -> str:
         ]
         parts.append(_table([line for _, line in found]))
     return "\n".join([*parts, _over_time(entries)])
+
+
+def dfn_curve() -> str:
+    """Error against time of the porous electrode, from the newest recorded lines."""
+    from flows.benchmarks.history import latest, read_history
+
+    entries = read_history(ROOT / "docs" / "benchmarks.json")
+    drawn = run_path(str(Path(__file__).with_name("curve.py")))["curve"]
+    return str(
+        drawn([line for _, line in latest(entries).values() if line["bench"] == "dfn" and "who" in line])
+    )
 
 
 def columns_of(bench: str) -> str:
@@ -260,6 +272,7 @@ IN_COLUMNS = {
 GENERATORS: dict[str, Callable[[], str]] = {
     "catalogue": catalogue,
     "benchmarks": benchmarks,
+    "dfn curve": dfn_curve,
     "blind": lambda: columns_of("blind"),
     "real": lambda: columns_of("real"),
     "command line": command_line,

@@ -22,6 +22,7 @@ MAY = {
     "aesi/pipeline/experiment/evaluate.py": "judges the models, already chosen",
     "aesi/pipeline/api.py": "takes them from the caller",
     "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
+    "aesi/pipeline/batch": "hands the files of each cell on",
     "aesi/pipeline/discovery/cases.py": "reads the files",
     "aesi/pipeline/discovery/finding.py": "tells what a reader did to them",
     "aesi/pipeline/discovery/discover.py": "hands them to the tracer",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from aesi.errors import InputError
+from aesi.numerics.modes.collocation import gauss_layer
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
@@ -19,11 +20,17 @@ LONGER_STEPS = 5.0
 
 
 def run_porous_electrode(
-    model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
+    model: EspmModel,
+    time: Array,
+    current: Array,
+    temperature_k: Array | None,
+    soc0: float,
+    hold: Hold,
+    profiles: dict[str, Array] | None = None,
 ) -> tuple[Array, dict[str, Array], int, int]:
     """As `extended.run_extended`: rows (7, n), further states by name, the first fault and what it was.
 
-    Raises InputError for an electrode cut into regions.
+    profiles : is given what `Run.profiles` names.  Raises InputError for an electrode cut into regions.
     """
     from aesi.physics.dfn.record_kernels import run_porous
 
@@ -37,15 +44,36 @@ def run_porous_electrode(
     given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
     state, trial, newton, weights = _memory(particles, stack, electrodes)
+    profile = np.zeros((0 if profiles is None else len(time), 4, len(electrodes.node_share)))
     fault_at, fault = run_porous(
         time, current, kelvin, given, hold == "backward", LONGER_STEPS * model.substep_s, model.most_substeps,
         np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, newton, weights,
-        out, np.zeros((0, 4, stack.at.shape[0])),
+        out, profile,
     )  # fmt: skip
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]
+    if profiles is not None:
+        profiles.update(_named(model, profile))
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
+
+
+def _named(model: EspmModel, profile: Array) -> dict[str, Array]:
+    """The rows (n, 4, places) of `run_porous` by name, places from the negative collector to the positive."""
+    n, s, p = model.cell.negative, model.cell.separator, model.cell.positive
+    x = gauss_layer(model.electrode_points).x
+    whole = n.thickness_m + s.thickness_m + p.thickness_m
+    half = len(x)
+    order = np.concatenate([np.arange(half), np.arange(2 * half - 1, half - 1, -1)])
+    surface = [y.area_per_volume_1_m * y.thickness_m for y in (n, p)]
+    theta, reaction, salt, potential = (profile[:, row, order] for row in range(4))
+    return {
+        "x_m": np.concatenate([n.thickness_m * x, whole - p.thickness_m * x])[order],
+        "surface_stoichiometry": theta,
+        "reaction_a_m2": reaction / np.repeat(surface, half),
+        "electrolyte_mol_m3": salt * model.cell.electrolyte.c0_mol_m3,
+        "potential_v": potential,
+    }
 
 
 def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, NewtonScratch, Weights]:

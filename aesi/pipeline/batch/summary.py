@@ -42,10 +42,10 @@ TRENDS = {
     "positive_ah": ("Active material, positive", "Ah"),
     "capacity_ah": ("Capacity", "Ah"),
 }
-Row = Mapping[str, Any]
+CellRow = Mapping[str, Any]
 
 
-def write_summary(out: Path, rows: Sequence[Row], title: str) -> Path:
+def write_summary(out: Path, rows: Sequence[CellRow], title: str) -> Path:
     """Write summary.csv, summary.json and index.html to `out`; returns the page."""
     out.mkdir(parents=True, exist_ok=True)
     (out / "summary.csv").write_text(_csv(rows), encoding="utf-8")
@@ -65,7 +65,7 @@ def write_summary(out: Path, rows: Sequence[Row], title: str) -> Path:
     )
 
 
-def trends(rows: Sequence[Row]) -> dict[str, list[dict[str, float]]]:
+def trends(rows: Sequence[CellRow]) -> dict[str, list[dict[str, float]]]:
     """Check-ups by specimen in the order of `at`, for specimens with two or more of them."""
     found: dict[str, list[dict[str, float]]] = {}
     for row in rows:
@@ -75,7 +75,7 @@ def trends(rows: Sequence[Row]) -> dict[str, list[dict[str, float]]]:
     return {name: sorted(each, key=lambda r: r["at"]) for name, each in found.items() if len(each) > 1}
 
 
-def _csv(rows: Sequence[Row]) -> str:
+def _csv(rows: Sequence[CellRow]) -> str:
     stream = io.StringIO()
     writer = csv.DictWriter(stream, HEADER, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aesi.errors import InputError, SimulationError
 from aesi.physics import Cell, simulate
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.simulation import simulate_file
@@ -49,8 +50,6 @@ def test_a_saved_model_keeps_which_one_it_is(tmp_path):
 
 
 def test_a_cell_that_runs_empty_says_which_electrode_ran_out():
-    from aesi.errors import SimulationError
-
     time = np.arange(0.0, 4000.0, 5.0)
     with pytest.raises(SimulationError, match="surface of the"):
         simulate(CELL, time, np.full(len(time), 60.0), 0.5, model="dfn")
@@ -59,3 +58,21 @@ def test_a_cell_that_runs_empty_says_which_electrode_ran_out():
     assert clipped.series["depleted"][-1] == 1.0
     whole = clipped.series["depleted"] == 0.0
     assert clipped.voltage_v[whole].min() < CELL.lower_voltage_v  # followed to the cut-off and beyond
+
+
+def test_profiles_across_the_electrodes_add_up_to_the_current():
+    run = simulate(CELL, TIME, CURRENT, 0.7, model="dfn", profiles=True)
+    x, reaction = run.profiles["x_m"], run.profiles["reaction_a_m2"]
+    half = len(x) // 2
+    assert (np.diff(x) > 0).all()
+    assert reaction.shape == (len(TIME), len(x))
+    weight = 0.5 * np.polynomial.legendre.leggauss(half)[1]
+    n, p = CELL.negative, CELL.positive
+    for side, electrode, sign in ((slice(0, half), n, 1.0), (slice(half, None), p, -1.0)):
+        area = electrode.area_per_volume_1_m * electrode.thickness_m * CELL.total_area_m2
+        assert reaction[:, side] @ weight * area == pytest.approx(sign * CURRENT, abs=1e-9)
+    discharging = CURRENT > 0
+    near, far = run.profiles["electrolyte_mol_m3"][discharging][-1, [half - 1, half]]
+    assert near > far  # salt is released in the negative electrode and taken up in the positive
+    with pytest.raises(InputError, match="dfn"):
+        simulate(CELL, TIME, CURRENT, 0.7, profiles=True)
