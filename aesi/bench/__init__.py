@@ -12,5 +12,6 @@ BENCHMARKS = {
     "design": "aesi.bench.design",
     "spci": "aesi.bench.spci",
     "bands": "aesi.bench.bands",
+    "cells": "aesi.bench.cells",
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""

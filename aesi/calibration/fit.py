@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
+from aesi.calibration.heat import with_heat
 from aesi.calibration.model import AGEING_SD, Model
 from aesi.calibration.parameters import SPAN_K, Shapes, free_parameters
 from aesi.calibration.records import Prepared, prepared, with_temperatures
@@ -114,7 +115,7 @@ def calibrate(
     covariance = np.linalg.inv(scaled.T @ scaled)
     declared = _declared_errors(cell, model)
     rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
-    found = rewound(model, x)
+    found, warmth = with_heat(rewound(model, x), model.records)
     return Calibration(
         cell=found,
         declared=cell,
@@ -125,9 +126,10 @@ def calibrate(
             RecordError(r.name, _degc(r), b, a) for r, b, a in zip(model.records, declared, rms, strict=True)
         ),
         capacities={
-            r.name: float(np.exp(AGEING_SD * x[model.layout.age(i)])) for i, r in enumerate(model.records)
+            r.name: float(np.exp(AGEING_SD * x[model.layout.age(i)])) / usual_share(model, x)
+            for i, r in enumerate(model.records)
         },
-        notes=(*notes, *_told(model, x)),
+        notes=(*notes, *_told(model, x), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
@@ -250,7 +252,25 @@ def rewound(model: Model, x: Array) -> Cell:
     n_1, p_1 = cell.stoichiometries(full)
     n_0, p_0 = cell.stoichiometries(empty)
     cell = cell.with_negative(theta_min=n_0, theta_max=n_1).with_positive(theta_min=p_1, theta_max=p_0)
+    share = usual_share(model, x)
+    cell = cell.with_negative(c_max_mol_m3=cell.negative.c_max_mol_m3 * share)
+    cell = cell.with_positive(c_max_mol_m3=cell.positive.c_max_mol_m3 * share)
     return replace(cell, nominal_capacity_ah=model.cell.nominal_capacity_ah)
+
+
+def usual_share(model: Model, x: Array) -> float:
+    """Capacity of the records near the reference temperature over the largest of any: that of the file.
+
+    A slow discharge gives more than a drive of the same cell does, and drives are what a file is used for: the mean of
+    the logarithms by rows.
+    """
+    logs, rows = [], []
+    for i, record in enumerate(model.records):
+        kelvin = model.cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin
+        if abs(kelvin - model.cell.reference_temperature_k) <= SPAN_K:
+            logs.append(AGEING_SD * float(x[model.layout.age(i)]))
+            rows.append(float(record.trusted.sum()))
+    return float(np.exp(np.average(logs, weights=rows))) if logs else 1.0
 
 
 def _declared_errors(cell: Cell, model: Model) -> list[float]:

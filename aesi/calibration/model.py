@@ -19,8 +19,8 @@ SOLID_ORDER = 8
 MOST_STEPS = 4
 ERROR_V = 5e-3
 """What a calibrated single-particle model is expected to miss."""
-INDEPENDENT = 200
-"""Rows of a record that say something of their own: what a model misses stays the same over many."""
+REPEATS = 10
+"""Rows over which what a model misses stays the same: that many say one thing."""
 OUTLIER_V = 0.015
 """Beyond this an error counts by its size and no longer by its square (pseudo-Huber)."""
 AGEING_SD = 0.03
@@ -74,9 +74,7 @@ class Model:
         self.cell, self.records, self.free, self.shapes = cell, records, free, shapes
         self.layout = WorkingVector(len(free), shapes.n_ocp, shapes.n_entropic, len(records))
         self.zero_a = ZERO_SHARE * max(float(np.abs(r.data.current_a).max()) for r in records)
-        self.weights = [
-            min(1.0, INDEPENDENT / len(r.rows)) ** 0.5 / ERROR_V * r.trusted.astype(float) for r in records
-        ]
+        self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
         ages = [self.layout.age(i) for i in range(len(records))]

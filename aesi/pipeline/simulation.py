@@ -13,8 +13,9 @@ from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
-from aesi.physics import Cell, InitialState, ModelName, initial_state, simulate
+from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.effects import activated
+from aesi.physics.effects.self_heating import of_file
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -39,6 +40,7 @@ def simulate_file(
     reading: Reading | None = None,
     say_notes: SayNotes | None = None,
     model: ModelName | None = None,
+    self_heating: bool = False,
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
@@ -47,6 +49,7 @@ def simulate_file(
     hold : None takes straight lines for a profile alone, and what `assumed_hold` says for a measurement.
     say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
     model : "espm" or "dfn"; None takes that of a saved model, else "espm".
+    self_heating : the cell warms itself, by the thermal data of its file.
     Raises DataError where a measurement cannot be of this cell.
     """
     say = say_notes or _silent
@@ -54,6 +57,8 @@ def simulate_file(
     say(profile.notes)
     declared = declared_model(cell)
     active = (*declared.effects, *activated(effects, effect_files))
+    if self_heating:
+        active = warmed(declared.cell, active)
     record = _record(profile, current, hold)
     taken = hold or ("linear" if profile.voltage_v is None else assumed_hold(profile.time_s))
     check_belongs(declared.cell, [record])
@@ -84,6 +89,7 @@ def predict_file(
     hold: Hold | None = None,
     reading: Reading | None = None,
     say_notes: SayNotes | None = None,
+    self_heating: bool = False,
 ) -> int:
     """Predict the voltage of the profile in `current`, write it with its band to `out`; the number of rows.
 
@@ -97,6 +103,8 @@ def predict_file(
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
     saved = HybridModel.load(model)
     hybrid = replace(saved, hold=hold or saved.hold)
+    if self_heating:
+        hybrid = replace(hybrid, effects=warmed(hybrid.cell, hybrid.effects))
     record = _record(profile, current, hold)
     check_belongs(hybrid.cell, [record])
     start = _start(hybrid, record, soc0)
@@ -154,6 +162,11 @@ def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> li
             f"measured voltage; it is {width:.1f} mV wide in the mean."
         )
     return said
+
+
+def warmed(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[ActiveEffect, ...]:
+    """The effects with self-heating by the cell file's thermal data, where it is not among them already."""
+    return effects if any(e.id == "self_heating" for e in effects) else (*effects, of_file(cell))
 
 
 def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> None:

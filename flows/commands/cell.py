@@ -23,6 +23,7 @@ def simulate(
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
     model: options.ModelOption = None,
+    self_heating: options.SelfHeating = False,
 ) -> None:
     """The physics model alone, under a current profile."""
     from aesi.pipeline.simulation import simulate_file
@@ -38,6 +39,7 @@ def simulate(
         reading=reading,
         say_notes=options.say_notes,
         model=model,
+        self_heating=self_heating,
     )
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
     typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)
@@ -55,6 +57,7 @@ def predict(
     ] = False,
     soc0: options.Soc0 = None,
     hold: options.HoldOption = None,
+    self_heating: options.SelfHeating = False,
 ) -> None:
     """A saved hybrid model with its intervals."""
     from aesi.pipeline.simulation import predict_file
@@ -68,6 +71,7 @@ def predict(
         hold=hold,
         reading=reading,
         say_notes=options.say_notes,
+        self_heating=self_heating,
     )
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)

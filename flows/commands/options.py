@@ -36,6 +36,14 @@ HoldOption = Annotated[
     ),
 ]
 
+SelfHeating = Annotated[
+    bool,
+    typer.Option(
+        "--self-heating",
+        help="Let the cell warm itself, by its file's thermal data; a measured temperature is used as it is.",
+    ),
+]
+
 ModelOption = Annotated[
     Literal["espm", "dfn"] | None,
     typer.Option("--model", help="Single particle (espm, the default) or porous electrode (dfn)."),

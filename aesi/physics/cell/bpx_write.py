@@ -8,6 +8,7 @@ from aesi.physics.cell.parts import (
     CONTACT_RESISTANCE,
     FILM_ENERGY,
     FILM_RESISTANCE,
+    HEAT_TRANSFER,
     CellParameters,
     Electrode,
 )
@@ -62,13 +63,16 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
         own[FILM_ENERGY] = cell.film_ea_j_mol
     if any(own.values()):
         parts["User-defined"] = {name: value for name, value in own.items() if value}
+    surroundings = {"Ambient temperature [K]": cell.ambient_temperature_k}
+    if cell.heat_transfer_w_m2_k is not None:
+        surroundings[HEAT_TRANSFER] = cell.heat_transfer_w_m2_k
     state = {
         "Initial conditions": {
             "Initial state-of-charge": 1.0,
             "Initial temperature [K]": cell.initial_temperature_k,
             "Initial electrolyte concentration [mol.m-3]": electrolyte.c0_mol_m3,
         },
-        "Thermal environment": {"Ambient temperature [K]": cell.ambient_temperature_k},
+        "Thermal environment": surroundings,
     }
     return {"Header": header, "Parameterisation": parts, "State": state}
 

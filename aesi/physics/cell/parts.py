@@ -18,6 +18,7 @@ from aesi.physics.cell.relations import Constant, Relation
 NO_ENTROPY = Constant(0.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
+HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FILM_RESISTANCE = "Film resistance [Ohm]"
 FILM_ENERGY = "Film resistance activation energy [J.mol-1]"
 
@@ -104,6 +105,7 @@ class CellParameters:
     specific_heat_j_kg_k: float | None = None
     volume_m3: float | None = None
     surface_area_m2: float | None = None
+    heat_transfer_w_m2_k: float | None = None
     contact_resistance_ohm: float = 0.0
     film_resistance_ohm: float = 0.0
     film_ea_j_mol: float = 0.0
@@ -126,6 +128,13 @@ class CellParameters:
         """Charge between the stoichiometry limits of the negative electrode."""
         window = self.negative.theta_max - self.negative.theta_min
         return window * self.electrode_capacity_ah(self.negative)
+
+    @property
+    def conductance_w_k(self) -> float | None:
+        """To the surroundings: heat transfer coefficient times surface, or None where one is not declared."""
+        if self.heat_transfer_w_m2_k is None or self.surface_area_m2 is None:
+            return None
+        return self.heat_transfer_w_m2_k * self.surface_area_m2
 
     @property
     def heat_capacity_j_k(self) -> float | None:

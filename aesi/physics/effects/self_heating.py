@@ -15,7 +15,8 @@ from dataclasses import replace
 
 from aesi.errors import CellError
 from aesi.parameters import Parameter
-from aesi.physics.effect import Effect
+from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.model import EspmModel, HeatBalance
 
 PARAMETERS = {
@@ -49,6 +50,17 @@ def warm(model: EspmModel, *, heat_transfer_w_k: float, heat_capacity_factor: fl
             "'Volume [m3]' in the cell file."
         )
     return replace(model, heat=HeatBalance(declared * heat_capacity_factor, heat_transfer_w_k))
+
+
+def of_file(cell: Cell) -> ActiveEffect:
+    """The effect with the thermal data of the cell's file; a conductance that it does not declare is typical.
+
+    Raises CellError where the file has no heat capacity.
+    """
+    conductance = cell.conductance_w_k
+    active = EFFECT.activate(**({} if conductance is None else {"heat_transfer_w_k": conductance}))
+    warm(EspmModel(cell), **active.parameters)
+    return active
 
 
 EFFECT = Effect(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -66,7 +66,6 @@ class InverseProblem:
     fixed: tuple[ActiveEffect, ...] = ()
     trust: Trust = "tight"
     reduction: ReductionError | None = None
-    known: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     def competing(self) -> tuple[str, ...]:
         """Ids of the effects that may be named: not those that only take back an approximation of the model."""

@@ -5,7 +5,6 @@ Thresholds are in one place, `Thresholds`, each with the command that measured i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -137,18 +136,3 @@ def look_alikes(path: Path, thresholds: Thresholds) -> tuple[tuple[tuple[str, ..
         if alike:
             groups.append((name, *(other for _, other in alike[: GROUP_SIZE - 1])))
     return tuple(groups), float(min(margin, 50.0))
-
-
-def all_needed(path: Path, fit: Explanation, least_nats: float) -> bool:
-    """Does every effect say more than the hypothesis without it, as far as that was tried?"""
-    tried: dict[frozenset[str], Explanation] = {frozenset(e.hypothesis): e for e in path.explanations()}
-    for name in fit.hypothesis:
-        without = tried.get(frozenset(set(fit.hypothesis) - {name}))
-        if without is not None and fit.score.total - without.score.total < least_nats:
-            return False
-    return True
-
-
-def ranked(explanations: Sequence[Explanation]) -> list[Explanation]:
-    """Best first."""
-    return sorted(explanations, key=lambda e: -e.score.total)

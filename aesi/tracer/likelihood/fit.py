@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -12,7 +12,7 @@ from aesi.numerics.bounded import descend
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
-from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
+from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
     PredictiveScore,
@@ -42,7 +42,6 @@ class FittedHypothesis:
     point: Linearised
     score: PredictiveScore
     simulations: int = 0
-    reference: ValuesByOwner = field(default_factory=dict)
 
     @property
     def values(self) -> dict[str, dict[str, float]]:

@@ -15,8 +15,8 @@ from flows.base.interrupt import ending_soon_on_interrupt
 deaf = "import signal, time; signal.signal(2, signal.SIG_IGN); time.sleep(60)"
 child = subprocess.Popen([sys.executable, "-c", deaf])
 with ending_soon_on_interrupt():
-    print(child.pid, flush=True)
     try:
+        print(child.pid, flush=True)
         time.sleep(60)
     finally:
         print("closing", flush=True)

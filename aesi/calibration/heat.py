@@ -1,0 +1,119 @@
+"""Heat capacity and conductance of a cell, from the temperature measured on its case.
+
+    C dT/dt = I (U - V) - I T dU/dT - G (T - T_amb)      I > 0 on discharge; V as measured, U of the calibrated cell
+
+Leaves out gradients between core and case. The surroundings are those of each record, within `AMBIENT_SD_K` of where
+the cell starts.
+
+Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from aesi.calibration.records import Prepared
+from aesi.constants import ZERO_CELSIUS_K
+from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell
+from aesi.physics.simulation import simulate
+
+LEAST_RISE_K = 2.0
+AMBIENT_SD_K = 0.5
+READING_K = 0.3
+TYPICAL_W_K = 0.1
+
+
+@dataclass(frozen=True)
+class HeatFit:
+    """Heat capacity (J/K), conductance to the surroundings (W/K), and what is left of the temperatures (K)."""
+
+    heat_capacity_j_k: float
+    conductance_w_k: float
+    rmse_k: float
+    records: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """For a reader."""
+        return (
+            f"heat: {self.heat_capacity_j_k:.3g} J/K and {self.conductance_w_k:.3g} W/K follow the measured "
+            f"temperature of {', '.join(self.records)} within {self.rmse_k:.2f} K; they are in the file."
+        )
+
+
+def with_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str, ...]]:
+    """The cell with its thermal data fitted, and a sentence; as it is where no record warms or it has no volume."""
+    warming = [r for r in records if r.kelvin is not None and float(np.ptp(r.kelvin)) > LEAST_RISE_K]
+    declared = cell.heat_capacity_j_k
+    if not warming or declared is None or cell.surface_area_m2 is None or cell.specific_heat_j_kg_k is None:
+        return cell, ()
+    fit = fitted(cell, warming, declared)
+    changed = replace(
+        cell,
+        specific_heat_j_kg_k=cell.specific_heat_j_kg_k * fit.heat_capacity_j_k / declared,
+        heat_transfer_w_m2_k=fit.conductance_w_k / cell.surface_area_m2,
+    )
+    return changed, (fit.sentence,)
+
+
+def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float) -> HeatFit:
+    """Least squares over all records."""
+    driven = [(r, heat_w(cell, r)) for r in records]
+
+    def off(z: Array) -> Array:
+        capacity, conductance = start_j_k * np.exp(z[0]), TYPICAL_W_K * np.exp(z[1])
+        parts = []
+        for (record, watts), shift in zip(driven, z[2:], strict=True):
+            assert record.kelvin is not None
+            ambient = record.kelvin[0] + AMBIENT_SD_K * shift
+            course = temperature_k(
+                record.rows.time_s, watts, record.kelvin[0], ambient, capacity, conductance
+            )
+            parts.append((course - record.kelvin) / READING_K / len(course) ** 0.5)
+        return np.concatenate([*parts, 0.1 * z[2:]])
+
+    z = least_squares(off, np.zeros(2 + len(driven)), loss="soft_l1").x
+    rows = sum(len(watts) for _, watts in driven)
+    errors = off(z)[:rows]
+    counts = np.concatenate([np.full(len(w), len(w) ** 0.5) for _, w in driven])
+    rmse = float(np.sqrt(np.mean((errors * counts * READING_K) ** 2)))
+    return HeatFit(
+        float(start_j_k * np.exp(z[0])),
+        float(TYPICAL_W_K * np.exp(z[1])),
+        rmse,
+        tuple(r.name for r, _ in driven),
+    )
+
+
+def heat_w(cell: Cell, record: Prepared) -> Array:
+    """(rows,) W released by the cell: from the voltage as measured and the open-circuit voltage of the mean state."""
+    rows = record.rows
+    assert record.kelvin is not None
+    run = simulate(
+        cell, rows.time_s, rows.current_a, record.start.soc, (), record.kelvin - ZERO_CELSIUS_K, record.hold,
+        on_depletion="clip",
+    )  # fmt: skip
+    soc = np.clip(run.series["soc"], 0.0, 1.0)
+    theta_n, theta_p = cell.stoichiometries(soc)  # type: ignore[arg-type]
+    entropic = cell.positive.entropic(np.asarray(theta_p)) - cell.negative.entropic(np.asarray(theta_n))
+    rise = record.kelvin - cell.reference_temperature_k
+    open_circuit = cell.rest_voltage_v(soc) + rise * entropic
+    return rows.current_a * (open_circuit - rows.voltage_v - record.kelvin * entropic)
+
+
+def temperature_k(
+    time_s: Array, watts: Array, start_k: float, ambient_k: float, capacity_j_k: float, conductance_w_k: float
+) -> Array:
+    """(n,) K of one lump, exact for heat that is constant since the row before."""
+    out = np.empty_like(time_s)
+    out[0] = start_k
+    decay = np.exp(-conductance_w_k / capacity_j_k * np.diff(time_s))
+    settled = ambient_k + watts[1:] / conductance_w_k
+    for k in range(len(decay)):
+        out[k + 1] = settled[k] + (out[k] - settled[k]) * decay[k]
+    return out

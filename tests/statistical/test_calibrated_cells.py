@@ -1,0 +1,42 @@
+"""The calibrated cell files come from the command that `experiments/cells/calibrate.sh` names."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.data.catalogue import locate
+from aesi.errors import DataError
+from aesi.physics import Cell, simulate
+
+CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "file", "data"),
+    [
+        ("hg2", "lg_18650hg2", "lg_18650hg2"),
+        ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
+    ],
+)
+def test_the_command_gives_the_file_again(name, file, data, tmp_path):
+    try:
+        records = locate(data, "25degC_c20_ocv").parent.parent.parent
+    except DataError as error:
+        pytest.skip(str(error))
+    environment = os.environ | {"AESI_DATA": str(records)}
+    subprocess.run(["sh", CELLS / "calibrate.sh", name, tmp_path], check=True, env=environment, timeout=3600)
+    shipped, again = (Cell.from_bpx(folder / f"{file}.bpx.json") for folder in (CELLS, tmp_path))
+    time = np.arange(0.0, 2400.0)
+    current = shipped.nominal_capacity_ah * (0.8 + np.sign(np.sin(time / 60.0)))
+    voltages = [
+        simulate(cell, time, current, 0.95, (), degc).voltage_v
+        for cell in (shipped, again)
+        for degc in (25.0, 5.0)
+    ]
+    # Other processors and libraries end a descent elsewhere along what the data leave open.
+    assert np.abs(voltages[0] - voltages[2]).max() < 2e-3
+    assert np.abs(voltages[1] - voltages[3]).max() < 4e-3

@@ -1,0 +1,54 @@
+"""Heat capacity and conductance from the measured case temperature; the switch that uses them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.calibration.heat import fitted, with_heat
+from aesi.calibration.records import prepared
+from aesi.errors import CellError
+from aesi.physics import Cell, simulate
+from aesi.physics.effects import CATALOGUE
+from aesi.physics.effects.self_heating import of_file
+from aesi.records import Measurement
+
+NMC = Cell.from_bpx(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json")
+TRUE_W_K, TRUE_FACTOR = 0.7, 1.3
+
+
+@pytest.fixture(scope="module")
+def warming() -> Measurement:
+    time = np.arange(0.0, 3000.0, 2.0)
+    current = np.where(time % 900 < 500, 60.0, -20.0)
+    effect = CATALOGUE["self_heating"].activate(heat_transfer_w_k=TRUE_W_K, heat_capacity_factor=TRUE_FACTOR)
+    run = simulate(NMC, time, current, 0.9, [effect], hold="backward")
+    return Measurement(time, current, run.voltage_v, run.series["temperature_k"] - 273.15, "warming")
+
+
+def test_the_heat_balance_behind_a_temperature_is_found(warming):
+    ready = prepared(NMC, [warming], 0.9)
+    found = fitted(NMC, ready, NMC.heat_capacity_j_k)
+    assert found.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.15)
+    assert found.heat_capacity_j_k == pytest.approx(TRUE_FACTOR * NMC.heat_capacity_j_k, rel=0.15)
+    assert found.rmse_k < 0.3
+
+
+def test_it_goes_into_the_file_and_comes_back(warming):
+    cell, notes = with_heat(NMC, prepared(NMC, [warming], 0.9))
+    again = Cell.from_bpx(cell.to_bpx())
+    assert again.conductance_w_k == pytest.approx(TRUE_W_K, rel=0.15)
+    assert again.heat_capacity_j_k == pytest.approx(cell.heat_capacity_j_k)
+    assert "W/K" in notes[0]
+    assert of_file(again).parameters["heat_transfer_w_k"] == pytest.approx(again.conductance_w_k)
+
+
+def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
+    flat = replace(warming, temperature_degc=np.full(len(warming), 25.0))
+    assert with_heat(NMC, prepared(NMC, [flat], 0.9)) == (NMC, ())
+
+
+def test_a_file_without_thermal_data_is_told_what_it_lacks():
+    with pytest.raises(CellError, match="Specific heat"):
+        of_file(replace(NMC, specific_heat_j_kg_k=None))
