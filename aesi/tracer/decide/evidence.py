@@ -131,21 +131,18 @@ def _with_confidence(verdict: Verdict) -> Verdict:
 def _recalibrated(
     problem: InverseProblem, tight: Path, archive: Archive
 ) -> tuple[InverseProblem, FittedHypothesis] | None:
-    """The declared model with all of its own parameters open; with fewer where that fits better, and none where not
-    even those do better than the declared ones on what they were fitted to."""
+    """The declared model with its own parameters open as far as that carries over: of the fits that do no worse than
+    the declared ones on what they saw, the one that leaves least on parts left out; None where there is none."""
     based = base_of(replace(problem, trust="loose"), archive)
-    tried = (
-        [(tight.problem, tight.base)]
-        if based is None
-        else [(based[0], based[2]), (tight.problem, tight.base)]
-    )
-    best = min(tried, key=lambda one: one[1].rmse_v)
+    loose = [] if based is None else [(based[0], based[2])]
     declared = ModelState(problem)
     errors = [
         (record.thin.voltage_v - declared.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
         for k, record in enumerate(problem.records)
     ]
-    return best if best[1].rmse_v <= float(np.sqrt(np.mean(np.concatenate(errors) ** 2))) else None
+    most = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+    tried = [one for one in (*loose, (tight.problem, tight.base)) if one[1].rmse_v <= most]
+    return min(tried, key=lambda one: left_out_errors(one[0], tight.blocks, one[1]).pooled_v, default=None)
 
 
 def _adopted(
@@ -180,7 +177,8 @@ def _best_carried(
     if recalibrated is not None:
         problem, fit = recalibrated
         other = ModelState.of(problem, fit)
-        basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
+        if range_fault(other) is None:  # what cannot be adopted itself is no yardstick for what can
+            basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
     tried: list[tuple[InverseProblem, FittedHypothesis]] = [
         (path.problem, path.base),
         (path.problem, path.chosen),

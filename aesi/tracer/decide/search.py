@@ -26,8 +26,8 @@ from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
 BASE_STEPS = 8
 REFIT_STEPS = 3
 FINALISTS = 3
-FINALIST_NATS = 15.0
-"""Effects that are fitted with the whole model: at most so many, within so much of the best."""
+"""Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
+before, so what it says of a right effect can be far too little."""
 PROMISING = 9
 """Effects that are grown on a hypothesis with effects: those that say most to first order."""
 BEAM = 2
@@ -254,9 +254,8 @@ def _step(
         if key not in grown or one.score.total > grown[key].score.total:
             grown[key] = one
     ranked = sorted(grown.values(), key=lambda g: -g.score.total)
-    near = [g for g in ranked[:FINALISTS] if ranked[0].score.total - g.score.total < FINALIST_NATS]
     fitted = []
-    for one in near if near and near[0].score.total - best.score.total > ADMITTED_NATS / 2 else ():
+    for one in (g for g in ranked[:FINALISTS] if g.score.total - best.score.total > ADMITTED_NATS / 2):
         fit = _fitted(
             problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, REFIT_STEPS, archive
         )

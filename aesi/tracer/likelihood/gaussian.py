@@ -53,7 +53,7 @@ class BlockSums:
 
 def whitened(problem: InverseProblem, blocks: Blocks, table: Array, delta_v: float) -> tuple[Array, Array]:
     """Columns (n, m) in V, whitened at a size of the model error, and log|C| by rows (n,)."""
-    amplitude = amplitude_v(problem.steepness, delta_v)
+    amplitude = amplitude_v(problem.steepness, delta_v, problem.trust)
     return whiten(table, problem.time_s, blocks.starts[:-1], amplitude, problem.white_v)
 
 

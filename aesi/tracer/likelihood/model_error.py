@@ -1,9 +1,11 @@
 """What the model of a right hypothesis misses: its size in the likelihood, and how likely that size is.
 
-    a(t)**2 = delta**2 (1 + (dU/dz)**2)        dU/dz in V, slope of the open-circuit voltage over state of charge
+    a(t)**2 = delta**2 + zeta**2 (dU/dz)**2        dU/dz in V, slope of the open-circuit voltage over state of charge
 
-A model errs by some voltage and by some state of charge, which shows where the open-circuit voltage is steep. delta
-has a log-normal prior: tight for a cell whose file was measured on it, loose for another of its make.
+A model errs by some voltage, delta, and by some state of charge, zeta, which shows where the open-circuit voltage is
+steep. delta has a log-normal prior: tight for a cell whose file was measured on it, loose for another of its make. zeta
+is delta where the balance of the electrodes is held as declared; where it is free, it takes up errors of charge itself,
+and zeta is no larger than for the cell that was measured.
 """
 
 from __future__ import annotations
@@ -39,6 +41,7 @@ SIZES_V = tuple(float(v) for v in 1e-3 * np.geomspace(0.2, 25.6, 8))
 """Sizes that are tried, a factor of two apart."""
 
 
-def amplitude_v(steepness: Array, delta_v: float) -> Array:
+def amplitude_v(steepness: Array, delta_v: float, trust: Trust) -> Array:
     """(n,) V, standard deviation of the model error in each row."""
-    return delta_v * np.sqrt(1.0 + steepness**2)
+    charge = min(delta_v, PRIORS["tight"].median_v) if trust == "loose" else delta_v
+    return np.sqrt(delta_v**2 + (charge * steepness) ** 2)
