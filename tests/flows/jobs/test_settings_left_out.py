@@ -35,7 +35,14 @@ FULL = {
         "duplicates": None,
         "virtual": VIRTUAL,
     },
-    "cell": {"bpx": "", "soc0": None, "effects": {}, "effect_files": [], "start": "declared", "model": "espm"},
+    "cell": {
+        "bpx": "",
+        "soc0": None,
+        "effects": {},
+        "effect_files": [],
+        "start": "declared",
+        "model": "espm",
+    },
     "fallback": None,
     "library": {
         "p_c": [0, 1],
