@@ -25,7 +25,7 @@ from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
 
 BASE_STEPS = 8
 REFIT_STEPS = 3
-FINALISTS = 3
+FINALISTS = 6
 """Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
 before, so what it says of a right effect can be far too little."""
 PROMISING = 9
