@@ -14,7 +14,7 @@ from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.evaluate import EvaluatedModels
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
-from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES
+from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import tables, write_figures, write_run_report
@@ -149,6 +149,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
         mlflow_run_id=result.run_id,
         seconds=result.seconds,
+        corrected=RECALIBRATED if result.loaded.config.cell.start == "recalibrated" else DECLARED,
         fallback=result.loaded.fallback,
     )
 

@@ -38,7 +38,7 @@ def paper_figures(view: RunView) -> dict[str, Figure]:
     figures |= before_and_after_maps(view)
     for role in ROLES:
         if view.of(role):
-            figures[f"voltage_{role}"] = records.voltage_figure(view.of(role), view.chosen, view.physics)
+            figures[f"voltage_{role}"] = records.voltage_figure(view.of(role), view.chosen, view.corrected)
     figures["violin"] = violin(view)
     figures["ranking"] = ensemble.importance_figure(view.terms)
     for i, model in enumerate(predicted_models(view), start=1):
@@ -57,7 +57,7 @@ def physics_maps(view: RunView) -> dict[str, Figure | None]:
     names = {"train": "training set", "valid": "validation set", "test": "test set"}
     return {
         f"error_map_espm_{role}": maps.map_figure(
-            current, soc, error, f"Error of the {view.physics}, {names[role]}", False, limit
+            current, soc, error, f"Error of the {view.corrected}, {names[role]}", False, limit
         )
         for role, (current, soc, error) in parts.items()
     }
@@ -72,7 +72,7 @@ def before_and_after_maps(view: RunView) -> dict[str, Figure | None]:
     after = np.concatenate([t.measured_v - t.predictions[view.chosen].free_run_v for t in tested])
     limit = maps.shared_limit(current, soc, [before, after], True)
     return {
-        "error_map_before": maps.map_figure(current, soc, before, f"{view.physics}, test set", True, limit),
+        "error_map_before": maps.map_figure(current, soc, before, f"{view.corrected}, test set", True, limit),
         "error_map_after": maps.map_figure(
             current, soc, after, f"{view.chosen} in free run, test set", True, limit
         ),
@@ -84,17 +84,17 @@ def violin(view: RunView) -> Figure | None:
     tested = view.of("test")
     if not tested:
         return None
-    residuals = {view.physics: _joined(tested)[2]}
+    residuals = {view.corrected: _joined(tested)[2]}
     for name in predicted_models(view):
         parts = [t.measured_v - t.predictions[name].free_run_v for t in tested if name in t.predictions]
         residuals[name] = np.concatenate(parts)
-    return maps.violin_figure(residuals, style.model_colours(list(residuals), view.physics))
+    return maps.violin_figure(residuals, style.model_colours(list(residuals), view.corrected))
 
 
 def predicted_models(view: RunView) -> list[str]:
     """Names of the hybrid models that predicted the test records, the chosen one first."""
     names = dict.fromkeys(name for trace in view.of("test") for name in trace.predictions)
-    names.pop(view.physics, None)
+    names.pop(view.corrected, None)
     return sorted(names, key=lambda name: name != view.chosen)
 
 

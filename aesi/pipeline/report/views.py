@@ -66,7 +66,8 @@ class BootstrapView:
 class RunView:
     """Everything the report of a run shows.
 
-    models : rows of summary.json (see `aesi.pipeline.report.tables`); `chosen` and `physics` name two of them.
+    models : rows of summary.json (see `aesi.pipeline.report.tables`); `chosen`, `physics` (as declared) and `corrected`
+    (the physics that the correction was learned on, which the traces show) name three of them.
     candidates : rows with oob, valid, terms and, where known, fitness, number, feasible, front, chosen.
     terms : rows with term and, where known, importance (SVD), bagging, stability, inclusion.
     settings : what the search picked (lambda1, lambda2, tau, ...), as text.
@@ -88,6 +89,7 @@ class RunView:
     mlflow_run_id: str = ""
     seconds: float | None = None
     physics: str = "ESPM"
+    corrected: str = "ESPM"
     fallback: str = ""
 
     def of(self, role: Role) -> tuple[RecordTrace, ...]:

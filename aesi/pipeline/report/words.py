@@ -44,6 +44,19 @@ def run_finding(view: RunView) -> str:
     )
 
 
+def corrected_finding(view: RunView) -> str:
+    """What the correction brings beyond the physics that it was learned on, in words; empty where that is declared."""
+    corrected, model = view.model(view.corrected), view.model(view.chosen)
+    before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (corrected, model))
+    if view.corrected in (view.physics, view.chosen) or before is None or after is None:
+        return ""
+    if after < before:
+        return f"The {view.corrected} alone errs by {before:.1f} mV there; the correction takes it to {after:.1f} mV."
+    return (
+        f"The {view.corrected} alone errs by {before:.1f} mV there: the correction does not help beyond it."
+    )
+
+
 def persistence_finding(model: Row) -> str:
     """One step ahead against persistence, in words."""
     ours, echo = (_figure(model, "one_step", key) for key in ("test_rmse_mv", "persistence_rmse_mv"))

@@ -39,8 +39,13 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         finding=words.run_finding(view),
         sentences=[
             sentence
-            for tell in (words.persistence_finding, words.interval_finding, words.outside_finding)
-            if (sentence := tell(chosen))
+            for sentence in (
+                words.corrected_finding(view),
+                words.persistence_finding(chosen),
+                words.interval_finding(chosen),
+                words.outside_finding(chosen),
+            )
+            if sentence
         ],
         tables=tables.all_tables(view.models),
         models=predicted_models(view),

@@ -22,6 +22,18 @@ def test_a_harmful_correction_is_called_harmful(views):
     assert "13.2 mV to 15.7 mV" in text
 
 
+def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_so(views):
+    view = views.run_view(200)
+    row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}
+    learned = replace(view, models=(*view.models, row), corrected="ESPM recalibrated")
+    assert words.corrected_finding(learned) == (
+        "The ESPM recalibrated alone errs by 3.9 mV there: the correction does not help beyond it."
+    )
+    better = replace(learned, models=(*view.models, {**row, "free_run": {"test_rmse_mv": 9.0}}))
+    assert "takes it to 4.1 mV" in words.corrected_finding(better)
+    assert words.corrected_finding(view) == ""
+
+
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
 def test_a_model_that_diverged_has_no_figures_to_tell(views, figures):
     view = views.run_view(200)
