@@ -11,7 +11,7 @@ import numpy as np
 from aesi.data.readers import open_table
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, ComplexArray
-from aesi.physics import Cell, impedance
+from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import activated
 from aesi.pipeline.product.declared import declared_model
@@ -30,15 +30,17 @@ def impedance_file(
     temperature_degc: float = 25.0,
     effects: Sequence[tuple[str, Mapping[str, float]]] = (),
     effect_files: Sequence[Path] = (),
+    model: ModelName | None = None,
 ) -> ComplexArray:
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
 
     cell : a BPX file, or a folder of a saved model, whose effects are taken.  frequencies : LOW:HIGH:N in Hz,
-    log-spaced, or a CSV with a column frequency_hz.
+    log-spaced, or a CSV with a column frequency_hz.  model : "espm" or "dfn"; None takes that of a saved model.
     """
-    model = declared_model(cell)
+    declared = declared_model(cell)
     hz = read_frequencies(frequencies)
-    z = impedance(model.cell, hz, soc, temperature_degc, (*model.effects, *activated(effects, effect_files)))
+    active = (*declared.effects, *activated(effects, effect_files))
+    z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     return z
 
