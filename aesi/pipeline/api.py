@@ -71,17 +71,20 @@ def calibrate(
     soc0: float | None = None,
     temperatures_degc: Mapping[str, float] | None = None,
     hold: Hold | None = None,
+    model: ModelName | None = None,
 ) -> Calibration:
     """Fit the parameters that a cell's file declares to measurements; the fitted cell is `.cell` of what comes back.
 
     cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
     temperatures_degc : of records without a temperature column, by name.
+    model : that is fitted, "espm" or "dfn"; None takes that of a saved model, else "espm".
     Raises AesiError, one sentence, for what cannot be used.
     """
-    declared = declared_model(cell).cell
+    given = declared_model(cell)
+    declared, physics = given.cell, model or given.model
     measurements = [_read(one, None, hold) for one in _listed(data)]
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    return fit_cell(declared, measurements, soc0=soc0, temperatures_degc=temperatures_degc)
+    return fit_cell(declared, measurements, soc0=soc0, temperatures_degc=temperatures_degc, physics=physics)
 
 
 def _listed(records: Data) -> list[FileOrRecord]:

@@ -77,7 +77,10 @@ class SpectrumError:
 
 
 def held_against(
-    cell: Cell, spectra: Sequence[Spectrum], effects: Sequence[ActiveEffect] = ()
+    cell: Cell,
+    spectra: Sequence[Spectrum],
+    effects: Sequence[ActiveEffect] = (),
+    model: ModelName = "espm",
 ) -> tuple[SpectrumError, ...]:
     """Each spectrum beside the cell's; one below empty or above full is left out."""
     out = []
@@ -88,7 +91,7 @@ def held_against(
         if not 0.0 <= soc <= 1.0:
             continue
         degc = 25.0 if spectrum.temperature_degc is None else spectrum.temperature_degc
-        z = impedance(cell, spectrum.frequency_hz, soc, degc, effects)
+        z = impedance(cell, spectrum.frequency_hz, soc, degc, effects, model=model)
         seen = (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
         ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
         out.append(SpectrumError(spectrum, soc, z, float(np.sqrt(np.mean(ratio**2)))))

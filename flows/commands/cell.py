@@ -108,6 +108,7 @@ def calibrate(
     ] = 0,
     title: Annotated[str | None, typer.Option(help="Name of the cell in the file that is written.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the posterior's samples.")] = 0,
+    model: options.ModelOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements of any temperatures together."""
     options.say_reading(data)
@@ -121,6 +122,7 @@ def calibrate(
         posterior=posterior,
         seed=seed,
         title=title,
+        model=model,
     )
     records = options.measurements(data, reading, hold, options.by_file("--until", until))
     flow(cell, records, out, request)

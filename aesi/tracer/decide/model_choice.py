@@ -10,14 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from aesi.physics.simulation import ModelName
+from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.evidence import Evidence
 from aesi.tracer.decide.search import base_of
-
-WORDS: dict[ModelName, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
@@ -45,7 +43,9 @@ def with_model(
     evidence = search(problems[name], kept(problems[name]))
     differ = "" if reduction is None else f"; {reduction.sentence}"
     if wanted is not None:
-        return evidence, ModelChoice(name, f"all hypotheses use {WORDS[name]}, as asked{differ}.", reduction)
+        return evidence, ModelChoice(
+            name, f"all hypotheses use {MODEL_WORDS[name]}, as asked{differ}.", reduction
+        )
     if name == "dfn":
         single = with_fine_numerics(replace(problem, model="espm"))
         other = _better(evidence, problems[name], single, search, kept)
@@ -53,9 +53,9 @@ def with_model(
             ahead = other.path.chosen.score.total - evidence.path.chosen.score.total
             why = f"which explains these data to the noise and says {ahead:.0f} nats more of them"
             return other, ModelChoice(
-                "espm", f"all hypotheses use {WORDS['espm']}, {why}{differ}.", reduction
+                "espm", f"all hypotheses use {MODEL_WORDS['espm']}, {why}{differ}.", reduction
             )
-    return evidence, ModelChoice(name, f"all hypotheses use {WORDS[name]}{differ}.", reduction)
+    return evidence, ModelChoice(name, f"all hypotheses use {MODEL_WORDS[name]}{differ}.", reduction)
 
 
 def _better(
