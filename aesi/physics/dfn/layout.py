@@ -136,6 +136,7 @@ class DfnTrial(NamedTuple):
     give: Array
     y_start: Array
     given_start: Array
+    psi_start: Array
     force: Array
     force_end: Array
     forcing: Array

@@ -8,12 +8,16 @@ from numba import njit
 from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
 from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY
-from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle
+from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
 from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
 from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
 
 TEMPERATURE_STEP_K = 0.01
 """Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
+SHORTER, SHORTEST = 0.25, 0.25**6
+"""Where no reaction is found at the end of a step, a quarter of it is tried, down to the shortest: at the edges of
+potentials, and where one rises with lithium, the end of a long step has several solutions or none in reach."""
+ROUND_OFF = 1e-9
 DIFFUSIONS = (0, 1, 4)
 """Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
 
@@ -37,12 +41,14 @@ def run_porous(  # type: ignore[no-untyped-def]
     weights,
     out,
     profile,
+    salt_profile,
 ):
     """Step all samples; `layout` says what the named tuples hold.
 
     given : the temperature is an input.  theta0 : (2,) at rest.  out : (9, n) voltage, mean surface stoichiometries
     (n, p), c_e0, c_eL, mean stoichiometries (n, p), temperature, plated lithium (mol/m3 of the negative electrode).
     profile : (n or 0, 4, places) surfaces, reaction A/m2 per share, salt over rest, phi_s - phi_e.
+    salt_profile : (n or 0, nodes) mol/m3, from one collector to the other.
     Returns (sample, what) of the first fault: 1, 2 a surface, 3 the salt, 4 no solution.
     """
     half = s.at.shape[0] // 2
@@ -69,9 +75,11 @@ def run_porous(  # type: ignore[no-untyped-def]
             else:
                 settle(p, s, e, state, t, newton, change, total, t_k)
         parts = min(max(1, math.ceil(whole / substep - 1e-9)), most) if k > 0 else 0
-        for part in range(parts):
-            dt = whole / parts
-            share = (part + 1.0) / parts
+        reached, length = 0.0, 1.0  # in parts: of the way between the samples, and of the next step
+        while reached < parts - ROUND_OFF:
+            length = min(length, math.floor(reached + ROUND_OFF) + 1.0 - reached)
+            dt = whole / parts * length
+            share = (reached + length) / parts
             before[0], before[1] = total[0], total[1]
             i1 = current[k] if backward else current[k - 1] + (current[k] - current[k - 1]) * share
             i0 = before[0] * e.area
@@ -103,10 +111,20 @@ def run_porous(  # type: ignore[no-untyped-def]
                 renew(p, s, faster, dt, w, taken, w_salt, spread)
             if e.has_layers:
                 hold_layers(e, state, t, dt, GAS_OVER_FARADAY * t_k)
+            last_try = length <= SHORTEST or fault_at >= 0
             phi_n, phi_p, steps = advance(
-                p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k
-            )
+                p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k,
+                last_try,
+            )  # fmt: skip
+            if steps < 0 and not last_try:
+                take_back(state, t)
+                total[0], total[1] = before[0], before[1]
+                t_k, last_dt = start_k, 0.0
+                length *= SHORTER
+                continue
             last_dt = dt
+            reached += length
+            length = min(2.0 * length, 1.0)
             if steps < 0 and fault_at < 0:
                 fault_at, fault = k, 4
             if e.plating[0] > 0.0:
@@ -133,6 +151,8 @@ def run_porous(  # type: ignore[no-untyped-def]
                 profile[k, 3, r] = state.psi[r]
             for u in range(p.place.shape[0]):
                 profile[k, 0, p.place[u]] += state.theta[u] * p.share[u] / e.node_share[p.place[u]]
+            for i in range(state.c.shape[0]):
+                salt_profile[k, i] = state.c[i]
         if fault_at < 0 or (fault_at == k and fault == 4):
             if not 0.0 <= out[1, k] <= 1.0:
                 fault_at, fault = k, 1

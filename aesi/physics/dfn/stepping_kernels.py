@@ -29,6 +29,17 @@ LARGEST_GROWTH = 4.0
 
 
 @compiled
+def take_back(state, t):  # type: ignore[no-untyped-def]
+    """The start of a step whose end was not found: `commit` alone changes the rest of the state."""
+    for u in range(state.y.shape[0]):
+        state.y[u] = t.y_start[u]
+    for r in range(state.given.shape[0]):
+        state.given[r] = t.given_start[r]
+        state.psi[r] = t.psi_start[r]
+        state.salt[r] = t.salt_before[r]
+
+
+@compiled
 def find_reaction(p, s, e, state, t, newton, spread, total, t_k):  # type: ignore[no-untyped-def]
     """Solve for the reaction, with the conductivity at the salt `t.salt`; returns as `solve_reaction`."""
     half = s.at.shape[0] // 2
@@ -72,11 +83,13 @@ def hold_layers(e, state, t, dt, thermal):  # type: ignore[no-untyped-def]
 
 @compiled
 def advance(  # type: ignore[no-untyped-def]
-    p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k
+    p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k,
+    last_try,
 ):  # fmt: skip
     """One step to the currents `total` (2,), which changed by `change` (2,); temperature t_k at its end.
 
-    last_dt : of the step before, 0 after a jump.  Returns as `solve_reaction`.
+    last_dt : of the step before, 0 after a jump.  last_try : take the step although it solves nothing.
+    Returns as `solve_reaction`.
     """
     predict(p, s, e, state, t, dt, last_dt, taken, change)
     varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
@@ -100,7 +113,8 @@ def advance(  # type: ignore[no-untyped-def]
             settled = end_forces(p, state, t, dt, w) < SURFACE_TOLERANCE and settled
         if settled:
             break
-    commit(p, s, e, state, t, dt, w, change, varies)
+    if steps > 0 or last_try:
+        commit(p, s, e, state, t, dt, w, change, varies)
     return phi_n, phi_p, steps
 
 
@@ -111,6 +125,7 @@ def predict(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-u
     ahead = dt / last_dt if dt < LARGEST_GROWTH * last_dt else 0.0
     for r in range(2 * half):
         t.given_start[r] = state.given[r]
+        t.psi_start[r] = state.psi[r]
         t.salt[r] = state.salt[r] + ahead * (state.salt[r] - t.salt_before[r])
         t.salt_before[r] = state.salt[r]
     for j in range(state.forcing.shape[0]):
