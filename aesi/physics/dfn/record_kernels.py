@@ -7,7 +7,6 @@ from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
-from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
 from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
 from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
@@ -17,6 +16,9 @@ TEMPERATURE_STEP_K = 0.01
 SHORTER, SHORTEST = 0.25, 0.25**6
 """Where no reaction is found at the end of a step, a quarter of it is tried, down to the shortest: at the edges of
 potentials, and where one rises with lithium, the end of a long step has several solutions or none in reach."""
+FIRST_LENGTH = 0.25
+"""Of a step, where double layers meet a current that has turned: whole steps of 1 s between edges of 0.1 s were 0.52 mV
+RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
 ROUND_OFF = 1e-9
 DIFFUSIONS = (0, 1, 4)
 """Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
@@ -57,7 +59,7 @@ def run_porous(  # type: ignore[no-untyped-def]
     t_k, t_weights, t_rates = temperature[0], -1.0, temperature[0]
     set_rates(e, t, t_k)
     watts, last_dt = 0.0, 0.0
-    fault_at, fault = -1, 0
+    slope, fault_at, fault = 0.0, -1, 0
     total[0] = current[0] / e.area
     total[1] = -total[0]
     phi_n, phi_p, steps = settle(p, s, e, state, t, newton, total, total, t_k)
@@ -71,11 +73,18 @@ def run_porous(  # type: ignore[no-untyped-def]
             if e.has_layers:
                 for r in range(2 * half):
                     state.given[r] += e.node_share[r] * change[0 if r < half else 1]
-                    state.layer[r] = 0.0
+                    state.layer[r] += e.node_share[r] * change[0 if r < half else 1]
             else:
                 settle(p, s, e, state, t, newton, change, total, t_k)
         parts = min(max(1, math.ceil(whole / substep - 1e-9)), most) if k > 0 else 0
-        reached, length = 0.0, 1.0  # in parts: of the way between the samples, and of the next step
+        turned = False
+        if e.has_layers and k > 0:
+            slope_before, slope = slope, 0.0 if backward else (current[k] - current[k - 1]) / whole
+            turned = slope != slope_before or (backward and current[k] != current[k - 1])
+        reached, length = (
+            0.0,
+            FIRST_LENGTH if turned else 1.0,
+        )  # in parts: of the way between the samples, and of the next step
         while reached < parts - ROUND_OFF:
             length = min(length, math.floor(reached + ROUND_OFF) + 1.0 - reached)
             dt = whole / parts * length
@@ -110,7 +119,7 @@ def run_porous(  # type: ignore[no-untyped-def]
                 weights.keys[slot] = key
                 renew(p, s, faster, dt, w, taken, w_salt, spread)
             if e.has_layers:
-                hold_layers(e, state, t, dt, GAS_OVER_FARADAY * t_k)
+                hold_layers(e, state, t, newton, dt)
             last_try = length <= SHORTEST or fault_at >= 0
             phi_n, phi_p, steps = advance(
                 p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k,

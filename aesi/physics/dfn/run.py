@@ -113,7 +113,7 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
     trial = DfnTrial(
         calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
         reach=of(units), give=of(units), y_start=of(units), given_start=of(places),
-        psi_start=of(places),
+        psi_start=of(places), y_back=of(units), skew=of(places), lag=of(places),
         force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
         salt_before=np.ones(places), q=of(salt_modes), c=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
         kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),
