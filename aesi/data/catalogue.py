@@ -123,7 +123,7 @@ def list_sets() -> tuple[DataSet, ...]:
     return SETS
 
 
-def listing() -> tuple[str, ...]:
+def catalogue_lines() -> tuple[str, ...]:
     """The catalogue as lines of text, with where each set is on this machine or how to get it."""
     lines: list[str] = []
     for one in SETS:

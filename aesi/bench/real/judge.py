@@ -18,7 +18,7 @@ from aesi.data.catalogue import locate
 from aesi.errors import AesiError, DataError
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.discovery.discover import to_json
+from aesi.pipeline.discovery.discover import discovery_content
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 
@@ -74,7 +74,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
             "named": False,
         }
     else:
-        answer = scored(case.answers, truth, to_json(found)) | {"residual": _residual(found)}
+        answer = scored(case.answers, truth, discovery_content(found)) | {"residual": _residual(found)}
     return row | answer | _spent(began, processor)
 
 

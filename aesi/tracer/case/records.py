@@ -135,7 +135,7 @@ def prepare(
     if uneven or float(np.mean(steps)) < STEADY_SHARE:
         thin, rows = condensed(data, steps, duration / STEADY_SAMPLES)
     else:
-        thin, rows = thinned(data, step_s), None
+        thin, rows = averaged_over(data, step_s), None
     thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
@@ -236,7 +236,7 @@ def prepare_all(
         step *= 2.0
 
 
-def thinned(data: Measurement, step_s: float) -> Measurement:
+def averaged_over(data: Measurement, step_s: float) -> Measurement:
     """At most one sample in `step_s`: centred averages of current, voltage and temperature.
 
     Records sampled more slowly than 0.75 of `step_s` on average are returned as they are.
