@@ -1,6 +1,6 @@
 """`aesi bench splits`: does the hybrid survive another drive? One line a split, and a last one that sums up.
 
-The splits are those of `aesi.bench.splits`; each runs the stages of `aesi run` in this process, untracked.
+The splits are those of `aesi.bench.hybrid.splits`; each runs the stages of `aesi run` in this process, untracked.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.splits import EXPERIMENTS, SplitCase, against, chosen_splits, judged
+from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, against, chosen_splits, judged
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 

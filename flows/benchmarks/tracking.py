@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.ensemble import synthetic_record
+from aesi.bench.hybrid.ensemble import synthetic_record
 from aesi.pipeline.experiment.sections import TrackingConfig
 from aesi.records import INPUT_NAMES, Split
 from aesi.sparse import Genome, Library, Options, Problem, evaluate

@@ -8,12 +8,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.errors import DataError
+from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps
-from aesi.tracer.decide.search import Path, Report, base_of, refitted, searched, with_wrong_parameters
-from aesi.tracer.decide.verdict import Thresholds, Verdict, judged, noise_v, structured_v, tolerance_v
+from aesi.tracer.decide.search import (
+    Path,
+    Report,
+    base_of,
+    refitted,
+    searched,
+    unseen_rmse_v,
+    with_wrong_parameters,
+)
+from aesi.tracer.decide.verdict import (
+    Thresholds,
+    Verdict,
+    beyond,
+    judged,
+    noise_v,
+    structured_v,
+    tolerance_v,
+)
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
@@ -86,13 +103,13 @@ def gathered(
     return _best_carried(path, loose, paths, verdict, recalibrated)
 
 
-def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[..., bool]:
-    def enough(path_blocks: object, fit: FittedHypothesis) -> bool:
-        from aesi.tracer.decide.search import unseen_rmse_v
+def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
+    """Does a hypothesis leave no more on unseen data than a right one may?"""
+    white_v = float(np.sqrt(np.mean(problem.white_v**2)))
+    allowed_v = tolerance_v(white_v, thresholds)
 
-        white = float((problem.white_v**2).mean())
-        left = max(unseen_rmse_v(path_blocks, fit) ** 2 - white, 0.0)  # type: ignore[arg-type]
-        return bool(left**0.5 <= tolerance_v(white**0.5, thresholds))
+    def enough(blocks: Blocks, fit: FittedHypothesis) -> bool:
+        return beyond(unseen_rmse_v(blocks, fit), white_v) <= allowed_v
 
     return enough
 

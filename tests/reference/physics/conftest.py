@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.bench.espm import drive
+from aesi.bench.physics.espm import drive
 from aesi.physics import Cell
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aesi.bench.spci import oracle_series
+from aesi.bench.intervals.spci import oracle_series
 from aesi.conformal import METHODS
 from aesi.conformal.validation import thinned, validation_scores
 

@@ -16,14 +16,14 @@ from time import perf_counter
 import numpy as np
 
 from aesi.bench import CaseRow
-from aesi.bench.espm import STEP_S, drive
+from aesi.bench.physics.espm import STEP_S, drive
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, EspmModel
 from aesi.physics.dfn.run import run_porous_electrode
 from aesi.pipeline.cross_check import DEFAULT_MESH, PybammRun, pybamm_run
 
-CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 SOC0 = 0.95
 KELVIN = {"25 degC": 298.15, "0 degC": 273.15}
 LARGEST_RATE = {"nmc_30ah": 3.0, "lg_m50_chen2020": 2.0}

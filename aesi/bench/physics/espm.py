@@ -15,7 +15,7 @@ from aesi.numerics.typing import Array
 from aesi.physics import Cell, simulate
 from aesi.pipeline.cross_check import DEFAULT_MESH, FINE_MESH, pybamm_run
 
-DEFAULT_CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
+DEFAULT_CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 STEP_S = 0.1
 BREAK_POINT_S = 1.0
 """The current is a straight line between break points, so that the peer can be told where they are."""
