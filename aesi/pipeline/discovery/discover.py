@@ -21,6 +21,7 @@ from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
 from aesi.tracer.report.outcome import Errors, Part, State
+from aesi.tracer.report.own_parameters import OwnParameter
 from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 
 SCHEMA = "aesi.discovery/1"
@@ -132,6 +133,7 @@ def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, A
             }
             for c in found.candidates
         ],
+        "own_parameters": {state: [_own_row(one) for one in rows] for state, rows in found.own.items()},
         "files": _file_rows(found),
         "dependence": _dependence(found),
         "points_to": _pointers(found),
@@ -149,6 +151,18 @@ def _errors(found: Discovery, state: State, part: Part) -> dict[str, float]:
         return {}
     errors = Errors.of(np.concatenate(residuals))
     return {"rmse_mv": MV * errors.rmse_v, "mae_mv": MV * errors.mae_v, "max_mv": MV * errors.max_v}
+
+
+def _own_row(one: OwnParameter) -> dict[str, Any]:
+    return {
+        "effect": one.owner,
+        "parameter": one.name,
+        "declared": one.declared,
+        "value": one.value,
+        "unit": one.unit,
+        "deviations": round(one.deviations, 3),
+        "at_limit": one.at_limit,
+    }
 
 
 def _file_rows(found: Discovery) -> list[dict[str, Any]]:

@@ -52,6 +52,14 @@ def quantity(value: Mapping[str, Any]) -> str:
     return f"{middle}{shown} [{low}, {high}]"
 
 
+def rounded(value: float, unit: str) -> str:
+    """A value with its unit to two digits, in thousandths where it is small: '3.1 mohm'."""
+    factor = 1.0
+    if unit in PREFIXES and abs(value) < SMALL:
+        unit, factor = PREFIXES[unit]
+    return f"{factor * value:.2g} {unit}"
+
+
 def finding_line(discovery: Mapping[str, Any]) -> str:
     """The verdict in one line, with what was found and how much of it; a confidence where it belongs to a name."""
     effects = [with_size(effect, discovery) for effect in discovery["effects"]]
