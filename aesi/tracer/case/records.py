@@ -42,6 +42,7 @@ class PreparedRecord:
     data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
     fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of charge
     and what it is uncertain by.  seen_rows : rows at the start that only lead to what is judged.
+    soc0_doubt : how far the voltage's own reading is from a state of charge that was given.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
     the white noise in each row of `thin`.  noise_full_v : of that in `data`.
     """
@@ -58,6 +59,7 @@ class PreparedRecord:
     noise_full_v: float
     rest_voltage_v: float | None = None
     basis: Basis = "rest"
+    soc0_doubt: float = 0.0
     seen_rows: int = 0
     notes: tuple[str, ...] = ()
 
@@ -161,6 +163,7 @@ def prepare(
         noise_full,
         start.rest_voltage_v,
         start.basis,
+        start.doubt,
         notes=notes,
     )
 
