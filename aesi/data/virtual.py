@@ -6,7 +6,7 @@ extended single-particle model does not know; `DEFAULT_MIX` is what it has unles
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -148,10 +148,3 @@ def _declared(bpx: Path, name: str) -> float:
         raise DataError(f"The cell file {bpx} cannot be opened: {error.strerror}.") from None
     except (ValueError, KeyError, TypeError) as error:
         raise DataError(f"{bpx.name} states no {name!r} ({error}).") from None
-
-
-def covers_range(train: Sequence[Array], test: Sequence[Array]) -> bool:
-    """Whether the range of the training arrays contains that of every test array."""
-    low = min(float(a.min()) for a in train)
-    high = max(float(a.max()) for a in train)
-    return all(low <= float(a.min()) and float(a.max()) <= high for a in test)

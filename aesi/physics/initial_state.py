@@ -131,13 +131,6 @@ def _given(record: Measurement, soc0: float, other: InitialState | None) -> Init
     return InitialState(soc0, GIVEN_SD, "given", words + ".", other is not None)
 
 
-def initial_states(
-    cell: Cell, records: Sequence[Measurement], soc0: float | None = None, hold: Hold = "backward"
-) -> tuple[InitialState, ...]:
-    """`initial_state` of several records of one cell; `soc0`, where given, is meant for all of them."""
-    return tuple(initial_state(cell, r, soc0, hold, shared=len(records) > 1) for r in records)
-
-
 class _Start:
     """The start of one record, against one cell."""
 
