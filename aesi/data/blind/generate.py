@@ -27,6 +27,8 @@ COARSE_POINTS = 15
 """Radial points of the runs that find the size of an effect, always with the single particle: the error of mesh and
 model cancels in a difference to within what `CLOSE_ENOUGH` allows."""
 CLOSE_ENOUGH = 0.2
+"""An effect is scaled until it moves the voltage by the size asked for, to within this share of it, in MOST_TRIES at
+most."""
 MOST_TRIES = 4
 SHOWN = 0.6
 """Of the target, that an effect has to move the voltage by at least."""

@@ -15,8 +15,10 @@ SCHEMA = "aesi.comparison/1"
 BLOCK_S = 60.0
 """Errors forget each other within about this time; whole blocks of it are drawn again."""
 DRAWS = 1000
+"""Block-bootstrap resamples: the ends of a 90 % interval are then known to about a percentile."""
 LEVEL_PCT = 90.0
 BINS = 16
+"""Of current and of state of charge."""
 MILLIVOLT_PER_VOLT = 1e3
 
 

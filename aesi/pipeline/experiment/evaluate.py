@@ -26,6 +26,7 @@ from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
 
 MILLIVOLT_PER_VOLT = 1e3
 HORIZONS_S = (1.0, 10.0, 60.0)
+"""A sample, a manoeuvre, a minute: those of the tables."""
 
 
 @dataclass(frozen=True, eq=False)
