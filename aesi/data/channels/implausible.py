@@ -42,8 +42,8 @@ SHORT_RECORD_S = 200.0
 
 
 def check_scale(columns: Columns, context: Context) -> None:
-    """Refuse a current in mA and a time in ms, hours or minutes: the charge that would have moved, the resistance and the
-    rate of change of the voltage would be those of no cell."""
+    """Refuse a current in mA and a time in ms, hours or minutes: the charge that would have moved, the resistance and
+    the rate of change of the voltage would be those of no cell."""
     time, current = columns["time_s"], columns["current_a"]
     charge = np.concatenate([[0.0], np.cumsum(current[1:] * np.diff(time))]) / SECONDS_PER_HOUR
     moved = float(np.ptp(charge))
@@ -75,8 +75,8 @@ def check_scale(columns: Columns, context: Context) -> None:
 
 
 def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> None:
-    """Refuse a current without its sign: one that only discharges (or charges), while the voltage also answers as to the
-    other direction."""
+    """Refuse a current without its sign: one that only discharges (or charges), while the voltage also answers as to
+    the other direction."""
     current = columns["current_a"]
     largest = float(np.max(np.abs(current)))
     if largest == 0 or (np.min(current) < -SMALL_SHARE * largest and np.max(current) > SMALL_SHARE * largest):
