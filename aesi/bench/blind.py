@@ -26,6 +26,7 @@ from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 
 LIMIT_S = 180.0
+"""Processor time of a case, after which it counts as not answered."""
 
 
 def chosen(

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.discovery.discover import ARCHIVE, MV_PER_V, Case, run_case, write_discovery
+from aesi.constants import MV_PER_V
+from aesi.pipeline.discovery.discover import ARCHIVE, Case, run_case, write_discovery
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
 from flows.base import environment

@@ -29,8 +29,11 @@ from aesi.sparse import Genome, Options, Problem, evaluate
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 
 ALPHA = 0.1
+"""Bands for 90 %."""
 HORIZONS_S = (1.0, 10.0, 60.0)
+"""Those of the tables of a run."""
 OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
+"""Those of the experiment on the measured drive."""
 RIDGE, THRESHOLD = 10.0, 1e-3
 
 

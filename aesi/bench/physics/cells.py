@@ -151,6 +151,7 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
 
 
 NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
+"""As the makers state them, for cell files of another size of the same chemistry."""
 
 
 def rmse_mv(cell: Cell, data: Measurement) -> float:
