@@ -21,7 +21,7 @@ from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, plan, small_plan
 from aesi.errors import AesiError
 from aesi.physics import Cell
-from aesi.pipeline.discovery.discover import to_json
+from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 
 MV = 1e3
@@ -72,7 +72,7 @@ def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
     try:
         with processor_limit(limit_s):
             found = discover(Cell.from_bpx(case.declared), case.measurements, soc0=case.soc0)
-            content = to_json(found)
+            content = discovery_content(found)
     except AesiError as error:
         row |= {"verdict": "error", "error": str(error)}
     except OutOfTime:

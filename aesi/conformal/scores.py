@@ -40,7 +40,7 @@ class Scores:
     low_minutes: float
 
 
-def score(
+def scores_of(
     intervals: Intervals,
     residuals: Array,
     alpha: float,

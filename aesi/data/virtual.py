@@ -6,7 +6,7 @@ extended single-particle model does not know; `DEFAULT_MIX` is what it has unles
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from aesi.data.laboratory.changes import find_change
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, run
+from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, simulate_truth
 from aesi.data.profiles.profile import OTHER_LOAD, PULSE_C, Profile, paper_profiles
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -81,7 +81,7 @@ class Laboratory:
         mix = ", ".join(self.effects) or "nothing added"
         note = f"{profile.name}: virtual, {self.model} of {self.bpx.name} with {mix}; seed {self.seed}."
         warm = "self_heating" in self.effects
-        trace = run(self.setup(), profile)
+        trace = simulate_truth(self.setup(), profile)
         notes = (note, *self._outside(profile.name, trace.voltage_v))
         return self.instrument.write(trace, profile.name, rng, warm, notes)
 
@@ -148,10 +148,3 @@ def _declared(bpx: Path, name: str) -> float:
         raise DataError(f"The cell file {bpx} cannot be opened: {error.strerror}.") from None
     except (ValueError, KeyError, TypeError) as error:
         raise DataError(f"{bpx.name} states no {name!r} ({error}).") from None
-
-
-def spans(train: Sequence[Array], test: Sequence[Array]) -> bool:
-    """Whether the range of the training arrays contains that of every test array."""
-    low = min(float(a.min()) for a in train)
-    high = max(float(a.max()) for a in train)
-    return all(low <= float(a.min()) and float(a.max()) <= high for a in test)

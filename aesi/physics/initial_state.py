@@ -15,7 +15,7 @@ A voltage is as good as the open-circuit potentials, so that a flat potential gi
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -70,6 +70,7 @@ class InitialState:
 
     basis : what it rests on.  sentence : the same for a reader, with the figures.  contradicted : True where a given
     state of charge is far from that of the voltage.  rest_voltage_v : at which the cell rests there, as read.
+    doubt : how far the reading of the voltage is from what was given.
     """
 
     soc: float
@@ -78,6 +79,7 @@ class InitialState:
     sentence: str
     contradicted: bool = False
     rest_voltage_v: float | None = None
+    doubt: float = 0.0
 
 
 def initial_state(
@@ -109,8 +111,10 @@ def initial_state(
             return _given(record, soc0, None)
         allowed = OTHER_STATE if read.basis in ("rest", "full charge") else OTHER_STATE_LOADED
         if abs(read.soc - soc0) <= allowed + 2.0 * read.sd:
-            return _given(record, soc0, None)
-        return read_instead(record, read, soc0) if shared else _given(record, soc0, read)
+            return replace(_given(record, soc0, None), doubt=abs(read.soc - soc0))
+        if shared:
+            return read_instead(record, read, soc0)
+        return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
     return start.read()
 
 
@@ -125,13 +129,6 @@ def _given(record: Measurement, soc0: float, other: InitialState | None) -> Init
     if other is not None:
         words += f"; its first voltage ({record.voltage_v[0]:.3f} V) rather says {other.soc:.3f}"
     return InitialState(soc0, GIVEN_SD, "given", words + ".", other is not None)
-
-
-def initial_states(
-    cell: Cell, records: Sequence[Measurement], soc0: float | None = None, hold: Hold = "backward"
-) -> tuple[InitialState, ...]:
-    """`initial_state` of several records of one cell; `soc0`, where given, is meant for all of them."""
-    return tuple(initial_state(cell, r, soc0, hold, shared=len(records) > 1) for r in records)
 
 
 class _Start:

@@ -60,7 +60,7 @@ def calibrate_files(
         found = replace(found, cell=replace(found.cell, name=asked.title, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra = held_against(found.cell, asked.impedance)
-    content = to_json(found, [note for m in measurements for note in m.notes], posterior, spectra)
+    content = calibration_content(found, [note for m in measurements for note in m.notes], posterior, spectra)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
     report = out.with_suffix(".report.json")
@@ -78,7 +78,7 @@ def _made_from(found: Calibration) -> str:
     return f"Fitted by aesi calibrate to {records}, from {found.declared.name}."
 
 
-def to_json(
+def calibration_content(
     found: Calibration,
     read: Sequence[str] = (),
     posterior: PosteriorSamples | None = None,

@@ -27,7 +27,7 @@ from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
 from aesi.tracer.report.outcome import FileOutcome, State, States, outcomes, test_rmse_v
 from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
-from aesi.tracer.report.tell_apart import experiment
+from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.yardstick import Yardstick, measure
 
 
@@ -191,7 +191,7 @@ def _told(
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,
-        experiments=tuple((g, experiment(g, problem.effects)) for g in verdict.groups),
+        experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         notes=_notes(evidence, tested),
         warnings=_warnings(files),
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},

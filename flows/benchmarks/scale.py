@@ -44,7 +44,7 @@ def run(
     from aesi.pipeline.experiment.load import load
     from flows.base import environment
 
-    environment.prepare()
+    environment.prepare_process()
     config = read_experiment(experiment, overrides)
     problem = build_problem(load(config), config)
     genomes = _genomes(problem, candidates)

@@ -122,7 +122,7 @@ def _workspace() -> Iterator[None]:
     before = os.environ.get("AESI_HOME")
     with tempfile.TemporaryDirectory(prefix="aesi-bench-") as folder:
         os.environ["AESI_HOME"] = folder
-        environment.prepare()
+        environment.prepare_process()
         try:
             yield
         finally:

@@ -22,7 +22,7 @@ from aesi.data.spectra import read_spectra
 from aesi.errors import AesiError, DataError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
-from aesi.pipeline.discovery.discover import to_json
+from aesi.pipeline.discovery.discover import discovery_content
 from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
 
@@ -77,7 +77,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
             "named": False,
         }
     else:
-        answer = _held_against(case, known, found, to_json(found), data, declared, soc0)
+        answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
     return row | answer | _spent(began, processor)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -76,10 +76,6 @@ class Method(ABC):
     @abstractmethod
     def band(self, data: CalibrationData) -> tuple[Band, Scale]:
         """The raw band, and the factor on its half-width that calibrates it."""
-
-    def adaptive(self, rate: float) -> Method:
-        """The same method with another rate of the adaptive step."""
-        return replace(self, rate=rate)
 
 
 def marginal_interval(records: Sequence[Array], alpha: float) -> tuple[float, float]:

@@ -40,7 +40,7 @@ def move(log_ratio: Array, group: int, missed: bool, rate: float, alpha: float) 
 
 
 @njit(cache=True)
-def scaled(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float]:
+def scaled_band(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float]:
     """The raw band scaled by r about its middle, at least `floor` wide."""
     middle = 0.5 * (low + high)
     half = 0.5 * max(abs(high - low), floor) * np.exp(log_ratio)
@@ -68,7 +68,7 @@ def replay(
     for k in range(low.size):
         if not ready[k]:
             continue
-        low[k], high[k] = scaled(low[k], high[k], log_ratio[groups[k]], floor)
+        low[k], high[k] = scaled_band(low[k], high[k], log_ratio[groups[k]], floor)
         if rate > 0 and np.isfinite(residuals[k]):
             missed = residuals[k] < low[k] or residuals[k] > high[k]
             move(log_ratio, groups[k], missed, rate, alpha)

@@ -16,7 +16,7 @@ from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, run
+from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, simulate_truth
 from aesi.data.profiles.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError
@@ -61,7 +61,7 @@ class _Bench:
     ) -> list[TrueRun]:
         """The cell with these changes under its tests."""
         setup = Setup(self.declared, model or self.spec.model, (*self.own, *applied), radial_points)
-        return [run(setup, profile) for profile in profiles or self.profiles]
+        return [simulate_truth(setup, profile) for profile in profiles or self.profiles]
 
     def unexplained(
         self,

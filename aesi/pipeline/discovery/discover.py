@@ -80,7 +80,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
     from aesi.pipeline.report import write_discovery_report
 
-    content = to_json(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
+    content = discovery_content(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content, indent=1, allow_nan=False)
     (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
@@ -102,7 +102,7 @@ def found_model(found: Discovery) -> HybridModel:
     return HybridModel(inside.cell, left, soc0=found.soc0, hold=found.hold)
 
 
-def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
+def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
     """The content of discovery.json.  read : what a reader dropped, mapped or averaged in the files."""
     verdict = found.verdict
     return {

@@ -15,7 +15,7 @@ import numpy as np
 
 from aesi.conformal import FreeRunBands, Intervals
 from aesi.conformal.free_run import HorizonBand
-from aesi.conformal.scores import score
+from aesi.conformal.scores import scores_of
 from aesi.numerics.metrics import rmse
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.fit import Fitted
@@ -48,7 +48,7 @@ class _Judged:
     compared: dict[str, Intervals]
 
 
-def evaluate(
+def evaluate_models(
     fitted: Sequence[Fitted], split: Split, validation: Mapping[str, float] | None = None
 ) -> EvaluatedModels:
     """Figures of every model on train, validation and test records, and the traces that the report draws.
@@ -206,7 +206,7 @@ def _interval_figures(
         upper_v=_joined(each.upper_v for each in known),
         warm=_joined(each.warm for each in known),
     )
-    scores = score(
+    scores = scores_of(
         together,
         _joined(residuals),
         alpha,

@@ -19,7 +19,7 @@ SMALL = 0.5
 """In its own unit; what is less is written in thousandths."""
 
 
-def sized(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
+def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
     """The effect's name with its fitted parameters and their 90 % intervals; the name alone where there are none."""
     name = title or effect.replace("_", " ")
     row = next((c for c in discovery["candidates"] if c["effect"] == effect), None)
@@ -62,7 +62,7 @@ def rounded(value: float, unit: str) -> str:
 
 def finding_line(discovery: Mapping[str, Any]) -> str:
     """The verdict in one line, with what was found and how much of it; a confidence where it belongs to a name."""
-    effects = [sized(effect, discovery) for effect in discovery["effects"]]
+    effects = [with_size(effect, discovery) for effect in discovery["effects"]]
     verdict = discovery["verdict"]
     if verdict == "none":
         return "none: nothing is missing that these data could show"

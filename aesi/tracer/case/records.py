@@ -42,6 +42,7 @@ class PreparedRecord:
     data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
     fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of charge
     and what it is uncertain by.  seen_rows : rows at the start that only lead to what is judged.
+    soc0_doubt : how far the voltage's own reading is from a state of charge that was given.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
     the white noise in each row of `thin`.  noise_full_v : of that in `data`.
     """
@@ -58,6 +59,7 @@ class PreparedRecord:
     noise_full_v: float
     rest_voltage_v: float | None = None
     basis: Basis = "rest"
+    soc0_doubt: float = 0.0
     seen_rows: int = 0
     notes: tuple[str, ...] = ()
 
@@ -135,7 +137,7 @@ def prepare(
     if uneven or float(np.mean(steps)) < STEADY_SHARE:
         thin, rows = condensed(data, steps, duration / STEADY_SAMPLES)
     else:
-        thin, rows = thinned(data, step_s), None
+        thin, rows = averaged_over(data, step_s), None
     thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
@@ -161,6 +163,7 @@ def prepare(
         noise_full,
         start.rest_voltage_v,
         start.basis,
+        start.doubt,
         notes=notes,
     )
 
@@ -236,7 +239,7 @@ def prepare_all(
         step *= 2.0
 
 
-def thinned(data: Measurement, step_s: float) -> Measurement:
+def averaged_over(data: Measurement, step_s: float) -> Measurement:
     """At most one sample in `step_s`: centred averages of current, voltage and temperature.
 
     Records sampled more slowly than 0.75 of `step_s` on average are returned as they are.
