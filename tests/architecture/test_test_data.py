@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 WORDS = {"test", "tests"}
 MAY = {
-    "aesi/records.py": "defines the split",
+    "aesi/records/split.py": "defines the split",
     "aesi/data/virtual.py": "makes the paper's records",
     "aesi/data/catalogue.py": "says which tests a data set holds",
     "aesi/data/blind": "makes the cases of the benchmark",
