@@ -35,11 +35,11 @@ from aesi.numerics.blocks import (
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries, Split
-from aesi.sparse.fade import range_weight
 from aesi.sparse.terms.basis import FUNCTIONS, values
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library, evaluate_terms
 from aesi.sparse.terms.scaling import Outside, Scaling
+from aesi.sparse.trained_region import TrainedRegion, tested_distance
 
 Regime = Literal["free_run", "one_step"]
 
@@ -87,7 +87,7 @@ class Problem:
 
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
     error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
-    error, target : (n,) scaled e[k] and e[k + 1].
+    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  region : what a fit to all rows is fitted to.
     counts : (resamples, n) how often each resample holds a row.
     fade : (n,) what is left of a correction at each row by a model that has not seen its fold (fade.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
@@ -108,6 +108,8 @@ class Problem:
     error: Array
     inputs: Array
     target: Array
+    soc: Array
+    region: TrainedRegion
     counts: CountArray
     row_weights: Array
     restart: BoolArray
@@ -149,6 +151,8 @@ class Problem:
         )
         block = options.block or default_block(n)
         cut = left_out_pieces(spans, options.fold, options.cuts)
+        soc = np.concatenate([record.soc[:-1] for record in train])
+        region = TrainedRegion.of(rows[:, 1:], soc, tested_distance(soc, cut))
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         augmented = np.empty((n, len(library) + 1), order="F")
         for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
@@ -174,11 +178,13 @@ class Problem:
             error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
             inputs=rows[:, 1:],
             target=target,
+            soc=soc,
+            region=region,
             counts=weights,
             row_weights=row_weights,
             restart=starts_mask(pieces(spans, options.horizon or block), n),
             folds=cut,
-            fade=_fade(rows[:, 1:], cut),
+            fade=_fade(rows[:, 1:], soc, cut, region.tested),
             factors=every[: len(weights)],
             fold_factors=every[len(weights) :],
             full_factor=r,
@@ -251,12 +257,13 @@ def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
     return [(int(p), int(q)) for p, q in pairwise(edges)]
 
 
-def _fade(inputs: Array, folds: Sequence[Span]) -> Array:
-    """(n,) by how far each row's scaled inputs lie outside the range of the other folds."""
+def _fade(inputs: Array, soc: Array, folds: Sequence[Span], tested: float) -> Array:
+    """(n,) by how remote each row is from the rows of the other folds."""
     parts = []
     for a, b in folds:
-        others = np.delete(inputs, np.s_[a:b], axis=0)
-        parts.append(range_weight(inputs[a:b], others.min(axis=0), others.max(axis=0)))
+        fold = np.s_[a:b]
+        others = TrainedRegion.of(np.delete(inputs, fold, axis=0), np.delete(soc, fold), tested)
+        parts.append(1.0 / (1.0 + others.remoteness(inputs[fold], soc[fold])))
     return np.concatenate(parts)
 
 
