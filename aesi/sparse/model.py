@@ -234,7 +234,9 @@ class SparseModel:
                 for mine in (self.library.feedbacks == q for q in self._functions)
             ]
         )
-        return drive if self.fade is None else self._zero + self._weight(variables, soc) * (drive - self._zero)
+        return (
+            drive if self.fade is None else self._zero + self._weight(variables, soc) * (drive - self._zero)
+        )
 
     @property
     def _zero(self) -> float:

@@ -65,13 +65,14 @@ class TrainedRegion:
 
 def charge_distance(soc: Array, charge: Array) -> Array:
     """(n,) from each state of charge to the nearest one of `charge` (k,), sorted; 0 within their resolution."""
-    above = np.clip(np.searchsorted(charge, soc), 1, max(len(charge) - 1, 1))
-    below, above = charge[above - 1], charge[np.minimum(above, len(charge) - 1)]
-    distance = np.minimum(np.abs(soc - below), np.abs(soc - above))
+    place = np.clip(np.searchsorted(charge, soc), 1, max(len(charge) - 1, 1))
+    distance = np.minimum(
+        np.abs(soc - charge[place - 1]), np.abs(soc - charge[np.minimum(place, len(charge) - 1)])
+    )
     return np.asarray(np.maximum(distance - RESOLUTION / 2, 0.0))
 
 
-def tested_distance(soc: Array, folds: Sequence[Span]) -> float:
+def farthest_left_out(soc: Array, folds: Sequence[Span]) -> float:
     """g_t of (1): the largest distance of any left-out row to the rows of the other folds."""
     farthest = 0.0
     for a, b in folds:
