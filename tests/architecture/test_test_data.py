@@ -19,6 +19,7 @@ MAY = {
     "aesi/data/blind": "makes the cases of the benchmark",
     "aesi/pipeline/experiment/sections.py": "names of records in the experiment's file",
     "aesi/pipeline/experiment/drives.py": "cuts the split",
+    "aesi/pipeline/experiment/sources.py": "reads the records of every role",
     "aesi/pipeline/experiment/evaluate.py": "judges the models, already chosen",
     "aesi/pipeline/api.py": "takes them from the caller",
     "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
