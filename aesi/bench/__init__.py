@@ -6,12 +6,12 @@ CaseRow = dict[str, Any]
 """What is told of one case: JSON-ready values by name."""
 
 BENCHMARKS = {
-    "espm": "aesi.bench.espm",
-    "dfn": "aesi.bench.dfn",
-    "ensemble": "aesi.bench.ensemble",
-    "design": "aesi.bench.design",
-    "spci": "aesi.bench.spci",
-    "bands": "aesi.bench.bands",
-    "cells": "aesi.bench.cells",
+    "espm": "aesi.bench.physics.espm",
+    "dfn": "aesi.bench.physics.dfn",
+    "ensemble": "aesi.bench.hybrid.ensemble",
+    "design": "aesi.bench.hybrid.design",
+    "spci": "aesi.bench.intervals.spci",
+    "bands": "aesi.bench.intervals.bands",
+    "cells": "aesi.bench.physics.cells",
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""

@@ -1,6 +1,6 @@
 """`aesi bench splits`: does the hybrid survive another drive? One line a split, and a last one that sums up.
 
-The splits are those of `aesi.bench.splits`; each runs the stages of `aesi run` in this process, untracked.
+The splits are those of `aesi.bench.hybrid.splits`; each runs the stages of `aesi run` in this process, untracked.
 """
 
 from __future__ import annotations
@@ -13,12 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.splits import EXPERIMENTS, SplitCase, against, chosen_splits, judged
+from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, against, chosen_splits, judged
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
+"""A look at every split in hours; `whole` runs them at the settings of an experiment."""
 BLOCK_S = 100.0
+"""Of the bootstrap."""
 CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
 """Intervals one step ahead are not judged here."""
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from aesi.bench.spci import ALPHA, oracle_series
+from aesi.bench.intervals.spci import ALPHA, oracle_series
 from aesi.conformal import METHODS
 from aesi.conformal.scores import interval_score, low_minute_share
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.bench.bands import run
+from aesi.bench.intervals.bands import run
 
 pytestmark = pytest.mark.slow
 

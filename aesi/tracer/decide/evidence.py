@@ -2,18 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aesi.errors import DataError
+from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps
-from aesi.tracer.decide.search import Path, Report, base_of, refitted, searched, with_wrong_parameters
-from aesi.tracer.decide.verdict import Thresholds, Verdict, judged, noise_v, structured_v, tolerance_v
+from aesi.tracer.decide.search import (
+    Path,
+    Report,
+    base_of,
+    refitted,
+    searched,
+    unseen_rmse_v,
+    with_wrong_parameters,
+)
+from aesi.tracer.decide.verdict import (
+    Thresholds,
+    Verdict,
+    beyond,
+    judged,
+    noise_v,
+    partly,
+    structured_v,
+    tolerance_v,
+)
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
@@ -78,21 +96,24 @@ def gathered(
     elif verdict.word == "none" and not _as_declared(replace(problem, trust="exact"), path, archive):
         exact = path_of("exact")
         path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
-    verdict = _with_confidence(verdict)
     recalibrated = _recalibrated(problem, paths["tight"], archive)
     if verdict.word != "unknown":
-        return _adopted(path, paths, verdict, recalibrated)
-    loose = path_of("loose") if len(problem.records) > 1 else None
-    return _best_carried(path, loose, paths, verdict, recalibrated)
+        return _adopted(path, paths, _with_confidence(verdict), recalibrated)
+    others = [path, path_of("measured")]
+    if len(problem.records) > 1:
+        others.append(path_of("loose"))
+    if paths["measured"].chosen.hypothesis:
+        path, verdict = paths["measured"], partly(paths["measured"], verdict, thresholds)
+    return _best_carried(path, others, paths, _with_confidence(verdict), recalibrated)
 
 
-def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[..., bool]:
-    def enough(path_blocks: object, fit: FittedHypothesis) -> bool:
-        from aesi.tracer.decide.search import unseen_rmse_v
+def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
+    """Does a hypothesis leave no more on unseen data than a right one may?"""
+    white_v = float(np.sqrt(np.mean(problem.white_v**2)))
+    allowed_v = tolerance_v(white_v, thresholds)
 
-        white = float((problem.white_v**2).mean())
-        left = max(unseen_rmse_v(path_blocks, fit) ** 2 - white, 0.0)  # type: ignore[arg-type]
-        return bool(left**0.5 <= tolerance_v(white**0.5, thresholds))
+    def enough(blocks: Blocks, fit: FittedHypothesis) -> bool:
+        return beyond(unseen_rmse_v(blocks, fit), white_v) <= allowed_v
 
     return enough
 
@@ -164,7 +185,7 @@ def _adopted(
 
 def _best_carried(
     path: Path,
-    loose: Path | None,
+    others: Sequence[Path],
     paths: dict[Trust, Path],
     verdict: Verdict,
     recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
@@ -179,12 +200,7 @@ def _best_carried(
         other = ModelState.of(problem, fit)
         if range_fault(other) is None:  # what cannot be adopted itself is no yardstick for what can
             basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
-    tried: list[tuple[InverseProblem, FittedHypothesis]] = [
-        (path.problem, path.base),
-        (path.problem, path.chosen),
-    ]
-    if loose is not None:
-        tried.append((loose.problem, loose.chosen))
+    tried = [(other.problem, fit) for other in others for fit in (other.base, other.chosen)]
     more = [
         Option(ModelState.of(problem, fit), left_out_errors(problem, path.blocks, fit), fit)
         for problem, fit in dict.fromkeys(tried)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.bench.spci import oracle_series
+from aesi.bench.intervals.spci import oracle_series
 from aesi.conformal import METHODS
 from aesi.conformal.scores import interval_score
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.bench.ensemble import synthetic_record
+from aesi.bench.hybrid.ensemble import synthetic_record
 from aesi.records import Split
 from aesi.sparse import Library, Options, Problem, STRidge
 from aesi.sparse.pysindy_adapter import chebyshev_library, stridge_optimizer

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aesi.bench.design import SETTINGS, run
+from aesi.bench.hybrid.design import SETTINGS, run
 
 CELL = Path(__file__).parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 

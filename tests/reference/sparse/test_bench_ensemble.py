@@ -2,7 +2,7 @@
 
 import pytest
 
-from aesi.bench.ensemble import run
+from aesi.bench.hybrid.ensemble import run
 
 
 def test_a_line_for_each_size():

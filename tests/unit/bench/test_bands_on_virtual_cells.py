@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from aesi.bench.bands import DESIGNS, HORIZONS_S, run
+from aesi.bench.intervals.bands import DESIGNS, HORIZONS_S, run
 from aesi.bench.virtual_drives import virtual_splits
 from aesi.physics import Cell
 

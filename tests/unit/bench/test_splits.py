@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from aesi.bench.splits import EXPERIMENTS, against, all_splits, chosen_splits, judged
+from aesi.bench.hybrid.splits import EXPERIMENTS, against, all_splits, chosen_splits, judged
 from aesi.errors import InputError
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.fit import Fitted

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.bench.spci import oracle_series
+from aesi.bench.intervals.spci import oracle_series
 from aesi.conformal import METHODS, RefittedForest
 from aesi.errors import FitError
 

@@ -15,7 +15,7 @@ from aesi.numerics.typing import Array
 from aesi.physics import Cell, simulate
 from aesi.pipeline.cross_check import DEFAULT_MESH, FINE_MESH, pybamm_run
 
-DEFAULT_CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
+DEFAULT_CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 STEP_S = 0.1
 BREAK_POINT_S = 1.0
 """The current is a straight line between break points, so that the peer can be told where they are."""
@@ -33,7 +33,7 @@ def run(
     if not Path(cell).is_file():
         raise InputError(f"there is no cell file {cell}; name a BPX file with cell=...")
     model = Cell.from_bpx(cell)
-    breaks, current_at_breaks = drive(samples, model.nominal_capacity_ah, np.random.default_rng(seed))
+    breaks, current_at_breaks = random_load(samples, model.nominal_capacity_ah, np.random.default_rng(seed))
     time = np.arange(samples, dtype=np.float64) * np.float64(STEP_S)
     current = np.interp(time, breaks, current_at_breaks)
     first = _timed(model, time, current)[0]
@@ -58,7 +58,7 @@ def run(
     }
 
 
-def drive(samples: int, capacity_ah: float, rng: np.random.Generator) -> tuple[Array, Array]:
+def random_load(samples: int, capacity_ah: float, rng: np.random.Generator) -> tuple[Array, Array]:
     """Break points (s) and current there (A): a correlated random load, discharging on average, within 3C."""
     breaks = np.arange(0.0, samples * STEP_S + BREAK_POINT_S, BREAK_POINT_S)
     keep = np.exp(-BREAK_POINT_S / CORRELATION_S)
