@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 LONGEST_IN_SECONDS = 20_000.0
+"""Axes of longer tests are in hours."""
 PANEL_HEIGHT = 190
+"""Pixels."""
 COLOURS = ("#1f2328", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Ink, then Okabe and Ito's palette, safe for colour-blind readers."""
 BAND = "rgba(0,114,178,0.2)"
@@ -21,6 +23,14 @@ BAND = "rgba(0,114,178,0.2)"
 def time_unit(span_s: float) -> tuple[str, float]:
     """Label and divisor for an axis of that length: seconds, or hours for long tests."""
     return ("h", SECONDS_PER_HOUR) if span_s > LONGEST_IN_SECONDS else ("s", 1.0)
+
+
+def extent(time_s: Array) -> str:
+    """Rows and duration, for a short text."""
+    if not len(time_s):
+        return "no rows"
+    unit, divisor = time_unit(float(time_s[-1] - time_s[0]))
+    return f"{len(time_s):,} rows over {(time_s[-1] - time_s[0]) / divisor:,.4g} {unit}"
 
 
 def over_time(

@@ -14,6 +14,7 @@ from aesi.numerics.typing import Array
 MAX_RESIDUALS = 20_000
 """Calibration residuals that are used: enough for half a per cent of coverage, and a fraction of a second."""
 PIECES = 20
+"""Runs that calibration residuals are thinned to, spread over all records."""
 
 
 def validation_scores(

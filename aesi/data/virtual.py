@@ -24,7 +24,9 @@ DEFAULT_MIX = ("ocv_hysteresis", "series_resistance")
 """8 mV of hysteresis on the negative electrode, and contacts that drop 8 mV at 1C."""
 
 DROP_AT_1C_V = 0.008
+"""Of a contact or a film at magnitude 1: of the size of the voltage error of a calibrated model."""
 PARASITIC_SHARE = 0.005
+"""Of the capacity an hour, at magnitude 1."""
 INSTRUMENT = Instrument()
 
 STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {

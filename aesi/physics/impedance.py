@@ -37,6 +37,7 @@ from aesi.physics.simulation import model_with
 SLOPE_STEP = 1e-4
 """Of stoichiometry: tables of potentials have steps of 1.2e-4."""
 SMALL_A = 1e-6
+"""Current whose response is a slope: far below any exchange current, far above round-off."""
 
 
 def impedance(

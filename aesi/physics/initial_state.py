@@ -46,7 +46,9 @@ MOVING_V = 4e-3
 BEYOND_V = 0.05
 """A voltage this far beyond the declared full or empty still belongs to a full or an empty cell of this kind."""
 CALM_ROWS = 60
+"""First rows that are looked at for a rest."""
 GRID = 4001
+"""States of charge at which potentials are looked up."""
 FLOWED_S = (0.0, 20.0, 200.0, 2000.0)
 """How long the first current may have flowed: after the last, it has drawn all but the slowest of its drops."""
 HISTORY_C_RATE = 0.25
@@ -55,10 +57,12 @@ what this current leaves once it has flowed for long."""
 DROP_ERROR = 0.2
 """Share of its drop that a model misses at the first row of a record."""
 JUDGED_S = 300.0
+"""First part of a record whose shape tells how long its current had flowed, of at most JUDGED_ROWS rows."""
 JUDGED_ROWS = 3000
 SHAPE_V = 2e-3
 """What the shape of a voltage over the first minutes is simulated to."""
 ROUNDS = 4
+"""Of drop and state of charge in turn: the drop hardly depends on it."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
 """A given state of charge further than this from that of a record's voltage is contradicted by it."""

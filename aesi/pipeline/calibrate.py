@@ -14,6 +14,7 @@ from aesi.calibration import Calibration, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
+from aesi.constants import MV_PER_V
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
@@ -21,7 +22,6 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement, Spectrum
 
 SCHEMA = "aesi.calibration/2"
-MV = 1e3
 
 
 @dataclass(frozen=True)
@@ -96,8 +96,8 @@ def calibration_content(
             {
                 "name": e.name,
                 "temperature_degc": e.temperature_degc,
-                "before_rmse_mv": MV * e.before_v,
-                "after_rmse_mv": MV * e.after_v,
+                "before_rmse_mv": MV_PER_V * e.before_v,
+                "after_rmse_mv": MV_PER_V * e.after_v,
                 "capacity_share": found.capacities[e.name],
             }
             for e in found.errors

@@ -28,6 +28,7 @@ HEAVIER = (
     "search.timeout_s=600",
 )
 WAIT_S = 600.0
+"""For workers that do not come."""
 
 
 def run(

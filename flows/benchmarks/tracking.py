@@ -28,8 +28,10 @@ from aesi.sparse.terms.inputs import with_inputs
 from flows.base import environment
 
 METRICS = 10
+"""As many as a candidate logs; and parameters."""
 PARAMETERS = 14
 DELIVERY_S = 120.0
+"""Wait for the store at the end."""
 
 
 def run(

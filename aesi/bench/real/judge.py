@@ -15,7 +15,7 @@ from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
@@ -26,7 +26,6 @@ from aesi.pipeline.discovery.discover import discovery_content
 from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
 
-MV = 1e3
 LIMIT_S = 600.0
 MOST_ROWS = 20_000
 """Rows that a case is read with; more are averaged, as `aesi discover` does."""
@@ -159,6 +158,6 @@ def _residual(found: Discovery) -> dict[str, list[float]]:
     kept = np.unique(np.linspace(0, len(time_s) - 1, DRAWN).astype(int))
     out = {"time_s": time_s[kept].round(1).tolist()}
     for state in ("before", "recalibrated", "after"):
-        residual = MV * np.concatenate([f.residual_v(state) for f in found.files])
+        residual = MV_PER_V * np.concatenate([f.residual_v(state) for f in found.files])
         out[f"{state}_mv"] = residual[kept].round(2).tolist()
     return out

@@ -22,6 +22,7 @@ RELATIVE_FLOOR = 1e-3
 """No interval is narrower than this share of the marginal one: at rest the residual is constant to the sensor's
 quantisation, and a fitted width would shrink to zero."""
 MIN_WINDOW = 10
+"""The lags alone are ten residuals (`aesi.numerics.windows`)."""
 
 
 @dataclass(frozen=True, eq=False)

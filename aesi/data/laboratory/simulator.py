@@ -31,7 +31,9 @@ VERSION = 4
 EDGE_SHARE = 0.15
 """A change of the current between two rows by this share of its range is an edge."""
 MOST_EDGES = 400
+"""Of the current that the solver is told of, the largest: each costs a restart."""
 MOST_STEPS = 40_000
+"""Steps that the limit on the solver's step may ask for: longer records have a longer limit."""
 CHARGE_TOLERANCE = 6e-4
 """Of the nominal capacity. The solver's own error has been seen at 3.8e-4 over 8,820 s at 10 Hz; a pulse of 2 s at
 2C that is stepped over makes 1.1e-3."""

@@ -9,6 +9,7 @@ from aesi.pipeline.report.sizes import TELLING, rounded
 from aesi.pipeline.report.views import Row
 
 MOST_NAMED = 3
+"""Parameters that one sentence names."""
 INITIAL_STATE = "soc0"
 """Stands for the effect of a row where a record's initial state of charge moved."""
 STATES = {"recalibrated": "Recalibrating", "after": "Beside the finding the fit"}

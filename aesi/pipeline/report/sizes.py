@@ -14,9 +14,11 @@ SAME_SHARE = 0.98
 TELLING = 1.0
 """Standard deviations of its tolerance: what a refit moved less is as it was declared, for all that these data say."""
 MOST_PARAMETERS = 3
+"""Of an effect, in one sentence."""
 ADDED = "added to what"
 """How a parameter's description says that it comes on top of the declared value."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
+"""Unit -> that of its thousandths or millionths, and how many make one."""
 SMALL = 0.5
 """In its own unit; what is less is written in thousandths."""
 

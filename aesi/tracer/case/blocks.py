@@ -12,6 +12,8 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.problem import InverseProblem
 
 BLOCKS = 24
+"""Pieces that are left out in turn, all records together: enough to tell, and each long against the correlation of a
+model error. A convention."""
 FEWEST = 4
 """Blocks of all records together, and the fewest of one."""
 SEEN_SHARE = 2.0 / 3.0

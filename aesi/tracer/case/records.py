@@ -19,20 +19,26 @@ from aesi.physics.initial_state import Basis, initial_state
 from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
 
 THIN_STEP_S = 1.0
-"""Fits see at most one sample a second: nothing in the catalogue is faster than a sample and slower than
-noise."""
+"""Fits see at most one sample a second: nothing in the catalogue is faster than that and yet
+above the noise."""
 FIT_SAMPLES = 12_000
+"""Of all records together: above it windows are doubled, since the time of a fit grows with its rows."""
 STEADY_SAMPLES = 600
+"""Rows that a record of steady currents is spread over."""
 STEADY_C_RATE = 0.01
+"""A change of the current by more than this is a step; a record with fewer steps than STEADY_SHARE of its rows is one
+of steady currents."""
 STEADY_SHARE = 0.01
 UNEVEN_SHARE = 0.01
 """Of the samples: averages over equal numbers of rows need equal times between them."""
 FIRST_STEP_S = 0.5
+"""Distance of the first rows after a step."""
 STEP_GROWTH = 0.25
 """Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 SMALLEST_NOISE_V = 5e-5
+"""No cycler writes less: a virtual record without noise would count each microvolt."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,9 +100,8 @@ class PreparedRecord:
 def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
     """Deviation of the white noise, from second differences where the current is steady.
 
-    voltage_v, current_a : (n,).  The scale is robust to the steps that remain; half the smallest voltage
-    step is
-    the least it can be.
+    voltage_v, current_a : (n,).  The scale is robust to the steps that remain; the smallest
+    voltage step over the root of twelve is the least it can be.
     """
     if len(voltage_v) < 8:
         return SMALLEST_NOISE_V
