@@ -21,7 +21,6 @@ from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import Candidate, sparse_model
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
-from aesi.sparse.trained_region import TrainedRegion
 
 N_PIECES = 12
 """Long enough to drift, short enough that the models without them are nearly the one that is judged."""
@@ -63,8 +62,8 @@ def fold_models(
             leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
         )
         if judged.fade is not None:
-            region = TrainedRegion.of(problem.inputs[seen], problem.soc[seen], problem.region.tested)
-            model = replace(model, fade=Fade(judged.fade.amplitude, region))
+            low, high = problem.inputs[seen].min(axis=0), problem.inputs[seen].max(axis=0)
+            model = replace(model, fade=Fade(judged.fade.amplitude, low, high))
         record, rows = fold_samples(problem, a, b)
         yield model, left_out[i].series if drives and left_out else record, rows
 
