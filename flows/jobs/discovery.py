@@ -135,7 +135,10 @@ def _track_result(
     if tracker is None:
         return
     from aesi.pipeline.report.sizes import finding_line
+    from aesi.pipeline.report.words import reason_finding
+    from flows.tracking.view import DISCOVERY_COLUMNS, HOW_TO_READ_DISCOVERIES, NOTE, experiment_tags
 
+    tracker.about(experiment_tags(HOW_TO_READ_DISCOVERIES, DISCOVERY_COLUMNS))
     tracker.parameters(
         {
             "cell": found.cell.name,
@@ -151,6 +154,7 @@ def _track_result(
             "verdict": content["verdict"],
             "effects": ", ".join(content["effects"]),
             "finding": finding_line(content),
+            NOTE: f"{finding_line(content)}\n\n{reason_finding(content)}",
         },
     )
     states = ("before", "recalibrated", "after")
