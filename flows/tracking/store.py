@@ -23,6 +23,7 @@ from filelock import FileLock
 from aesi.errors import AesiError, InputError
 from flows.base import environment
 from flows.tracking.relocation import artifact_folder, follow
+from flows.tracking.whole_run import read_runs
 
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
@@ -147,6 +148,12 @@ class Store:
             token = page.token
             if not token:
                 return
+
+    def jobs(self, experiment_id: str) -> list[Any]:
+        """The runs of an experiment that are whole jobs and nested in none, newest first."""
+        if self.local:
+            return read_runs(self.database, experiment_id, (KIND, "run"))
+        return list(self.runs(experiment_id, f"tags.`{KIND}` = 'run'"))
 
     def children(self, experiment_id: str, parent: str) -> dict[str, Any]:
         """Nested runs of a parent by the label they were given (`candidate:7`, `model:AESI I`)."""

@@ -69,3 +69,21 @@ def test_a_table_that_refuses_leaves_nothing_of_the_run(store, item):
     with pytest.raises(Exception, match="NOT NULL"):
         delivery.deliver(store, item, again=False)
     assert store.children(item["experiment_id"], item["parent"]) == {}
+
+
+def test_what_is_read_is_what_the_client_reads(store, item):
+    experiment = item["experiment_id"]
+    first, last = item["parent"], store.create_run(experiment, "another", {KIND: "run"})
+    store.client.log_metric(last, "fitness", 0.25, step=1)
+    store.client.log_metric(last, "fitness", float("nan"), step=2)
+    store.client.log_param(last, "seed", "1")
+    gone = store.create_run(experiment, "deleted", {KIND: "run"})
+    store.client.delete_run(gone)
+    delivery.deliver(store, item, again=False)  # nested: no job
+    ours = store.jobs(experiment)
+    theirs = list(store.runs(experiment, f"tags.`{KIND}` = 'run'"))
+    assert {run.info.run_id for run in ours} == {first, last}
+    for run, other in zip(ours, theirs, strict=True):
+        assert dict(run.info) == dict(other.info)
+        assert (run.data.params, run.data.tags) == (other.data.params, other.data.tags)
+        assert str(run.data.metrics) == str(other.data.metrics)  # NaN is not equal to itself
