@@ -17,6 +17,7 @@ from aesi.physics.model import EspmModel
 SOLID_ORDER = 8
 """Eight modes resolve a particle to 0.4 mV under a drive to 3C."""
 MOST_STEPS = 4
+"""Of a model between two rows: they are thinned to where little happens between them."""
 ERROR_V = 5e-3
 """What a calibrated single-particle model is expected to miss."""
 REPEATS = 10
@@ -30,6 +31,7 @@ NEWER = 0.1
 ZERO_SHARE = 5e-4
 """Of the largest current among the records: what a cycler's zero is uncertain by, 0.1 % of its range being usual."""
 STEP = 0.02
+"""Of finite differences, in deviations of the prior."""
 
 
 @dataclass(frozen=True)

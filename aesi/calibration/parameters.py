@@ -19,11 +19,17 @@ from aesi.physics.cell.relations import Constant, Expression, LookupTable, Relat
 LIMIT_SD = 4.0
 """No parameter goes further than this many of its prior's deviations."""
 KNOTS = 23
+"""Of the correction of each open-circuit potential, dense at the ends where potentials are steep."""
 ENTROPY_KNOTS = 5
+"""Of the correction of an entropy, which is smoother."""
 TABLE_POINTS = 513
+"""Of the table that a corrected potential becomes."""
 BEYOND = 0.06
+"""Of the stoichiometry window, that the table reaches further: surfaces leave it under load."""
 OCP_SD_V = 0.04
+"""Of a potential at each knot: what half-cell measurements of one material differ by."""
 ENTROPY_SD_V_K = 1.5e-4
+"""Of an entropic coefficient at each knot: its own size."""
 
 
 @dataclass(frozen=True)

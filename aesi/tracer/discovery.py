@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -25,8 +25,9 @@ from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
-from aesi.tracer.report.outcome import FileOutcome, States, outcomes, test_rmse_v
-from aesi.tracer.report.tell_apart import experiment
+from aesi.tracer.report.outcome import FileOutcome, State, States, outcomes, test_rmse_v
+from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
+from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.yardstick import Yardstick, measure
 
 
@@ -62,6 +63,7 @@ class Discovery:
 
     model_effects : what `after` simulates with: the effects found, and the tolerated parameters where they
     settled.
+    own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
     soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
     part.  before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
     tell them apart.  warnings : where the written model does worse than another one on the test part.
@@ -81,6 +83,7 @@ class Discovery:
     experiments: tuple[tuple[tuple[str, ...], str], ...]
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
     seconds: float = 0.0
     simulations: int = 0
 
@@ -188,9 +191,10 @@ def _told(
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,
-        experiments=tuple((g, experiment(g, problem.effects)) for g in verdict.groups),
+        experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         notes=_notes(evidence, tested),
         warnings=_warnings(files),
+        own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         seconds=seconds,
         simulations=simulations,
     )

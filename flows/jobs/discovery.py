@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, run_case, write_discovery
+from aesi.constants import MV_PER_V
+from aesi.pipeline.discovery.discover import ARCHIVE, Case, run_case, write_discovery
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
 from flows.base import environment
@@ -100,8 +101,8 @@ class Follow:
         }
         metrics = {
             "gain_nats": tried.gain_nats,
-            "fit/rmse_mv": MV * tried.rmse_v,
-            "model_error_mv": MV * tried.delta_v,
+            "fit/rmse_mv": MV_PER_V * tried.rmse_v,
+            "model_error_mv": MV_PER_V * tried.delta_v,
             "simulations": float(tried.simulations),
         }
         self._tracker.nested(
@@ -134,6 +135,7 @@ def _track_result(
 ) -> None:
     if tracker is None:
         return
+    from aesi.pipeline.report.moved import moved_summary
     from aesi.pipeline.report.sizes import finding_line
     from aesi.pipeline.report.words import reason_finding
     from flows.tracking.view import DISCOVERY_COLUMNS, HOW_TO_READ_DISCOVERIES, NOTE, experiment_tags
@@ -155,6 +157,11 @@ def _track_result(
             "effects": ", ".join(content["effects"]),
             "finding": finding_line(content),
             NOTE: f"{finding_line(content)}\n\n{reason_finding(content)}",
+            **{
+                f"moved_{state}": moved_summary(rows)
+                for state, rows in content["own_parameters"].items()
+                if moved_summary(rows)
+            },
         },
     )
     states = ("before", "recalibrated", "after")
@@ -173,6 +180,7 @@ def _track_result(
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
+    from aesi.pipeline.report.moved import moved_findings
     from aesi.pipeline.report.sizes import finding_line
     from aesi.pipeline.report.words import name_confidence, reason_finding
 
@@ -180,6 +188,8 @@ def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: P
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
     console.say(f"  {reason_finding(content)}")
+    for sentence in moved_findings(content):
+        console.say(f"  {sentence}")
     for group in content["indistinguishable"]:
         console.say(f"  these data cannot tell apart: {', '.join(group)}")
     for part in ("fit", "test"):

@@ -8,6 +8,7 @@ from math import log10
 from pathlib import Path
 from typing import Any
 
+from aesi.constants import MV_PER_V
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
@@ -21,7 +22,6 @@ from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
-MILLIVOLT_PER_VOLT = 1e3
 CHOSEN = "aesi.chosen"
 INPUTS, RECORDS, DECLARED = "inputs", "records.bin", "declared"
 """What a candidate is made from: the error series by role, and the declared cell with its effects."""
@@ -174,7 +174,7 @@ def candidate_metrics(candidate: Candidate) -> dict[str, float]:
         "pearson/train": candidate.pearson_train,
         "pearson/valid": candidate.pearson_valid,
         "free_run/valid_mser_pct": candidate.free_run_valid_mser_pct,
-        "one_step/valid_rmse_mv": MILLIVOLT_PER_VOLT * candidate.one_step_valid_rmse_v,
+        "one_step/valid_rmse_mv": MV_PER_V * candidate.one_step_valid_rmse_v,
     }
 
 
@@ -182,7 +182,7 @@ def _metrics(scored: ScoredCandidate) -> dict[str, Any]:
     return candidate_metrics(scored.candidate) | {
         "intervals/valid_coverage_pct": scored.coverage_pct,
         "intervals/valid_width_v": scored.width_v,
-        "intervals/valid_width_mv": None if scored.width_v is None else MILLIVOLT_PER_VOLT * scored.width_v,
+        "intervals/valid_width_mv": None if scored.width_v is None else MV_PER_V * scored.width_v,
         "intervals/valid_coverage_pct_aesi_ii": scored.stable_coverage_pct,
         "intervals/valid_width_v_aesi_ii": scored.stable_width_v,
     }
@@ -206,5 +206,5 @@ def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
             if name.endswith(
                 "_width_v"
             ):  # what is read is in millivolts; the summary's own name stays beside it
-                result[f"{prefix}{name.removesuffix('v')}mv"] = MILLIVOLT_PER_VOLT * value
+                result[f"{prefix}{name.removesuffix('v')}mv"] = MV_PER_V * value
     return result

@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError
 from aesi.physics import Cell, initial_state, simulate
 from aesi.records import Measurement
 
-MV = 1e3
 NCR, HG2, NMC, M50T = "panasonic_ncr18650pf", "lg_18650hg2", "about_energy_nmc", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
@@ -151,6 +151,7 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
 
 
 NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
+"""As the makers state them, for cell files of another size of the same chemistry."""
 
 
 def rmse_mv(cell: Cell, data: Measurement) -> float:
@@ -166,7 +167,7 @@ def rmse_mv(cell: Cell, data: Measurement) -> float:
         "backward",
         on_depletion="clip",
     )
-    return round(MV * float(np.sqrt(np.mean((data.voltage_v - run.voltage_v) ** 2))), 2)
+    return round(MV_PER_V * float(np.sqrt(np.mean((data.voltage_v - run.voltage_v) ** 2))), 2)
 
 
 def aged(cell: Cell, share: float) -> Cell:

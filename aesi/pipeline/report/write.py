@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from aesi.pipeline.report import sections, tables, words
 from aesi.pipeline.report.figures import paper_figures, predicted_models
+from aesi.pipeline.report.moved import moved_findings, moved_value, parameter_words
 from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.plots import hypotheses, maps, records
-from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, RunView
+from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, Row, RunView
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -69,14 +70,27 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
             for sentence in (
                 words.look_alike_finding(view),
                 words.discovery_consequence(view),
+                *moved_findings(view.discovery),
                 words.reason_finding(view.discovery),
                 words.span_finding(view),
             )
             if sentence
         ],
         rest=words.rest_finding(view.discovery),
+        moved=_moved_rows(view.discovery),
         candidates=sorted(view.discovery["candidates"], key=lambda row: -row["score"]),
     )
+
+
+def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:
+    """A row a declared parameter: what it is, and where the refit and, with a finding, the fit with it put it."""
+    own = discovery.get("own_parameters", {})
+    rows: dict[str, dict[str, str]] = {}
+    for state in STATES if discovery["effects"] else ("recalibrated",):
+        for row in own.get(state, ()):
+            where = f"{moved_value(row)}{', at its limit' if row['at_limit'] else ''}"
+            rows.setdefault(parameter_words(row), {})[state] = f"{where} ({row['deviations']:+.1f})"
+    return [{"name": name, **where} for name, where in rows.items()]
 
 
 def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:

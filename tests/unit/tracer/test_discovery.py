@@ -114,3 +114,17 @@ def test_an_effect_that_cannot_be_simulated_is_left_out_and_said(cell, make):
     found = discover(bare, [make()], soc0=0.9, effects=effects)
     assert [c.effect for c in found.candidates] == ["series_resistance"]
     assert any(note.startswith("self_heating: not tried") for note in found.notes)
+
+
+def test_what_a_refit_moved_is_told_with_its_tolerance(cell, few, make):
+    slow = CATALOGUE["solid_diffusivity"].activate(negative_factor=1.0, positive_factor=0.4)
+    found = discover(cell, [make((slow,))], soc0=0.9, effects={"solid_diffusivity": few["solid_diffusivity"]})
+    own = {one.name: one for one in found.own["recalibrated"] if one.owner == "solid_diffusivity"}
+    positive = own["positive_factor"]
+    assert positive.declared == 1.0
+    assert positive.value == pytest.approx(0.4, rel=0.1)
+    assert positive.deviations < -2.0  # 0.43 of its logarithm is one
+    assert not positive.at_limit
+    assert {one.name for one in found.own["recalibrated"] if one.owner == "soc0"} == {"made"}
+    furthest = [abs(one.deviations) for one in found.own["recalibrated"]]
+    assert furthest == sorted(furthest, reverse=True)

@@ -1,0 +1,69 @@
+"""What a refit moved of the parameters that a cell's file declares, in words, from the content of discovery.json."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from aesi.pipeline.report.sizes import rounded
+from aesi.pipeline.report.views import Row
+
+TELLING = 1.0
+"""Standard deviations of its tolerance: what moved less is as it was declared, for all that these data say."""
+MOST_NAMED = 3
+"""Parameters that one sentence names."""
+INITIAL_STATE = "soc0"
+"""Stands for the effect of a row where a record's initial state of charge moved."""
+STATES = {"recalibrated": "Recalibrating", "after": "Beside the finding the fit"}
+
+
+def moved_findings(discovery: Mapping[str, Any]) -> list[str]:
+    """A sentence for the recalibrated model and, where something was found, one for the model with it: what moved most,
+    and what ended at the end of its range; none where nothing was fitted."""
+    own = discovery.get("own_parameters", {})
+    shown = STATES if discovery["effects"] else {"recalibrated": STATES["recalibrated"]}
+    return [_sentence(words, own[state]) for state, words in shown.items() if own.get(state)]
+
+
+def _sentence(words: str, rows: Sequence[Row]) -> str:
+    furthest = [row for row in rows if abs(row["deviations"]) > TELLING]
+    if not furthest:
+        return f"{words} moves no declared parameter by more than its tolerance."
+    named = "; ".join(_moved(row) for row in furthest[:MOST_NAMED])
+    rest = len(furthest) - MOST_NAMED
+    more = f"; and {rest} more" if rest > 0 else ""
+    text = f"{words} moves {named}{more}."
+    ended = [parameter_words(row) for row in rows if row["at_limit"]]
+    if ended:
+        text += (
+            f" At the end of what it may be: {'; '.join(ended)}. That value is the limit's, not the data's."
+        )
+    return text
+
+
+def _moved(row: Row) -> str:
+    times = f"{abs(row['deviations']):.1f} standard deviations of its tolerance"
+    return f"{parameter_words(row)} to {moved_value(row)} ({times})"
+
+
+def moved_value(row: Row) -> str:
+    """Where a parameter went: '0.42 times declared', '0.97 (declared 1)', '3.1 mohm'."""
+    if row["unit"] == "dimensionless" and row["declared"] == 1.0:
+        return f"{row['value']:.2g} times declared"
+    if row["unit"] in ("dimensionless", "1"):
+        return f"{row['value']:.3g} (declared {row['declared']:.3g})"
+    return rounded(row["value"], row["unit"])
+
+
+def parameter_words(row: Row) -> str:
+    """'solid diffusivity (negative)', 'the initial state of charge of drive'."""
+    if row["effect"] == INITIAL_STATE:
+        return f"the initial state of charge of {row['parameter']}"
+    name = row["parameter"].removesuffix("_factor").replace("_", " ")
+    return f"{row['effect'].replace('_', ' ')} ({name})"
+
+
+def moved_summary(rows: Iterable[Row]) -> str:
+    """All that moved by more than its tolerance on one line, for a tag of a tracked run."""
+    told = [row for row in rows if abs(row["deviations"]) > TELLING]
+    return "; ".join(f"{parameter_words(r)} {moved_value(r)}" for r in told)

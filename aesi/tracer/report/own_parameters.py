@@ -1,0 +1,55 @@
+"""What a fit made of the parameters that the cell's file declares: how far each went, and which ended on its limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter
+from aesi.tracer.likelihood.model_state import ModelState
+
+LIMIT_SHARE = 0.01
+"""Share of the range next to its end that counts as the end."""
+
+
+@dataclass(frozen=True)
+class OwnParameter:
+    """A declared parameter after a fit.
+
+    owner : the effect that restates it, or STATE_OF_CHARGE, whose `name` is then that of the record.
+    declared, value : in `unit`; a factor is declared as 1.  deviations : from declared, in standard deviations of its
+    tolerance.  at_limit : whether it ended at the end of the range in which it may move.
+    """
+
+    owner: str
+    name: str
+    declared: float
+    value: float
+    unit: str
+    deviations: float
+    at_limit: bool
+
+
+def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
+    """The declared parameters that were open in a fit, furthest first; none where nothing was fitted."""
+    if state.values is None:
+        return ()
+    problem = state.problem
+    skipped = (
+        "" if problem.reduction is None else problem.reduction.effect.id
+    )  # of the model, not of the cell
+    found = [
+        _own_parameter(free, state.values[free.owner][free.name], _name(state, free))
+        for free in problem.free(state.hypothesis)
+        if free.own and free.owner != skipped and free.name in state.values.get(free.owner, {})
+    ]
+    return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
+
+
+def _name(state: ModelState, free: FreeParameter) -> str:
+    return state.problem.records[int(free.name)].name if free.owner == STATE_OF_CHARGE else free.name
+
+
+def _own_parameter(free: FreeParameter, value: float, name: str) -> OwnParameter:
+    x, (low, high) = free.coordinate(value), free.bounds
+    near = LIMIT_SHARE * (high - low)
+    return OwnParameter(free.owner, name, free.centre, value, free.unit, x, not low + near < x < high - near)

@@ -1,0 +1,47 @@
+"""What a refit moved, beside the verdict."""
+
+from aesi.pipeline.report.moved import moved_findings, moved_summary
+
+
+def row(parameter, value, deviations, at_limit=False, effect="solid_diffusivity"):
+    return {
+        "effect": effect,
+        "parameter": parameter,
+        "declared": 1.0,
+        "value": value,
+        "unit": "dimensionless",
+        "deviations": deviations,
+        "at_limit": at_limit,
+    }
+
+
+FAR = row("negative_factor", 0.18, -4.0, at_limit=True)
+STAYED = row("positive_factor", 1.02, 0.1)
+
+
+def test_what_moved_is_named_with_how_far_and_what_ended_on_its_limit_is_said_so():
+    (text,) = moved_findings(
+        {"effects": [], "own_parameters": {"recalibrated": [FAR, STAYED], "after": [FAR]}}
+    )
+    assert text == (
+        "Recalibrating moves solid diffusivity (negative) to 0.18 times declared (4.0 standard deviations of its "
+        "tolerance). At the end of what it may be: solid diffusivity (negative). That value is the limit's, not the "
+        "data's."
+    )
+
+
+def test_with_a_finding_the_fit_beside_it_is_told_too():
+    texts = moved_findings(
+        {"effects": ["self_heating"], "own_parameters": {"recalibrated": [FAR], "after": [STAYED]}}
+    )
+    assert texts[1] == "Beside the finding the fit moves no declared parameter by more than its tolerance."
+
+
+def test_where_nothing_was_fitted_nothing_is_told():
+    assert moved_findings({"effects": [], "own_parameters": {"recalibrated": [], "after": []}}) == []
+
+
+def test_a_state_of_charge_is_told_with_what_was_declared():
+    moved = row("drive", 0.973, -2.7, effect="soc0") | {"unit": "1"}
+    text = moved_summary([moved, STAYED])
+    assert text == "the initial state of charge of drive 0.973 (declared 1)"
