@@ -231,7 +231,27 @@ class _Finder:
                     )
                 self.bdf_current |= quantity == "current_a"
                 return True
-        return False
+        return self._of_bdf_in_other_units(quantity)
+
+    def _of_bdf_in_other_units(self, quantity: str) -> bool:
+        """BDF's own names with another of a quantity's units: 'Test Time / h', 'Current / mA'."""
+        stems = {_plain(label.rpartition("/")[0]) for label in BDF.get(quantity, ()) if "/" in label}
+        places = [
+            i
+            for i, name in enumerate(self._table.header)
+            if _plain(name.rpartition("/")[0]) in stems and headers.unit_of(quantity, name)
+        ]
+        found = self._only(places, quantity)
+        if found is None:
+            return False
+        name = self._table.header[found]
+        self.position[quantity] = found
+        self._set_unit(quantity, headers.unit_of(quantity, name) or "")
+        self.notes.append(
+            f"{quantity} was taken from the BDF column {name!r} (converted from {self.unit[quantity]})."
+        )
+        self.bdf_current |= quantity == "current_a"
+        return True
 
     def _set_unit(self, quantity: str, known: str) -> None:
         """The user's unit, that of the line of units, the maker's, or SI; a name that says another is refused."""

@@ -46,7 +46,10 @@ DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text table is written: what a look at its head tells."""
+    """How a text table is written: what a look at its head tells.
+
+    layer : empty cells that a row of this table begins with, in a report that holds those of cycles and steps too.
+    """
 
     encoding: str
     separator: str
@@ -56,6 +59,7 @@ class Layout:
     notes: tuple[str, ...]
     format: Format | None = None
     units: tuple[str, ...] = field(default=())
+    layer: int = 0
 
 
 class TextTable:
@@ -146,9 +150,23 @@ class TextTable:
 
     def _utf8(self) -> BinaryIO:
         """The file as UTF-8 bytes; loggers' files nearly always are, and then nothing is copied."""
+        if self._layout.layer:
+            return self._records_alone()
         if self._layout.encoding in ("utf-8", "utf-8-sig"):
             return self._bytes()
         return cast(BinaryIO, codecs.EncodedFile(self._bytes(), "utf-8", self._layout.encoding))
+
+    def _records_alone(self) -> BinaryIO:
+        """The lines above the table, and of the rows those of its own layer, without the tabs that pad their cells."""
+        layout = self._layout
+        start = layout.separator * layout.layer
+        with self._text() as text:
+            kept = [
+                line.replace("\t", "") if layout.separator != "\t" else line
+                for number, line in enumerate(text)
+                if number < layout.lines_before_data or line.startswith(start)
+            ]
+        return io.BytesIO("".join(kept).encode())
 
     def _text(self) -> io.TextIOWrapper:
         return io.TextIOWrapper(self._bytes(), encoding=self._layout.encoding, errors="replace")
@@ -163,7 +181,7 @@ class TextTable:
                 text.readline()
             reader = csv.reader(text, delimiter=self._layout.separator)
             for cells in reader:
-                if cells:
+                if cells and not any(cells[: self._layout.layer]):
                     yield self._layout.lines_before_data + reader.line_num, cells
 
     def _raise_first_fault(self, positions: tuple[int, ...]) -> int:
@@ -256,7 +274,17 @@ def _layout(text: str, encoding: str, *, whole: bool, name: str, wanted: Collect
         notes.append("Numbers were read with a decimal comma.")
     header = _as_wide_as_the_rows(header, below, separator)
     form, units = (heading.format, heading.units) if heading else (None, ())
-    return Layout(encoding, separator, decimal, header, start + 1 + last, tuple(notes), form, units)
+    layer = _layer(header, below, separator) if form else 0
+    if layer:
+        notes.append("The rows of cycles and steps between the records were passed over.")
+    return Layout(encoding, separator, decimal, header, start + 1 + last, tuple(notes), form, units, layer)
+
+
+def _layer(header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
+    """Columns without a name at the start of the header, where some rows, of other layers, have something there."""
+    nameless = next((i for i, name in enumerate(header) if name), 0)
+    others = any(any(cell.strip() for cell in split(line, separator)[:nameless]) for line in below)
+    return nameless if others else 0
 
 
 def _cells(line: str) -> list[str]:
