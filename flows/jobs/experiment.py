@@ -107,7 +107,7 @@ def _stages(
     )
     summary = run("report", lambda: write_outputs(folder, result))
     tracker.json("comparison.json", comparison(result))
-    track_result(tracker, folder, summary, found.number, fitted)
+    track_result(tracker, folder, summary, found.number, fitted, config.note)
     key = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")
     run.publish(f"{key}-report", _page(folder, summary, tracker), f"What came of {config.name}")
     run.publish(

@@ -166,8 +166,7 @@ def searched(
         chosen = step.admitted
         if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
             break
-        alone = enough(blocks, chosen) or problem.trust == "measured"
-        others = () if alone else (f for f in step.fitted if f is not chosen)
+        others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
     chosen = _pruned(problem, blocks, chosen, steps, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
