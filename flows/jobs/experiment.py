@@ -48,9 +48,9 @@ def _stages(
     console: Console,
     started: float,
 ) -> Path:
+    from aesi.pipeline.experiment.comparison import comparison
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
-    from aesi.pipeline.experiment.judging.comparison import comparison
     from aesi.pipeline.experiment.judging.evaluate import evaluate_models
     from aesi.pipeline.experiment.judging.validation import validation_mser
     from aesi.pipeline.experiment.load import load

@@ -22,7 +22,7 @@ MAY = {
     "aesi/pipeline/experiment/sources.py": "reads the records of every role",
     "aesi/pipeline/experiment/judging/evaluate.py": "judges the models, already chosen",
     "aesi/pipeline/api.py": "takes them from the caller",
-    "aesi/pipeline/experiment/judging/comparison.py": "compares runs by what the evaluation left",
+    "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
     "aesi/pipeline/batch": "hands the files of each cell on",
     "aesi/pipeline/discovery/cases.py": "reads the files",
     "aesi/pipeline/discovery/finding.py": "tells what a reader did to them",

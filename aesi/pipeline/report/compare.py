@@ -36,7 +36,7 @@ class ComparedRun:
     """One tracked run.
 
     settings : dotted key -> text.  metrics : by MLflow's names.
-    comparison : see `aesi.pipeline.experiment.judging.comparison`.  discovery : content of discovery.json.
+    comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
     """
 
     run_id: str
