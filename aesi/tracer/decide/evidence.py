@@ -13,6 +13,7 @@ from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps
+from aesi.tracer.decide.one_cause import in_one
 from aesi.tracer.decide.search import (
     Path,
     Report,
@@ -97,6 +98,7 @@ def gathered(
             path, verdict = wrong, judged(wrong, thresholds)
     if verdict.word == "found":
         path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
+        path, verdict = _with_one_cause(path, verdict, archive, thresholds)
     elif verdict.word == "none" and not _as_declared(replace(problem, trust="exact"), path, archive):
         exact = path_of("exact")
         path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
@@ -147,6 +149,17 @@ def _sharpened(
         return path, verdict
     left, allowed = structured_v(found, found.chosen), tolerance_v(noise_v(found), thresholds)
     return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
+
+
+def _with_one_cause(
+    path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
+) -> tuple[Path, Verdict]:
+    """The same finding by one cause, where one says as much as several wrong parameters together."""
+    one, group = in_one(path, archive)
+    if not group:
+        return path, verdict
+    found = judged(one, thresholds)
+    return (one, replace(found, groups=(group,))) if found.word == "found" else (path, verdict)
 
 
 def _with_confidence(verdict: Verdict) -> Verdict:
