@@ -9,7 +9,6 @@ import numpy as np
 
 from aesi.calibration.fit import Calibration, rewound
 from aesi.constants import MILLI
-from aesi.constants import MILLI
 from aesi.physics.cell import Cell
 
 STEP = 1e-2
