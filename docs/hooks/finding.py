@@ -3,7 +3,7 @@
     python docs/hooks/finding.py FOLDER docs/images/finding.svg [--thermocouple RECORD [--until-s S]] [--witness TEXT]
 
 The measured voltage, its residual as declared, recalibrated and with what was found, the name and size of that, and
-what was measured beside it: RECORD, a record whose temperature the loop was not given, or TEXT in your own words. Errors
+what was measured beside it: RECORD, one whose temperature the loop was not given, or TEXT in your own words. Errors
 are of the part that chose nothing, shaded here. All curves are those that the folder's report carries.
 """
 
