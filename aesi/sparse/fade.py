@@ -12,9 +12,10 @@ outside of what the others visit. As the terms' coefficients are shrunk by a rid
 
 It is for models whose terms are free of the error: in one that feeds back, an amplitude would change its dynamics.
 
-SE is the rule of one standard error. Over the development splits of the NMC drive and the LG M50T in `aesi bench splits`
-(reduction of the squared error, mean; against the recalibrated physics, worst): 63.7 and -3.5 % with it, 64.0 and
--9.3 % with half of it. KAPPA: 64.0 and -9.3 % with 0.1, 61.7 and -6.9 % with 1. DOUBT was chosen there as well.
+SE is the rule of one standard error. Over the development splits of the NMC drive and the LG M50T in
+`aesi bench splits` (reduction of the squared error, mean; against the recalibrated physics, worst): 63.7 and -3.5 %
+with it, 64.0 and -9.3 % with half of it. KAPPA: 64.0 and -9.3 % with 0.1, 61.7 and -6.9 % with 1. DOUBT was chosen
+there as well.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from aesi.conformal import FreeRunBands, Intervals
-from aesi.conformal.free_run import HorizonBand
+from aesi.conformal.horizon_band import HorizonBand
 from aesi.conformal.scores import scores_of
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rmse
