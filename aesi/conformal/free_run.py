@@ -33,7 +33,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.conformal.horizon_band import HorizonBand, calibrate_horizon
+from aesi.conformal.horizon_band import HorizonBand, calibrated_band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
 from aesi.conformal.seen import Seen
@@ -90,7 +90,7 @@ class FreeRunBands:
         ]
         usable = inside or [np.ones(len(c), dtype=bool) for c in columns]
         bands = [
-            calibrate_horizon(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s)
+            calibrated_band(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s)
             for horizon in sorted(errors_by_horizon)
         ]
         return cls(alpha, tuple(bands), seen)

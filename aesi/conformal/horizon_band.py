@@ -1,4 +1,4 @@
-"""The band of one horizon, the time since the last measured voltage: equations (1) and (2) of free_run.py."""
+"""The band at one horizon: equations (1) and (2) of `aesi.conformal.free_run`, calibrated over pieces of drives."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class _Piece:
     columns: Array
 
 
-def calibrate_horizon(
+def calibrated_band(
     horizon: float,
     errors: Sequence[Array],
     columns: Sequence[Array],
@@ -111,7 +111,6 @@ def calibrate_horizon(
     alpha: float,
     dt_s: float,
 ) -> HorizonBand:
-    """The band of one horizon; as for `FreeRunBands.fit`, with the columns of `local_scale.covariates` of each record."""
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
             f"errors at {horizon:g} s and covariates differ in length; give one row a sample of each."

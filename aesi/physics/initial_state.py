@@ -28,7 +28,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Trace
 from aesi.physics.espm.plain import shifted_ocp
 from aesi.physics.model import EspmModel
-from aesi.physics.simulation import model_with, simulate
+from aesi.physics.simulation import ModelName, model_with, simulate
 from aesi.records import Hold, Measurement
 
 Basis = Literal["given", "full charge", "rest", "load"]
@@ -94,16 +94,18 @@ def initial_state(
     effects: Iterable[ActiveEffect] = (),
     *,
     shared: bool = False,
+    model: ModelName = "espm",
 ) -> InitialState:
     """State of charge at the first row of `record`, see above.
 
     record : its temperature is used where it was measured.  soc0 : given by the user, for this record, or (`shared`)
     for several, so that one whose voltage contradicts it starts where its voltage says.
-    hold : how the current runs between rows.  effects : what the cell has beyond its file.
+    hold : how the current runs between rows.  effects : what the cell has beyond its file.  model : that a
+    loaded start is simulated with.
     Raises DataError where the voltage belongs to no state of this cell, or there is neither voltage nor `soc0`.
     """
     active = tuple(effects)
-    start = _Start(cell, record, hold, active)
+    start = _Start(cell, record, hold, active, model)
     if not np.isfinite(record.voltage_v[0]):
         if soc0 is None:
             raise DataError(f"{record.name} has no voltage to start from; give --soc0.")
@@ -117,12 +119,12 @@ def initial_state(
         if abs(read.soc - soc0) <= allowed + 2.0 * read.sd:
             return replace(_given(record, soc0, None), doubt=abs(read.soc - soc0))
         if shared:
-            return read_instead(record, read, soc0)
+            return _read_instead(read, soc0)
         return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
     return start.read()
 
 
-def read_instead(record: Measurement, read: InitialState, soc0: float) -> InitialState:
+def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
     words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
     return InitialState(read.soc, read.sd, read.basis, words, True, read.rest_voltage_v)
@@ -139,8 +141,14 @@ class _Start:
     """The start of one record, against one cell."""
 
     def __init__(
-        self, cell: Cell, record: Measurement, hold: Hold, effects: tuple[ActiveEffect, ...]
+        self,
+        cell: Cell,
+        record: Measurement,
+        hold: Hold,
+        effects: tuple[ActiveEffect, ...],
+        physics: ModelName,
     ) -> None:
+        self.physics = physics
         self.declared, self.record, self.hold, self.effects = cell, record, hold, effects
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
@@ -268,7 +276,9 @@ class _Start:
 
     def _run(self, time_s: Array, current_a: Array, soc: float) -> Array:
         kelvin = self._kelvin() - ZERO_CELSIUS_K
-        run = simulate(self.cell, time_s, current_a, soc, (), kelvin, self.hold, on_depletion="clip")
+        run = simulate(
+            self.cell, time_s, current_a, soc, (), kelvin, self.hold, on_depletion="clip", model=self.physics
+        )
         return run.voltage_v
 
     def _declared(self, soc: float) -> float:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aesi.calibration import Calibration, calibrate
+from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
+from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
@@ -28,7 +30,8 @@ class Request:
     """What a calibration is asked for beside its records: see `aesi.calibration.calibrate`.
 
     temperatures_degc : by record name.  impedance : spectra to hold the result against.  posterior : steps of each
-    walker, 0 for none.  title : name of the cell that is written.
+    walker, 0 for none.  title : name of the cell that is written.  model : that is fitted, "espm" or "dfn"; None takes
+    that of a saved model, else "espm".
     """
 
     soc0: float | None = None
@@ -37,6 +40,7 @@ class Request:
     posterior: int = 0
     seed: int = 0
     title: str | None = None
+    model: ModelName | None = None
 
 
 def calibrate_files(
@@ -47,18 +51,20 @@ def calibrate_files(
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
     asked = request or Request()
-    declared = declared_model(cell).cell
+    given = declared_model(cell)
+    declared, model = given.cell, asked.model or given.model
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     found = calibrate(
         declared,
         measurements,
         soc0=asked.soc0,
         temperatures_degc=asked.temperatures_degc,
+        physics=model,
     )
     if asked.title is not None:
         found = replace(found, cell=replace(found.cell, name=asked.title, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
-    spectra = held_against(found.cell, asked.impedance)
+    spectra = held_against(found.cell, asked.impedance, model=model)
     content = calibration_content(found, [note for m in measurements for note in m.notes], posterior, spectra)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
@@ -91,6 +97,7 @@ def calibration_content(
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
+        "model": found.model.physics,
         "files": [
             {
                 "name": e.name,
@@ -110,6 +117,7 @@ def calibration_content(
         },
         "capacity_ah": found.cell.capacity_ah,
         "declared_capacity_ah": found.declared.capacity_ah,
+        "health": _health_rows(found),
         "undetermined": [
             {"weights": dict(o.weights), "narrowed": o.narrowed, "sentence": o.sentence}
             for o in found.undetermined
@@ -130,6 +138,14 @@ def calibration_content(
     }  # fmt: skip
 
 
+def _health_rows(found: Calibration) -> dict[str, dict[str, float]]:
+    intervals = health_intervals(found)
+    return {
+        name: {"value": value, "low": intervals[name][0], "high": intervals[name][1]}
+        for name, value in asdict(health_of(found.cell)).items()
+    }
+
+
 def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:
     if posterior is None:
         return {}
@@ -140,7 +156,7 @@ def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, fl
 def to_text(content: dict[str, Any]) -> str:
     """The report as Markdown."""
     lines = [
-        f"# Calibration of {content['cell']}", "",
+        f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", "",
         "| file | mean temperature, degC | before, mV | after, mV | capacity |", "|---|---|---|---|---|",
     ]  # fmt: skip
     lines += [
@@ -153,7 +169,12 @@ def to_text(content: dict[str, Any]) -> str:
         "Errors are RMSE on the data that were fitted; the capacity is that of the record over the file's.",
         "",
     ]
-    lines += ["| parameter | value | 95 % interval | unit | prior from |", "|---|---|---|---|---|"]
+    lines += ["| state of health | value | 95 % interval |", "|---|---|---|"]
+    lines += [
+        f"| {HEALTH_WORDS[name]} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} |"
+        for name, p in content["health"].items()
+    ]
+    lines += ["", "| parameter | value | 95 % interval | unit | prior from |", "|---|---|---|---|---|"]
     lines += [
         f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} | {p['prior_from']} |"
         for name, p in content["parameters"].items()

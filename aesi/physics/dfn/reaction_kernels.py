@@ -31,7 +31,7 @@ UPDATE_TOLERANCE_V = 5e-5
 0.05 uV."""
 EASY_STEPS = 6
 """So many without looking back; most steps need two."""
-MOST_STEPS = 100
+MOST_STEPS = 40
 SMALLEST_SHARE = 1.0 / 256.0
 """Of a Newton step, below which it is taken although it does not bring the solution nearer."""
 SMALLEST_SLOPE = 1e-3

@@ -26,9 +26,7 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.records import ErrorSeries, HeldOutDrive, Hold, Split
 from aesi.sparse import with_inputs
 
-DFN_NOTE = (
-    "The physics model is the porous electrode (dfn); tables and figures call it ESPM as they call the other."
-)
+DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +110,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     for name, (measurement, known_soc0) in sources.records.items():
         check_belongs(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        start = initial_state(cell, measurement, declared, config.data.hold, effects)
+        start = initial_state(cell, measurement, declared, config.data.hold, effects, model=model)
         soc0[name] = start.soc
         notes.append(start.sentence)
         even = to_even(measurement, config.data.dt_s)
