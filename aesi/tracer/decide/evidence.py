@@ -12,7 +12,7 @@ from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
-from aesi.tracer.decide.confidence import frequency_maps
+from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.one_cause import in_one
 from aesi.tracer.decide.search import (
     Path,
@@ -163,7 +163,8 @@ def _with_one_cause(
 
 
 def _with_confidence(verdict: Verdict) -> Verdict:
-    return replace(verdict, confidence=frequency_maps()[verdict.word].frequency(verdict.margin))
+    kind = kind_of(verdict.word, verdict.effects)
+    return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
 
 
 def _recalibrated(
