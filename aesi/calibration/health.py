@@ -8,9 +8,9 @@ from dataclasses import astuple, dataclass, fields
 import numpy as np
 
 from aesi.calibration.fit import Calibration, rewound
+from aesi.constants import MILLI
 from aesi.physics.cell import Cell
 
-MILLI = 1e3
 STEP = 1e-2
 """In standard deviations of the priors, for slopes."""
 REACH = 1.96

@@ -31,6 +31,7 @@ __all__ = ["Duplicates", "Reading", "Sign", "read", "read_measurement"]
 MAX_ROWS = 2_000_000
 """A tenth of a second for two days; more rows are decimated, and a note says so."""
 FEW_RESTS = 3
+"""Told one by one; more are told by their number."""
 SUFFIXES = (".gz", ".csv", ".txt", ".tsv", ".bdf", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax")
 
 

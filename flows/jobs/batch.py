@@ -131,7 +131,7 @@ def _on_dask(
 
     try:
         futures = [client.submit(run_job, job, out.resolve(), settings, pure=False) for job in jobs]
-        for future in as_completed(futures):
+        for future in as_completed(futures, loop=client.loop):
             yield future.result()
     finally:
         client.close(timeout=5)

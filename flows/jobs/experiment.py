@@ -49,12 +49,12 @@ def _stages(
     started: float,
 ) -> Path:
     from aesi.pipeline.experiment.comparison import comparison
-    from aesi.pipeline.experiment.evaluate import evaluate_models
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
+    from aesi.pipeline.experiment.judging.evaluate import evaluate_models
+    from aesi.pipeline.experiment.judging.validation import validation_mser
     from aesi.pipeline.experiment.load import load
     from aesi.pipeline.experiment.outputs import Result, write_outputs
-    from aesi.pipeline.experiment.validation import validation_mser
     from aesi.pipeline.notes import together
     from flows.base.stage_cache import Cache
     from flows.search.study import run_study

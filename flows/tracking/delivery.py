@@ -110,7 +110,7 @@ def _send_json(store: Store, item: Item, again: bool) -> None:
 
 
 def _send_model(store: Store, item: Item, again: bool) -> None:
-    from flows.tracking.logged_model import log_hybrid
+    from flows.tracking.serving.logged_model import log_hybrid
 
     log_hybrid(store.uri, item["run_id"], Path(item["path"]), item["registered_as"])
 

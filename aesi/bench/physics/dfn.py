@@ -25,6 +25,7 @@ from aesi.pipeline.cross_check import DEFAULT_MESH, PybammRun, pybamm_run
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 SOC0 = 0.95
+"""Where a load starts, so that charges stay below full."""
 KELVIN = {"25 degC": 298.15, "0 degC": 273.15}
 LARGEST_RATE = {"nmc_30ah": 3.0, "lg_m50_chen2020": 2.0}
 """C-rate of the hardest load of each cell."""

@@ -17,6 +17,7 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 BRUGGEMAN = 1.5
+"""Bruggeman's exponent, for spheres."""
 PARAMETERS = {
     name: Parameter(
         0.8,

@@ -10,9 +10,9 @@ from aesi.parameters import Parameter
 from aesi.physics.effects import CATALOGUE
 
 SAME_SHARE = 0.98
-"""An error after that is not below this share of the recalibrated one is no better than a refit."""
+"""A finding that leaves more than this share of the error of a refit is no better than the refit."""
 TELLING = 1.0
-"""Standard deviations of its tolerance: what a refit moved less is as it was declared, for all that these data say."""
+"""Standard deviations of its tolerance: a parameter that a refit moved by less counts as declared."""
 MOST_PARAMETERS = 3
 """Of an effect, in one sentence."""
 ADDED = "added to what"

@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from aesi.calibration.health import HEALTH_WORDS
 from aesi.pipeline.batch.job import Settings
 from aesi.pipeline.batch.plan import read_plan
@@ -21,7 +23,8 @@ def done(folder, job, ohm):
     (folder / "row.json").write_text(json.dumps({"key": job.key(Settings().key), "row": row}))
 
 
-def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked):
+@pytest.mark.parametrize("runner", ["local", "dask"])
+def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     from flows.jobs.batch import batch
     from flows.tracking.store import Store
 
@@ -32,7 +35,7 @@ def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked):
     out = tracked / "out"
     for job, ohm in zip(read_plan(plan, CELL), (3.0, 5.0), strict=False):
         done(out / job.name, job, ohm)
-    rows = batch(plan, out, CELL, workers=1)
+    rows = batch(plan, out, CELL, workers=1, runner=runner)
     assert [row["status"] for row in rows] == ["done", "done", "failed"]
     trend = json.loads((out / "summary.json").read_text())["trends"]["cell 1"]
     assert [(each["at"], each["resistance_mohm"]) for each in trend] == [(0.0, 3.0), (100.0, 5.0)]

@@ -54,7 +54,7 @@ def evaluate_models(
 ) -> EvaluatedModels:
     """Figures of every model on train, validation and test records, and the traces that the report draws.
 
-    validation : model -> reduction over drives that chose nothing, per cent (`aesi.pipeline.experiment.validation`).
+    validation : model -> reduction over drives that chose nothing, per cent (`judging.validation`).
     """
     traces: dict[tuple[Role, str], dict[str, ModelVoltage]] = {}
     rows, outside = [], {}
