@@ -142,10 +142,10 @@ def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:
 def _sharpened(
     problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
-    """The same finding with the own parameters believed exactly, where that says more of unseen data."""
+    """The same finding with the own parameters believed exactly, where that says as much of unseen data."""
     exact = replace(problem, trust="exact")
     found = refitted(exact, path, archive)
-    if found is None or found.chosen.score.total < path.chosen.score.total:
+    if found is None or found.chosen.score.total < path.chosen.score.total - AS_MUCH_NATS:
         return path, verdict
     left, allowed = structured_v(found, found.chosen), tolerance_v(noise_v(found), thresholds)
     return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
