@@ -58,16 +58,22 @@ class Load:
 
 
 def run(
-    samples: int = 88_200, repeats: int = 3, cell: str = "", seed: int = 0, seconds: int = 200
+    samples: int = 88_200,
+    repeats: int = 3,
+    cell: str = "",
+    seed: int = 0,
+    seconds: int = 200,
+    curves: bool = True,
 ) -> Iterator[CaseRow]:
     """Lines of every load and numbers, then the timing, then the summary.
 
     samples : of the timed drive at 10 Hz, 0 leaves it out.  cell : one of the shipped cells, or a BPX file; both
     shipped ones without it.  seconds : of the drives and pulses that are compared.
+    curves : false for the timing alone.
     """
     worst: dict[str, float] = {}
     names = [cell] if cell else list(LARGEST_RATE)
-    for name in names:
+    for name in names if curves else ():
         for load in benchmark_loads(name, seed, seconds):
             for line in curve(load, repeats):
                 if line.get("in_use"):
