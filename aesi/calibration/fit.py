@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -14,13 +15,16 @@ from aesi.calibration.model import AGEING_SD, Model
 from aesi.calibration.parameters import SPAN_K, Shapes, free_parameters
 from aesi.calibration.records import Prepared, prepared, with_temperatures
 from aesi.calibration.start import one_branch, sized, with_activation
-from aesi.constants import ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
 from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 EVALUATIONS = 40
 GAIN = 1e-4
@@ -91,6 +95,19 @@ class Calibration:
     model: Model
     x: Array
     covariance: Array
+
+    def __repr__(self) -> str:
+        errors = ", ".join(
+            f"{e.name} {MV_PER_V * e.before_v:.1f} -> {MV_PER_V * e.after_v:.1f} mV" for e in self.errors
+        )
+        return f"Calibration(cell {self.cell.name!r}, {errors})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The parameters with their 95 % intervals, units and where their priors are from."""
+        import pandas as pd
+
+        rows = {name: asdict(interval) for name, interval in self.parameters.items()}
+        return pd.DataFrame.from_dict(rows, orient="index")
 
 
 def calibrate(
