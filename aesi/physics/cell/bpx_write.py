@@ -9,6 +9,8 @@ from aesi.physics.cell.parts import (
     FILM_ENERGY,
     FILM_RESISTANCE,
     HEAT_TRANSFER,
+    RATE_FACTORS,
+    UNITY,
     CellParameters,
     Electrode,
 )
@@ -58,9 +60,12 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
             "Transport efficiency": cell.separator.transport_efficiency,
         },
     }
-    own = {CONTACT_RESISTANCE: cell.contact_resistance_ohm, FILM_RESISTANCE: cell.film_resistance_ohm}
+    own: dict[str, Any] = {CONTACT_RESISTANCE: cell.contact_resistance_ohm, FILM_RESISTANCE: cell.film_resistance_ohm}
     if cell.film_resistance_ohm:
         own[FILM_ENERGY] = cell.film_ea_j_mol
+    for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
+        if electrode.rate_factor != UNITY:
+            own[RATE_FACTORS[side]] = to_bpx(electrode.rate_factor)
     if any(own.values()):
         parts["User-defined"] = {name: value for name, value in own.items() if value}
     surroundings = {"Ambient temperature [K]": cell.ambient_temperature_k}

@@ -16,11 +16,16 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell.relations import Constant, Relation
 
 NO_ENTROPY = Constant(0.0)
+UNITY = Constant(1.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
 HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FILM_RESISTANCE = "Film resistance [Ohm]"
 FILM_ENERGY = "Film resistance activation energy [J.mol-1]"
+RATE_FACTORS = {
+    side: f"{side} electrode reaction rate factor" for side in ("Negative", "Positive")
+}
+"""The fields of `Electrode.rate_factor` in the user-defined section."""
 
 
 @dataclass(frozen=True)
@@ -29,8 +34,8 @@ class Electrode:
 
     Lengths in m, concentrations in mol/m3, diffusivity in m2/s at stoichiometry x, open-circuit potential in
     V against Li/Li+, entropic coefficient in V/K, effective solid conductivity in S/m, rate constant in
-    mol/(m2 s) so that the exchange current density is F K sqrt(c_e/c_e0 x (1 - x)), activation energies in
-    J/mol.
+    mol/(m2 s) so that the exchange current density is F K f(x) sqrt(c_e/c_e0 x (1 - x)) with f the rate factor at
+    stoichiometry x, activation energies in J/mol.
     """
 
     thickness_m: float
@@ -46,6 +51,7 @@ class Electrode:
     ocp: Relation
     rate_constant: float
     entropic: Relation = NO_ENTROPY
+    rate_factor: Relation = UNITY
     diffusivity_ea_j_mol: float = 0.0
     rate_ea_j_mol: float = 0.0
     ocp_lithiation: Relation | None = None

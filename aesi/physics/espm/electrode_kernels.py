@@ -83,7 +83,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
     old in, new out.
     """
     region_of, share, exchange = particles.place[:, 1], particles.share, particles.exchange
-    ocp, entropic = surfaces.ocp[side], surfaces.entropic[side]
+    ocp, entropic, rate = surfaces.ocp[side], surfaces.entropic[side], surfaces.rate[side]
     alpha, capacity, plating = surfaces.alpha[side], surfaces.capacity[side], surfaces.plating
     y, theta, theta_pred, give, ohm, salt, log_salt, region_salt = memory[:8]
     delta, dl_current, region_total, plated, plating_current, work = memory[8:]
@@ -107,7 +107,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
             k = 3 * (first + r)
             occupancy = max(t * (1.0 - t), SMALLEST_OCCUPANCY)
             eta, d_eta = overpotential(
-                y[u], exchange[u] * exchange_factor, occupancy,
+                y[u], exchange[u] * exchange_factor * lookup(rate, t), occupancy,
                 salt[k], salt[k + 1], salt[k + 2], log_salt[first + r] , alpha, thermal,
             )  # fmt: skip
             inside = min(max(t, 0.0), 1.0)

@@ -19,6 +19,7 @@ from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
     ocp_table,
+    rate_tables,
     solid_diffusion,
 )
 from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
@@ -134,6 +135,7 @@ def _surfaces(model: EspmModel) -> Surfaces:
     return Surfaces(
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
+        rate=rate_tables(model.cell),
         alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),
         capacity=np.array([interface_capacity(model, side) for side in range(2)]),
         plating=np.array([area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient]),
