@@ -19,6 +19,7 @@ from aesi.errors import DataError, FitError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
+from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
 
 EVALUATIONS = 40
@@ -99,15 +100,16 @@ def calibrate(
     soc0: float | None = None,
     temperatures_degc: Mapping[str, float] | None = None,
     evaluations: int = EVALUATIONS,
+    physics: ModelName = "espm",
 ) -> Calibration:
     """Capacities, stoichiometry windows, potential, diffusion, kinetics, electrolyte and contacts, with temperature.
 
     records : at least one, of any temperatures: their column, or `temperatures_degc` by name, or the cell file's.
-    soc0 : of every record that its voltage does not contradict.
+    soc0 : of every record that its voltage does not contradict.  physics : the model that is fitted.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
-    model, notes = problem(cell, records, soc0, temperatures_degc or {})
+    model, notes = problem(cell, records, soc0, temperatures_degc or {}, physics)
     x = descended(model, evaluations)
     jacobian, errors = model.jacobian(x), model.errors(x)
     weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
@@ -142,6 +144,7 @@ def problem(
     records: Sequence[Measurement],
     soc0: float | None,
     temperatures_degc: Mapping[str, float],
+    physics: ModelName = "espm",
 ) -> tuple[Model, tuple[str, ...]]:
     """What is fitted, and sentences on how it was set up."""
     if not records:
@@ -152,13 +155,13 @@ def problem(
     kept = [one_branch(start, data) for data in records]
     placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
     start, typical = with_activation(start)
-    ready = prepared(start, placed, soc0)
+    ready = prepared(start, placed, soc0, physics)
     for one in ready:
         _check_charge(start, one)
     span = _span_k(start, ready)
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
-    model = Model(start, ready, free_parameters(start, span), Shapes.over(start, span))
+    model = Model(start, ready, free_parameters(start, span), Shapes.over(start, span), physics)
     starts = tuple(r.start.sentence for r in ready)
     return model, (*notes, *(n for _, more in kept for n in more), *told, *typical, *starts)
 

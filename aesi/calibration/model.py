@@ -10,12 +10,13 @@ from aesi.calibration.parameters import Free, Shapes, moved
 from aesi.calibration.records import Prepared
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.espm.extended import run_extended
-from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
+from aesi.physics.simulation import ModelName, solver
 
 SOLID_ORDER = 8
 """Eight modes resolve a particle to 0.4 mV under a drive to 3C."""
+ELECTRODE_POINTS = 4
+"""Of the porous electrode: to 0.14 mV on discharges of the shipped cells to 1C."""
 MOST_STEPS = 4
 ERROR_V = 5e-3
 """What a calibrated single-particle model is expected to miss."""
@@ -69,8 +70,14 @@ class Model:
     """Residuals of prepared records under a working vector, each coordinate a standard normal deviate a priori."""
 
     def __init__(
-        self, cell: Cell, records: tuple[Prepared, ...], free: tuple[Free, ...], shapes: Shapes
+        self,
+        cell: Cell,
+        records: tuple[Prepared, ...],
+        free: tuple[Free, ...],
+        shapes: Shapes,
+        physics: ModelName = "espm",
     ) -> None:
+        self.physics = physics
         self.cell, self.records, self.free, self.shapes = cell, records, free, shapes
         self.layout = WorkingVector(len(free), shapes.n_ocp, shapes.n_entropic, len(records))
         self.zero_a = ZERO_SHARE * max(float(np.abs(r.data.current_a).max()) for r in records)
@@ -97,14 +104,19 @@ class Model:
             negative=replace(cell.negative, c_max_mol_m3=cell.negative.c_max_mol_m3 * aged),
             positive=replace(cell.positive, c_max_mol_m3=cell.positive.c_max_mol_m3 * aged),
         )
-        model = EspmModel(cell, solid_order=SOLID_ORDER, substep_s=record.longest_s, most_substeps=MOST_STEPS)
+        model = EspmModel(
+            cell,
+            solid_order=SOLID_ORDER,
+            electrode_points=ELECTRODE_POINTS,
+            substep_s=record.longest_s,
+            most_substeps=MOST_STEPS,
+        )
         soc = record.start.soc + record.soc_sd * float(x[self.layout.soc(index)])
         current = record.rows.current_a
         if record.slow:
             current = current - self.zero_a * float(x[self.layout.zero]) * record.flows
-        if record.kelvin is None and model.is_plain:
-            return run_plain(model, record.rows.time_s, current, soc, record.hold)[0]
-        return run_extended(model, record.rows.time_s, current, record.kelvin, soc, record.hold)[0]
+        solve = solver(self.physics)
+        return solve(model, record.rows.time_s, current, record.kelvin, soc, record.hold)[0]
 
     def errors(self, x: Array) -> list[Array]:
         """(rows,) V of each record, measured less model."""

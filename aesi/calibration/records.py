@@ -14,6 +14,7 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
+from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement
 
 SOC_SD = 0.005
@@ -55,15 +56,19 @@ class Prepared:
         return None if self.kelvin is None else float(self.kelvin.mean())
 
 
-def prepared(cell: Cell, records: Sequence[Measurement], soc0: float | None) -> tuple[Prepared, ...]:
+def prepared(
+    cell: Cell, records: Sequence[Measurement], soc0: float | None, physics: ModelName = "espm"
+) -> tuple[Prepared, ...]:
     """Every record with its rows and its initial state.  soc0 : of all that their voltage does not contradict."""
-    return tuple(_prepared(cell, data, soc0, len(records) > 1) for data in records)
+    return tuple(_prepared(cell, data, soc0, len(records) > 1, physics) for data in records)
 
 
-def _prepared(cell: Cell, data: Measurement, soc0: float | None, shared: bool) -> Prepared:
+def _prepared(
+    cell: Cell, data: Measurement, soc0: float | None, shared: bool, physics: ModelName
+) -> Prepared:
     window_s = max(1.0, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
     thin = thinned(data, cell.capacity_ah, window_s)
-    start = initial_state(cell, data, soc0, data.hold or "backward", shared=shared)
+    start = initial_state(cell, data, soc0, data.hold or "backward", shared=shared, model=physics)
     sd = start.sd if start.basis == "given" else max(start.sd, SOC_SD)
     temperature = thin.data.temperature_degc
     current = np.abs(thin.data.current_a)

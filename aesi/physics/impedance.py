@@ -7,8 +7,9 @@ answers with the modes of the electrolyte; kinetics are a resistance R T/(F j0),
 
     x_u = -(lump/(jw) + sum gains/(jw + rates)) y_u,      phi_u = U' x_u + R_u y_u,      i_r = sum_u y_u + jw C phi_r
 
-All regions of an electrode see one potential, as in time. Leaves out what has no linear answer at rest: hysteresis (a
-small sine turns within it), plating, and the heat of a current, which is of second order.
+All regions of an electrode see one potential, as in time; the porous electrode is in `dfn.linear`. Leaves out what has
+no linear answer at rest: hysteresis (a small sine turns within it), plating, and the heat of a current, which is of
+second order.
 
 Source: Meddings et al., J. Power Sources 480 (2020) 228742, doi:10.1016/j.jpowsour.2020.228742, for the practice.
 """
@@ -24,6 +25,7 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array, ComplexArray
+from aesi.physics.arguments import check_choice
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
 from aesi.physics.effect import ActiveEffect, Record, Trace
@@ -32,7 +34,7 @@ from aesi.physics.espm.layout import Units
 from aesi.physics.espm.plain import arrhenius, shifted_ocp, stack_of
 from aesi.physics.espm.tables import solid_diffusion
 from aesi.physics.model import EspmModel
-from aesi.physics.simulation import model_with
+from aesi.physics.simulation import ModelName, model_with
 
 SLOPE_STEP = 1e-4
 """Of stoichiometry: tables of potentials have steps of 1.2e-4."""
@@ -45,10 +47,13 @@ def impedance(
     soc: float,
     temperature_degc: float = 25.0,
     effects: Iterable[ActiveEffect] = (),
+    *,
+    model: ModelName = "espm",
 ) -> ComplexArray:
     """Impedance of `cell` at rest.
 
-    frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows.  effects : as in `simulate`.
+    frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows.  effects, model : as in
+    `simulate`.
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
     Raises DataError for frequencies or a state that have none.
     """
@@ -59,15 +64,25 @@ def impedance(
     kelvin = _shifted(active, temperature_degc + ZERO_CELSIUS_K)
     if not np.isfinite(kelvin) or kelvin <= 0.0:
         raise DataError("temperature_degc has to be a number above -273.15 degC.")
-    model = model_with(cell, active)
-    rest = np.array(model.cell.stoichiometries(soc))
+    check_choice("model", model, ModelName)
+    changed = model_with(cell, active)
+    rest = np.array(changed.cell.stoichiometries(soc))
     if not ((rest > 0.0) & (rest < 1.0)).all():
         raise DataError(
             f"{cell.name} has no state of charge of {soc:g}: a stoichiometry leaves (0, 1) there."
         )
-    if model.negative.plating is not None:
+    if changed.negative.plating is not None:
         raise SimulationError("lithium plating has no linear answer at rest; leave the effect out.")
-    return _Linear(model, rest, kelvin).impedance(2.0 * np.pi * frequency) + _series(model, active)
+    omega: Array = 2.0 * np.pi * frequency
+    if model == "dfn":
+        from aesi.physics.dfn.linear import porous_impedance
+        from aesi.physics.dfn.run import check_whole
+
+        check_whole(changed)
+        z = porous_impedance(changed, _slopes(changed.cell, rest, kelvin), rest, kelvin, omega)
+    else:
+        z = _Linear(changed, rest, kelvin).impedance(omega)
+    return z + _series(changed, active)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +133,12 @@ class _Linear:
     def _local(self, units: Units, s: ComplexArray) -> ComplexArray:
         """(frequencies, units) ohm m2: kinetics, and open-circuit slope times what the surface loses."""
         cell = self.model.cell
+        slopes = _slopes(cell, self.rest, self.kelvin)
         out = np.zeros((len(s), len(units.place)), dtype=complex)
         for side, electrode in enumerate((cell.negative, cell.positive)):
             at = self.rest[side]
             here = np.flatnonzero(units.place[:, 0] == side)
-            slope = _slope(shifted_ocp(electrode, self.kelvin - cell.reference_temperature_k), at)
+            slope = slopes[side]
             kinetic = arrhenius(electrode.rate_ea_j_mol, self.kelvin, cell.reference_temperature_k)
             thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
             faster = arrhenius(electrode.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
@@ -172,6 +188,13 @@ class _Linear:
     def _kappa(self) -> float:
         e = self.model.cell.electrolyte
         return float(e.conductivity(np.array([e.c0_mol_m3]))[0])
+
+
+def _slopes(cell: Cell, rest: Array, kelvin: float) -> Array:
+    """(2,) V: dU/dx of both electrodes at stoichiometries `rest` (2,)."""
+    rise = kelvin - cell.reference_temperature_k
+    electrodes = (cell.negative, cell.positive)
+    return np.array([_slope(shifted_ocp(x, rise), at) for x, at in zip(electrodes, rest, strict=True)])
 
 
 def _slope(relation: Relation, at: float) -> float:

@@ -28,7 +28,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Trace
 from aesi.physics.espm.plain import shifted_ocp
 from aesi.physics.model import EspmModel
-from aesi.physics.simulation import model_with, simulate
+from aesi.physics.simulation import ModelName, model_with, simulate
 from aesi.records import Hold, Measurement
 
 Basis = Literal["given", "full charge", "rest", "load"]
@@ -88,16 +88,18 @@ def initial_state(
     effects: Iterable[ActiveEffect] = (),
     *,
     shared: bool = False,
+    model: ModelName = "espm",
 ) -> InitialState:
     """State of charge at the first row of `record`, see above.
 
     record : its temperature is used where it was measured.  soc0 : given by the user, for this record, or (`shared`)
     for several, so that one whose voltage contradicts it starts where its voltage says.
-    hold : how the current runs between rows.  effects : what the cell has beyond its file.
+    hold : how the current runs between rows.  effects : what the cell has beyond its file.  model : that a
+    loaded start is simulated with.
     Raises DataError where the voltage belongs to no state of this cell, or there is neither voltage nor `soc0`.
     """
     active = tuple(effects)
-    start = _Start(cell, record, hold, active)
+    start = _Start(cell, record, hold, active, model)
     if not np.isfinite(record.voltage_v[0]):
         if soc0 is None:
             raise DataError(f"{record.name} has no voltage to start from; give --soc0.")
@@ -138,8 +140,14 @@ class _Start:
     """The start of one record, against one cell."""
 
     def __init__(
-        self, cell: Cell, record: Measurement, hold: Hold, effects: tuple[ActiveEffect, ...]
+        self,
+        cell: Cell,
+        record: Measurement,
+        hold: Hold,
+        effects: tuple[ActiveEffect, ...],
+        physics: ModelName,
     ) -> None:
+        self.physics = physics
         self.declared, self.record, self.hold, self.effects = cell, record, hold, effects
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
@@ -267,7 +275,9 @@ class _Start:
 
     def _run(self, time_s: Array, current_a: Array, soc: float) -> Array:
         kelvin = self._kelvin() - ZERO_CELSIUS_K
-        run = simulate(self.cell, time_s, current_a, soc, (), kelvin, self.hold, on_depletion="clip")
+        run = simulate(
+            self.cell, time_s, current_a, soc, (), kelvin, self.hold, on_depletion="clip", model=self.physics
+        )
         return run.voltage_v
 
     def _declared(self, soc: float) -> float:

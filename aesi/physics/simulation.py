@@ -9,7 +9,7 @@ solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache, partial
 from typing import Literal
 
@@ -28,6 +28,8 @@ from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
 
 ModelName = Literal["espm", "dfn"]
+MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
+"""How reports call the models."""
 OnDepletion = Literal["raise", "clip"]
 
 
@@ -74,7 +76,7 @@ def simulate(
     time, current = _checked_record(time_s, current_a)
     active = _instruments_first(checked_effects(effects))
     across: dict[str, Array] | None = {} if profiles else None
-    solve = _solver(model, across)
+    solve = solver(model, across)
     changed = model_with(cell, active)
     record = Record(time, current, _kelvin(temperature_degc, time))
     for effect in active:
@@ -132,8 +134,11 @@ Solver = Callable[
 first fault and what it was."""
 
 
-def _solver(name: str, profiles: dict[str, Array] | None) -> Solver:
-    """The model of that name; it is imported, and its compiled code read, when it is first used."""
+def solver(name: str, profiles: dict[str, Array] | None = None) -> Solver:
+    """The model of that name; it is imported, and its compiled code read, when it is first used.
+
+    profiles : is given what `Run.profiles` names.  Raises InputError for another name.
+    """
     if name == "espm":
         if profiles is not None:
             raise InputError("profiles across the electrodes are of the porous electrode; use model='dfn'.")

@@ -10,6 +10,7 @@ from aesi.calibration import Calibration
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, read
+from aesi.physics import ModelName
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.discovery.cases import MOST_ROWS
 from aesi.pipeline.discovery.discover import Case, run_case
@@ -34,6 +35,7 @@ def discover(
     seed: int = 0,
     hold: Hold | None = None,
     effect_files: Sequence[str | PathLike[str]] = (),
+    model: ModelName | None = None,
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Finding:
@@ -45,6 +47,7 @@ def discover(
     soc0 : state of charge at the first sample; None takes it from the voltage.
     hold : how the current runs between rows; None takes what the records say.
     effect_files : Python files with effects of your own; they are run, so name only files that you trust.
+    model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably.
     out : a folder for discovery.json, report.html and model/, and for fits, so that an interrupted search goes on.
 
     Raises AesiError, one sentence, for what cannot be read, decided or be of this cell.
@@ -54,7 +57,7 @@ def discover(
     measurements, judged = (tuple(_read(one, rows, hold) for one in part) for part in (looked, tested))
     check_belongs(given.cell, [*measurements, *judged])
     files = tuple(Path(file) for file in effect_files)
-    case = Case(given, measurements, judged, soc0, holdout, max_effects, seed, files)
+    case = Case(given, measurements, judged, soc0, holdout, max_effects, seed, files, model=model)
     finding = Finding(case, run_case(case, None if out is None else Path(out), progress))
     if out is not None:
         finding.save(Path(out))
@@ -68,17 +71,20 @@ def calibrate(
     soc0: float | None = None,
     temperatures_degc: Mapping[str, float] | None = None,
     hold: Hold | None = None,
+    model: ModelName | None = None,
 ) -> Calibration:
     """Fit the parameters that a cell's file declares to measurements; the fitted cell is `.cell` of what comes back.
 
     cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
     temperatures_degc : of records without a temperature column, by name.
+    model : that is fitted, "espm" or "dfn"; None takes that of a saved model, else "espm".
     Raises AesiError, one sentence, for what cannot be used.
     """
-    declared = declared_model(cell).cell
+    given = declared_model(cell)
+    declared, physics = given.cell, model or given.model
     measurements = [_read(one, None, hold) for one in _listed(data)]
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    return fit_cell(declared, measurements, soc0=soc0, temperatures_degc=temperatures_degc)
+    return fit_cell(declared, measurements, soc0=soc0, temperatures_degc=temperatures_degc, physics=physics)
 
 
 def _listed(records: Data) -> list[FileOrRecord]:

@@ -13,6 +13,7 @@ import numpy as np
 from aesi.calibration import Calibration, calibrate
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
+from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
@@ -28,7 +29,8 @@ class Request:
     """What a calibration is asked for beside its records: see `aesi.calibration.calibrate`.
 
     temperatures_degc : by record name.  impedance : spectra to hold the result against.  posterior : steps of each
-    walker, 0 for none.  title : name of the cell that is written.
+    walker, 0 for none.  title : name of the cell that is written.  model : that is fitted, "espm" or "dfn"; None takes
+    that of a saved model, else "espm".
     """
 
     soc0: float | None = None
@@ -37,6 +39,7 @@ class Request:
     posterior: int = 0
     seed: int = 0
     title: str | None = None
+    model: ModelName | None = None
 
 
 def calibrate_files(
@@ -47,18 +50,20 @@ def calibrate_files(
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
     asked = request or Request()
-    declared = declared_model(cell).cell
+    given = declared_model(cell)
+    declared, model = given.cell, asked.model or given.model
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     found = calibrate(
         declared,
         measurements,
         soc0=asked.soc0,
         temperatures_degc=asked.temperatures_degc,
+        physics=model,
     )
     if asked.title is not None:
         found = replace(found, cell=replace(found.cell, name=asked.title, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
-    spectra = held_against(found.cell, asked.impedance)
+    spectra = held_against(found.cell, asked.impedance, model=model)
     content = to_json(found, [note for m in measurements for note in m.notes], posterior, spectra)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
@@ -91,6 +96,7 @@ def to_json(
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
+        "model": found.model.physics,
         "files": [
             {
                 "name": e.name,
@@ -140,7 +146,7 @@ def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, fl
 def to_text(content: dict[str, Any]) -> str:
     """The report as Markdown."""
     lines = [
-        f"# Calibration of {content['cell']}", "",
+        f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", "",
         "| file | mean temperature, degC | before, mV | after, mV | capacity |", "|---|---|---|---|---|",
     ]  # fmt: skip
     lines += [

@@ -11,7 +11,7 @@ import numpy as np
 from aesi.data.readers import open_table
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, ComplexArray
-from aesi.physics import Cell, impedance
+from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import activated
 from aesi.pipeline.product.declared import declared_model
@@ -30,15 +30,17 @@ def impedance_file(
     temperature_degc: float = 25.0,
     effects: Sequence[tuple[str, Mapping[str, float]]] = (),
     effect_files: Sequence[Path] = (),
+    model: ModelName | None = None,
 ) -> ComplexArray:
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
 
     cell : a BPX file, or a folder of a saved model, whose effects are taken.  frequencies : LOW:HIGH:N in Hz,
-    log-spaced, or a CSV with a column frequency_hz.
+    log-spaced, or a CSV with a column frequency_hz.  model : "espm" or "dfn"; None takes that of a saved model.
     """
-    model = declared_model(cell)
+    declared = declared_model(cell)
     hz = read_frequencies(frequencies)
-    z = impedance(model.cell, hz, soc, temperature_degc, (*model.effects, *activated(effects, effect_files)))
+    active = (*declared.effects, *activated(effects, effect_files))
+    z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     return z
 
@@ -75,7 +77,10 @@ class SpectrumError:
 
 
 def held_against(
-    cell: Cell, spectra: Sequence[Spectrum], effects: Sequence[ActiveEffect] = ()
+    cell: Cell,
+    spectra: Sequence[Spectrum],
+    effects: Sequence[ActiveEffect] = (),
+    model: ModelName = "espm",
 ) -> tuple[SpectrumError, ...]:
     """Each spectrum beside the cell's; one below empty or above full is left out."""
     out = []
@@ -86,7 +91,7 @@ def held_against(
         if not 0.0 <= soc <= 1.0:
             continue
         degc = 25.0 if spectrum.temperature_degc is None else spectrum.temperature_degc
-        z = impedance(cell, spectrum.frequency_hz, soc, degc, effects)
+        z = impedance(cell, spectrum.frequency_hz, soc, degc, effects, model=model)
         seen = (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
         ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
         out.append(SpectrumError(spectrum, soc, z, float(np.sqrt(np.mean(ratio**2)))))

@@ -62,7 +62,8 @@ def simulate_file(
     record = _record(profile, current, hold)
     taken = hold or ("linear" if profile.voltage_v is None else assumed_hold(profile.time_s))
     check_belongs(declared.cell, [record])
-    start = _start(replace(declared, effects=active, hold=taken), record, soc0)
+    used = replace(declared, effects=active, hold=taken, model=model or declared.model)
+    start = _start(used, record, soc0)
     say([start.sentence, hold_sentence(record.name, taken, hold is not None)])
     run = simulate(
         declared.cell,
@@ -72,7 +73,7 @@ def simulate_file(
         active,
         profile.temperature_degc,
         taken,
-        model=model or declared.model,
+        model=used.model,
     )
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out)
@@ -193,7 +194,7 @@ def _start(model: HybridModel, record: Measurement, soc0: float | None) -> Initi
     """The state of charge at the first row: as given, from the voltage, or the saved model's."""
     if soc0 is None and not np.isfinite(record.voltage_v[0]):
         soc0 = model.soc0
-    return initial_state(model.cell, record, soc0, model.hold, model.effects)
+    return initial_state(model.cell, record, soc0, model.hold, model.effects, model=model.model)
 
 
 def _silent(notes: Iterable[str]) -> None:

@@ -13,13 +13,14 @@ from aesi.errors import DataError
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.checks import check_measurement, check_record, check_same_cell
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
-from aesi.tracer.case.reduction import with_fine_numerics
 from aesi.tracer.decide.archive import Archive, context_of
 from aesi.tracer.decide.evidence import Evidence, gathered
+from aesi.tracer.decide.model_choice import ModelChoice, with_model
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
@@ -66,7 +67,8 @@ class Discovery:
     own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
     soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
     part.  before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
-    tell them apart.  warnings : where the written model does worse than another one on the test part.
+    tell them apart.  choice : of the model of the cell.  warnings : where the written model does worse than another one
+    on the test part.
     """
 
     cell: Cell
@@ -81,6 +83,7 @@ class Discovery:
     hold: Hold
     effects: Mapping[str, Effect]
     experiments: tuple[tuple[tuple[str, ...], str], ...]
+    choice: ModelChoice
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
@@ -101,6 +104,7 @@ def discover(
     given: Sequence[ActiveEffect] = (),
     archive: FilePath | None = None,
     progress: Progress | None = None,
+    model: ModelName | None = None,
 ) -> Discovery:
     """Find what `cell` lacks to explain the measurements.
 
@@ -108,7 +112,8 @@ def discover(
     tests : files that choose nothing.  soc0 : state of charge at the first sample; None takes it from the
     rest voltage.
     effects : what may be tried.  given : effects that the declared model has already.  archive : a file that
-    keeps fits, so that an interrupted search resumes.
+    keeps fits, so that an interrupted search resumes.  model : "espm" or "dfn" for every hypothesis; None takes the
+    porous electrode where it differs notably from the single particle.
 
     Raises DataError where the data cannot decide anything or do not belong to the cell.
     """
@@ -123,16 +128,19 @@ def discover(
     tested = tuple(prepare_test(cell, data, measurements, soc0, given) for data in tests)
     there = {active.id for active in given} - _own(effects)
     tried = {name: effect for name, effect in effects.items() if name not in there}
-    problem = with_fine_numerics(InverseProblem(cell, records, tried, fixed=tuple(given)))
+    problem = InverseProblem(cell, records, tried, fixed=tuple(given), model=model or "espm")
     declared = ModelState(problem)
     for index, record in enumerate((*records, *tested)):
         run = declared.simulated(record, index if index < len(records) else None, thin=True)
         check_same_cell(record.name, record.thin.voltage_v - run.voltage_v, cell)
     spent = _Spent(progress)
-    kept = Archive(archive, context_of(problem))
-    evidence = gathered(problem, max_effects, kept, Thresholds(), spent)
+
+    def search(one: InverseProblem, kept: Archive) -> Evidence:
+        return gathered(one, max_effects, kept, Thresholds(), spent)
+
+    evidence, choice = with_model(problem, model, search, lambda one: Archive(archive, context_of(one)))
     return _told(
-        evidence, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
+        evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )
 
 
@@ -164,6 +172,7 @@ class _Spent:
 
 def _told(
     evidence: Evidence,
+    choice: ModelChoice,
     tested: Sequence[PreparedRecord],
     simulations: int,
     rng: np.random.Generator,
@@ -192,7 +201,8 @@ def _told(
         hold=records[0].hold,
         effects=problem.effects,
         experiments=tuple((g, experiment(g, problem.effects)) for g in verdict.groups),
-        notes=_notes(evidence, tested),
+        choice=choice,
+        notes=(choice.sentence, *_notes(evidence, tested)),
         warnings=_warnings(files),
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         seconds=seconds,
@@ -203,11 +213,6 @@ def _told(
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, ...]:
     notes = [note for record in (*evidence.path.problem.records, *tested) for note in record.notes]
     notes += [note for path in evidence.paths.values() for note in path.notes]
-    if evidence.path.problem.reduction is not None:
-        notes.append(
-            "the declared porous electrode moves the voltage by more than a tenth of the noise against the single "
-            "particle, and every hypothesis could use it."
-        )
     notes += evidence.limits
     if evidence.fault is not None:
         notes.append(f"not adopted: {evidence.fault}.")

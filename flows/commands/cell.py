@@ -108,6 +108,7 @@ def calibrate(
     ] = 0,
     title: Annotated[str | None, typer.Option(help="Name of the cell in the file that is written.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the posterior's samples.")] = 0,
+    model: options.ModelOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements of any temperatures together."""
     options.say_reading(data)
@@ -121,6 +122,7 @@ def calibrate(
         posterior=posterior,
         seed=seed,
         title=title,
+        model=model,
     )
     records = options.measurements(data, reading, hold, options.by_file("--until", until))
     flow(cell, records, out, request)
@@ -136,6 +138,7 @@ def impedance(
     temperature_degc: Annotated[float, typer.Option(help="Of the cell.")] = 25.0,
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
+    model: options.ModelOption = None,
 ) -> None:
     """The physics model in the frequency domain, at rest."""
     from aesi.pipeline.impedance import impedance_file
@@ -148,6 +151,7 @@ def impedance(
         temperature_degc,
         [options.effect_values(text) for text in effect or []],
         effect_file or [],
+        model,
     )
     typer.echo(
         f"{out}: {len(z):,} frequencies, {1e3 * z.real.min():.4g} to {1e3 * z.real.max():.4g} mOhm", err=True
@@ -190,6 +194,13 @@ def discover(
     without: Annotated[
         list[str] | None, typer.Option("--without", help="Leave this effect out; may be repeated.")
     ] = None,
+    model: Annotated[
+        Literal["espm", "dfn"] | None,
+        typer.Option(
+            "--model",
+            help="Single particle or porous electrode; without it the porous electrode where the two differ notably.",
+        ),
+    ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="key=value laid over the experiment file.")
     ] = None,
@@ -221,6 +232,7 @@ def discover(
         hold,
         only or [],
         without or [],
+        model,
     )
     options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
     flow(case, out, prefect)

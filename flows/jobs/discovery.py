@@ -140,6 +140,7 @@ def _track_result(
     tracker.parameters(
         {
             "cell": found.cell.name,
+            "model": found.choice.model,
             "data": ", ".join(m.name for m in case.measurements),
             "data_digest": ", ".join(m.digest for m in case.measurements),
             "test": ", ".join(m.name for m in case.tests),

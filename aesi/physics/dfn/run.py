@@ -34,11 +34,7 @@ def run_porous_electrode(
     """
     from aesi.physics.dfn.record_kernels import run_porous
 
-    if model.regions != 1:
-        raise InputError(
-            "reaction_nonuniformity is what the porous-electrode model has of itself; leave it out, or use model "
-            "'espm'."
-        )
+    check_whole(model)
     particles, stack, electrodes = porous_arguments(model)
     out = np.empty((9, len(time)))
     given = temperature_k is not None
@@ -56,6 +52,15 @@ def run_porous_electrode(
     if profiles is not None:
         profiles.update(_named(model, profile))
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
+
+
+def check_whole(model: EspmModel) -> None:
+    """Raises InputError for an electrode cut into regions."""
+    if model.regions != 1:
+        raise InputError(
+            "reaction_nonuniformity is what the porous-electrode model has of itself; leave it out, or use model "
+            "'espm'."
+        )
 
 
 def _named(model: EspmModel, profile: Array) -> dict[str, Array]:

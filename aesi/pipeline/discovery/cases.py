@@ -7,6 +7,7 @@ from pathlib import Path
 
 from aesi.data.read import Reading, read
 from aesi.errors import ConfigError
+from aesi.physics import ModelName
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
@@ -32,6 +33,7 @@ def case_of_files(
     hold: Hold | None = None,
     only: Sequence[str] = (),
     without: Sequence[str] = (),
+    model: ModelName | None = None,
 ) -> Case:
     """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
 
@@ -52,6 +54,7 @@ def case_of_files(
         tuple(effect_files),
         tuple(only),
         tuple(without),
+        model,
     )
 
 
@@ -74,6 +77,7 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         wanted.holdout,
         wanted.max_effects,
         config.seed,
+        model=config.cell.model,
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
+from aesi.physics.simulation import ModelName
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -38,6 +39,7 @@ class Case:
 
     cell : a BPX file, or a saved model or its folder, whose cell and effects are what is declared.
     only, without : ids of the effects that are tried, or are not; all where neither names one.
+    model : "espm" or "dfn" for every hypothesis; None: that of a saved porous electrode, else what the data ask for.
     """
 
     cell: Path | HybridModel
@@ -50,6 +52,7 @@ class Case:
     effect_files: tuple[Path, ...] = ()
     only: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
+    model: ModelName | None = None
 
     def tried(self) -> dict[str, Effect]:
         """The effects that compete.  Raises InputError for an effect file or an id that is none."""
@@ -73,6 +76,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
         given=given.effects,
         archive=None if out is None else out / ARCHIVE,
         progress=progress,
+        model=case.model or ("dfn" if given.model == "dfn" else None),
     )
 
 
@@ -99,7 +103,7 @@ def found_model(found: Discovery) -> HybridModel:
     if not inside.same_window(found.cell):
         inside = folded(found.cell, ())
     left = inside.left if inside.held else found.model_effects
-    return HybridModel(inside.cell, left, soc0=found.soc0, hold=found.hold)
+    return HybridModel(inside.cell, left, soc0=found.soc0, hold=found.hold, model=found.choice.model)
 
 
 def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
@@ -112,6 +116,7 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         "indistinguishable": [list(group) for group in verdict.groups],
         "confidence": round(verdict.confidence, 4),
         "reason": verdict.reason,
+        "model": _model(found),
         **{state: {part: _errors(found, state, part) for part in ("fit", "test")} for state in STATES},
         "noise_floor_mv": MV * found.noise_floor_v,
         "explainable_mv": MV * found.after.yardstick.explained_v,
@@ -143,6 +148,15 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         "seconds": round(found.seconds, 2),
         "simulations": found.simulations,
     }
+
+
+def _model(found: Discovery) -> dict[str, Any]:
+    """Which model of the cell every hypothesis used, and by how much the two of the declared cell differ."""
+    choice, told = found.choice, found.choice.reduction
+    out: dict[str, Any] = {"name": choice.model, "sentence": choice.sentence}
+    if told is not None:
+        out |= {"differ_rms_mv": MV * told.shift_v, "of_noise": told.shift_v / told.noise_v}
+    return out
 
 
 def _errors(found: Discovery, state: State, part: Part) -> dict[str, float]:

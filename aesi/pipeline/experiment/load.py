@@ -145,7 +145,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     for name, (measurement, known_soc0) in sources.records.items():
         check_belongs(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        start = initial_state(cell, measurement, declared, config.data.hold, effects)
+        start = initial_state(cell, measurement, declared, config.data.hold, effects, model=model)
         soc0[name] = start.soc
         notes.append(start.sentence)
         even = to_even(measurement, config.data.dt_s)

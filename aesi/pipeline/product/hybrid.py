@@ -126,7 +126,7 @@ class HybridModel:
         if soc0 is not None:
             return soc0
         if measured:
-            return initial_state(self.cell, record, None, self.hold, self.effects).soc
+            return initial_state(self.cell, record, None, self.hold, self.effects, model=self.model).soc
         if self.soc0 is None:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
         return self.soc0

@@ -15,6 +15,7 @@ from aesi.parameters import Parameter
 from aesi.physics import simulate
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
+from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.free_parameter import (
     STATE_OF_CHARGE,
@@ -24,7 +25,7 @@ from aesi.tracer.case.free_parameter import (
     state_of_charge,
 )
 from aesi.tracer.case.records import PreparedRecord
-from aesi.tracer.case.stepping import stepping
+from aesi.tracer.case.stepping import FEWER_POINTS, stepping
 
 Trust = Literal["exact", "tight", "loose"]
 """How far the declared parameters are believed: as fitted to this very cell by this very model, as a careful
@@ -37,27 +38,11 @@ ValuesByOwner = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class ReductionError:
-    """What the declared porous electrode has beyond the reduced model, at a reference point: fitted as one column.
-
-    effect : takes the reduction back.  columns_v : one array a record, (n_fit,) V at full strength.
-    """
-
-    effect: Effect
-    columns_v: tuple[Array, ...]
-
-    @property
-    def name(self) -> str:
-        """Of the effect's only parameter."""
-        return next(iter(self.effect.parameters))
-
-
-@dataclass(frozen=True, eq=False)
 class InverseProblem:
     """One case.
 
     effects : id -> Effect, all that may be tried or moved.  own : ids of the declared parameters that every hypothesis
-    may move within their spread, by trust.  fixed : effects in every simulation.  reduction : see ReductionError.
+    may move within their spread, by trust.  fixed : effects in every simulation.  model : that every hypothesis uses.
     """
 
     cell: Cell
@@ -65,7 +50,7 @@ class InverseProblem:
     effects: Mapping[str, Effect]
     fixed: tuple[ActiveEffect, ...] = ()
     trust: Trust = "tight"
-    reduction: ReductionError | None = None
+    model: ModelName = "espm"
 
     def competing(self) -> tuple[str, ...]:
         """Ids of the effects that may be named: not those that only take back an approximation of the model."""
@@ -81,8 +66,6 @@ class InverseProblem:
                 sd = self._spread(effect, p)
                 if sd is not None:
                     out.append(own(effect.id, name, p, sd))
-        if self.reduction is not None:
-            out.append(own(self.reduction.effect.id, self.reduction.name, self._strength, 1.0))
         for effect_id in hypothesis:
             out += of_effect(effect_id, self.effects[effect_id].parameters)
         return tuple(out)
@@ -98,11 +81,6 @@ class InverseProblem:
             sd *= EXACT_SHARE
         return sd / self.cell.nominal_capacity_ah if p.spread.ohmic else sd
 
-    @property
-    def _strength(self) -> Parameter:
-        assert self.reduction is not None
-        return self.reduction.effect.parameters[self.reduction.name]
-
     def active(self, values: ValuesByOwner) -> tuple[ActiveEffect, ...]:
         """The effects to simulate with.  One under test is in even at its neutral point: some say the same of a cell in
         other words there (windows by voltages), and a fit must not see a step."""
@@ -111,11 +89,6 @@ class InverseProblem:
 
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
         """(n,) V over the fit parts of all records, or of one; None where the model fails."""
-        strength = 0.0
-        if self.reduction is not None:
-            told = values.get(self.reduction.effect.id, {})
-            strength = told.get(self.reduction.name, 0.0)
-            values = {owner: v for owner, v in values.items() if owner != self.reduction.effect.id}
         out = []
         try:
             effects = self.active(values)
@@ -123,8 +96,6 @@ class InverseProblem:
                 voltage = self.run(
                     self.seen[i], values[STATE_OF_CHARGE][str(i)], effects, self.records[i].thin_hold
                 ).voltage_v
-                if self.reduction is not None and strength:
-                    voltage = voltage + strength * self.reduction.columns_v[i]
                 out.append(voltage)
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
@@ -142,16 +113,18 @@ class InverseProblem:
         """One simulation, at the measured temperature where there is one; stoichiometries that run out are clipped, so
         that a search is not stopped by them."""
         needed = [a for a in effects if a.effect.infers is None or data.temperature_degc is None]
+        spared = (FEWER_POINTS,) if self.model == "dfn" else ()
         return simulate(
             self.cell,
             data.time_s,
             data.current_a,
             soc0,
-            (*needed, *stepping(data)),
+            (*spared, *needed, *stepping(data)),
             data.temperature_degc,
             hold,
             rest_voltage_v=rest_voltage_v,
             on_depletion="clip",
+            model=self.model,
         )
 
     def why_not(self, hypothesis: Sequence[str]) -> str:

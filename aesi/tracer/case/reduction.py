@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.physics.effect import Effect
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
-from aesi.tracer.case.problem import InverseProblem, ReductionError, ValuesByOwner
+from aesi.errors import AesiError
+from aesi.physics.simulation import ModelName
+from aesi.tracer.case.problem import InverseProblem
+
+MODELS: tuple[ModelName, ModelName] = ("espm", "dfn")
 
 NOTABLE_SHARE = 0.1
 """Of the noise: an approximation that moves the voltage by more than this is taken back in every hypothesis."""
 
 
-def _refining(effects: Mapping[str, Effect], what: str) -> Effect | None:
-    return next((effect for effect in effects.values() if effect.refines == what), None)
-
-
 def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
     """The problem on a finer basis and shorter steps, where the declared ones move the voltage notably."""
-    finer = _refining(problem.effects, "discretisation")
+    finer = next((e for e in problem.effects.values() if e.refines == "discretisation"), None)
     if finer is None:
         return problem
     effects = (*problem.fixed, finer.activate())
@@ -33,24 +30,46 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
     return replace(problem, fixed=effects) if shift > NOTABLE_SHARE * _noise_v(problem) else problem
 
 
-def with_reduction_error(problem: InverseProblem, values: ValuesByOwner) -> InverseProblem:
-    """The problem with what the declared porous electrode has beyond the reduced model, at these values, as a column;
-    as it was where that is not notable."""
-    effect = _refining(problem.effects, "reduction")
-    if effect is None or effect.id in {a.id for a in problem.fixed}:
-        return problem
-    full = effect.activate(**{name: p.bounds[1] for name, p in effect.parameters.items()})
-    values = {owner: given for owner, given in values.items() if owner != effect.id}
-    active = problem.active(values)
-    columns = []
-    for i, (record, data) in enumerate(zip(problem.records, problem.seen, strict=True)):
-        soc0 = values[STATE_OF_CHARGE][str(i)]
-        reduced = problem.run(data, soc0, active, record.thin_hold).voltage_v
-        columns.append(problem.run(data, soc0, (*active, full), record.thin_hold).voltage_v - reduced)
-    size = float(np.sqrt(np.mean(np.concatenate(columns) ** 2)))
-    if not np.isfinite(size) or size <= NOTABLE_SHARE * _noise_v(problem):
-        return replace(problem, reduction=None)
-    return replace(problem, reduction=ReductionError(effect, tuple(columns)))
+@dataclass(frozen=True)
+class Reduction:
+    """What the single particle leaves out of the declared porous electrode.
+
+    shift_v : root mean square over what fits see, V.  noise_v : of the sensors there.
+    """
+
+    shift_v: float
+    noise_v: float
+
+    @property
+    def notable(self) -> bool:
+        """True where it is too much to be passed over."""
+        return not self.shift_v <= NOTABLE_SHARE * self.noise_v
+
+    @property
+    def sentence(self) -> str:
+        """By how much the two models of the declared cell differ."""
+        return (
+            f"the porous electrode (dfn) and the single particle (espm) of the declared cell differ by "
+            f"{1e3 * self.shift_v:.2f} mV RMS here, {self.shift_v / self.noise_v:.2g} times the noise"
+        )
+
+
+def reduction_of(problem: InverseProblem) -> Reduction | None:
+    """What the reduction of the declared cell moves in its records; None where one of the models cannot be simulated,
+    or where the declared model takes the reduction back already."""
+    if any(active.effect.refines == "reduction" for active in problem.fixed):
+        return None
+    moved = []
+    try:
+        for record, data in zip(problem.records, problem.seen, strict=True):
+            reduced, full = (
+                replace(problem, model=name).run(data, record.soc0, problem.fixed, record.thin_hold).voltage_v
+                for name in MODELS
+            )
+            moved.append(full - reduced)
+    except AesiError:
+        return None
+    return Reduction(float(np.sqrt(np.mean(np.concatenate(moved) ** 2))), _noise_v(problem))
 
 
 def _noise_v(problem: InverseProblem) -> float:

@@ -1,4 +1,5 @@
-"""Longer steps of the nonlinear part where a record asks for no more: slow tests cost as little as short ones."""
+"""What a fit spares: longer steps of the nonlinear part where a record asks for no more, so that slow tests cost as
+little as short ones, and fewer points across a porous electrode than a simulation that is looked at."""
 
 from __future__ import annotations
 
@@ -31,6 +32,19 @@ def longer_steps(model: EspmModel, *, substep_s: float) -> EspmModel:
 
 
 EFFECT = Effect("longer_steps", "instrument", __doc__ or "", PARAMETERS, on_model=longer_steps)
+
+POINTS = 4
+"""Across each electrode. Against 14, on discharges of the shipped cells to 1C at 25 degC: 0.14 mV RMS at most for the
+NCA cell, 0.05 for the others, at 0.6 of the cost of the 6 that `simulate` takes. Where they move the voltage notably,
+finer numerics double them."""
+
+
+def fewer_points(model: EspmModel) -> EspmModel:
+    """The model with few points across an electrode."""
+    return replace(model, electrode_points=POINTS)
+
+
+FEWER_POINTS = Effect("fewer_points", "instrument", __doc__ or "", on_model=fewer_points).activate()
 
 
 def stepping(data: Measurement) -> tuple[ActiveEffect, ...]:

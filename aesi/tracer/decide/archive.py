@@ -56,13 +56,12 @@ class Archive:
 
 def fit_name(problem: InverseProblem, kind: str, hypothesis: Sequence[str]) -> str:
     """Of a fit in the archive: its kind, what is believed of the own parameters, and its effects in order."""
-    reduced = "" if problem.reduction is None else " reduction"
-    return f"{kind} {problem.trust}{reduced}: {'+'.join(hypothesis)}"
+    return f"{kind} {problem.trust}: {'+'.join(hypothesis)}"
 
 
 def context_of(problem: InverseProblem) -> str:
     """Changes whenever a stored fit would no longer be the same fit."""
-    text = [repr(problem.cell), *(identity(e) for e in problem.effects.values())]
+    text = [repr(problem.cell), problem.model, *(identity(e) for e in problem.effects.values())]
     text += [f"fixed {active.values} {identity(active.effect)}" for active in problem.fixed]
     text += [f"{r.data.digest} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}" for r in problem.records]
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]

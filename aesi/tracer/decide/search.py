@@ -17,7 +17,6 @@ from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.free_parameter import coordinates_of
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import with_reduction_error
 from aesi.tracer.decide.archive import Archive, fit_name
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter, held_out_residual
 from aesi.tracer.likelihood.growth import Explanation, Grown, Parent, grow, promise
@@ -98,16 +97,10 @@ def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
 def base_of(
     problem: InverseProblem, archive: Archive
 ) -> tuple[InverseProblem, Blocks, FittedHypothesis] | None:
-    """The hypothesis without effects, with the error of the reduction at it; None where it cannot be simulated."""
+    """The hypothesis without effects; None where it cannot be simulated."""
     blocks = blocks_of(problem)
     fit = _fitted(problem, blocks, (), None, PRIORS[problem.trust].median_v, BASE_STEPS, archive)
-    if fit is None:
-        return None
-    problem = with_reduction_error(problem, fit.values)
-    if problem.reduction is not None:
-        median_v = PRIORS[problem.trust].median_v
-        fit = _fitted(problem, blocks, (), fit.placed, median_v, BASE_STEPS, archive) or fit
-    return problem, blocks, fit
+    return None if fit is None else (problem, blocks, fit)
 
 
 def _fitted(

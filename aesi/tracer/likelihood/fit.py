@@ -105,8 +105,6 @@ class HypothesisFitter:
         size = min(size, 0.25 * (self.high[j] - self.low[j]))
         only = int(one.name) if one.owner == STATE_OF_CHARGE else None
         rows = slice(None) if only is None else self.problem.slices[only]
-        if self.problem.reduction is not None and one.owner == self.problem.reduction.effect.id:
-            return one.sd * np.concatenate(self.problem.reduction.columns_v)
         for h in (size, -size) if x[j] + size <= self.high[j] else (-size, size):
             moved = x.copy()
             moved[j] = x[j] + h

@@ -37,7 +37,7 @@ class ModelState:
         """What is simulated on top of the declared cell."""
         if self.values is None:
             return self.problem.fixed
-        return replace(self.problem, reduction=None).active(self.values)
+        return self.problem.active(self.values)
 
     def simulated(self, record: PreparedRecord, index: int | None, thin: bool) -> Run:
         """One record.
