@@ -12,18 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from aesi.numerics.typing import Array
+from aesi.calibration.shapes import SPAN_K
 from aesi.physics.cell import Cell, Electrode
-from aesi.physics.cell.relations import Constant, Expression, LookupTable, Relation, Sum, scaled
+from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation, scaled
 
 LIMIT_SD = 4.0
 """No parameter goes further than this many of its prior's deviations."""
-KNOTS = 23
-ENTROPY_KNOTS = 5
-TABLE_POINTS = 513
-BEYOND = 0.06
-OCP_SD_V = 0.04
-ENTROPY_SD_V_K = 1.5e-4
+PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
+"""Knots of a diffusivity's and of a rate's course, shares of an electrode's window: dense at both ends, where either
+falls off. Pulse tests come at ten states of charge or more."""
+COURSE_POINTS = 65
 
 
 @dataclass(frozen=True)
@@ -72,6 +70,13 @@ SALT_ENERGIES = (
     "17.1 kJ/mol in Ecker et al. 2015; 12 to 25 over concentration in Landesfeind & Gasteiger 2019"
 )
 FILMS = "25 to 60 kJ/mol for films on graphite, Waldmann et al. 2014, doi:10.1016/j.jpowsour.2014.03.112"
+COURSES = "a decade and more over the window of graphite and NMC, Ecker et al. 2015, figure 9"
+RATE_COURSES = (
+    "exchange currents of both electrodes leave the square root by factors, Ecker et al. 2015, figure 11"
+)
+COURSE_SD = 0.8
+DOUBLE_LAYER_F_M2, LAYER_SD = 0.2, 0.7
+LAYERS = "0.1 to 0.5 F/m2 of true surface, Ong & Newman 1999, doi:10.1149/1.1392643; rough surfaces have more"
 HALF_CELLS = "scatter of half-cell potentials, tens of millivolts, Chen et al. 2020"
 
 
@@ -88,14 +93,21 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
         Free("positive.full_stoichiometry", cell.positive.theta_min, 0.03, "1", HALF_CELLS, low=1.0 - FULLEST),
         Free("negative.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("positive.diffusivity", 1.0, 1.2, "factor", RATES, True),
-        Free("negative.diffusivity_slope", 0.0, 1.0, "e-folds a window", "Ecker et al. 2015, figure 9"),
-        Free("positive.diffusivity_slope", 0.0, 1.0, "e-folds a window", "Ecker et al. 2015, figure 9"),
         Free("negative.rate", 1.0, RATE_SD, "factor", RATES, True),
         Free("positive.rate", 1.0, RATE_SD, "factor", RATES, True),
         Free("electrolyte.conductivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
         Free("electrolyte.diffusivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
         Free("contact.resistance", cell.contact_resistance_ohm, ohm, "ohm", "a share of the drop at 1C", low=0.0),
+        *(
+            Free(course(side, what, k), 1.0, sd, "factor", source, True)
+            for side in ("negative", "positive")
+            for what, sd, source in (("diffusivity", COURSE_SD, COURSES), ("rate", COURSE_SD, RATE_COURSES))
+            for k in range(len(PLACES))
+        ),
     ]  # fmt: skip
+    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+        typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
+        out.append(Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True))
     if span_k > SPAN_K:
         n, p, e = cell.negative, cell.positive, cell.electrolyte
         out += [
@@ -109,71 +121,6 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
             Free("film.energy", cell.film_ea_j_mol or 40e3, 12e3, "J/mol", FILMS, low=0.0),
         ]  # fmt: skip
     return tuple(out)
-
-
-SPAN_K = 8.0
-"""Records have to span this many kelvins before activation energies and entropy move."""
-
-
-@dataclass(frozen=True, eq=False)
-class Shapes:
-    """Corrections of the positive electrode's potential and of its entropic coefficient, linear in their knots.
-
-    low, high : stoichiometry range of the knots.  ocp, entropic : cardinal cubic splines, None where not fitted.
-    """
-
-    low: float
-    high: float
-    ocp: CubicSpline
-    entropic: CubicSpline | None
-
-    @classmethod
-    def over(cls, cell: Cell, span_k: float) -> Shapes:
-        """For the cell's window, and a little beyond it."""
-        p = cell.positive
-        margin = 0.02 * (p.theta_max - p.theta_min)
-        low, high = max(p.theta_min - margin, 1e-3), min(p.theta_max + margin, 1.0 - 1e-3)
-        places = np.linspace(0.0, 1.0, KNOTS)
-        dense_at_ends = places - 0.7 * np.sin(2.0 * np.pi * places) / (2.0 * np.pi)
-        ocp = CubicSpline(low + (high - low) * dense_at_ends, np.eye(KNOTS), bc_type="natural")
-        few = np.linspace(low, high, ENTROPY_KNOTS)
-        entropic = CubicSpline(few, np.eye(ENTROPY_KNOTS), bc_type="natural") if span_k > SPAN_K else None
-        return cls(low, high, ocp, entropic)
-
-    @property
-    def n_ocp(self) -> int:
-        """Knots of the potential."""
-        return KNOTS
-
-    @property
-    def n_entropic(self) -> int:
-        """Knots of the entropic coefficient."""
-        return 0 if self.entropic is None else ENTROPY_KNOTS
-
-    def columns(self, theta_p: Array, rise_k: Array) -> Array:
-        """(n, knots) V per working unit: what the voltage gains, at surface stoichiometries and above the reference."""
-        at = np.clip(theta_p, self.low, self.high)
-        parts = [OCP_SD_V * self.ocp(at)]
-        if self.entropic is not None:
-            parts.append(ENTROPY_SD_V_K * rise_k[:, None] * self.entropic(at))
-        return np.concatenate(parts, axis=1)
-
-    def on(self, electrode: Electrode, z: Array) -> Electrode:
-        """The electrode with both corrections; z : (knots,) working coordinates."""
-        x = np.linspace(max(self.low - BEYOND, 1e-3), min(self.high + BEYOND, 1.0 - 1e-3), TABLE_POINTS)
-        at = np.clip(x, self.low, self.high)
-        ocp = electrode.ocp
-        if np.any(z[:KNOTS]):
-            ocp = _plus(ocp, x, OCP_SD_V * self.ocp(at) @ z[:KNOTS])
-        entropic = electrode.entropic
-        if self.entropic is not None and np.any(z[KNOTS:]):
-            entropic = _plus(entropic, x, ENTROPY_SD_V_K * self.entropic(at) @ z[KNOTS:])
-        return replace(electrode, ocp=ocp, entropic=entropic)
-
-
-def _plus(base: Relation, x: Array, y: Array) -> Relation:
-    table = LookupTable(tuple(map(float, x)), tuple(map(float, y)))
-    return table if base == Constant(0.0) else Sum(base, table)
 
 
 def moved(cell: Cell, values: Mapping[str, float]) -> Cell:
@@ -204,24 +151,40 @@ def moved(cell: Cell, values: Mapping[str, float]) -> Cell:
     )
 
 
+def course(side: str, what: str, place: int) -> str:
+    """Name of a knot: `place` nought at the least stoichiometry of the window."""
+    return f"{side}.{what}_at_{round(100 * PLACES[place])}_percent"
+
+
 def _electrode(electrode: Electrode, side: str, values: Mapping[str, float]) -> Electrode:
-    factor = values.get(f"{side}.diffusivity", 1.0)
-    slope = values.get(f"{side}.diffusivity_slope", 0.0)
+    diffusivity = _times(_course(electrode, side, "diffusivity", values), electrode.diffusivity)
     return replace(
         electrode,
         area_per_volume_1_m=electrode.area_per_volume_1_m * values.get(f"{side}.capacity", 1.0),
-        diffusivity=_sloped(electrode, factor, slope),
+        diffusivity=scaled(diffusivity, values.get(f"{side}.diffusivity", 1.0)),
         rate_constant=electrode.rate_constant * values.get(f"{side}.rate", 1.0),
+        double_layer_f_m2=values.get(f"{side}.double_layer", electrode.double_layer_f_m2),
+        rate_factor=_times(_course(electrode, side, "rate", values), electrode.rate_factor),
         diffusivity_ea_j_mol=values.get(f"{side}.diffusivity_energy", electrode.diffusivity_ea_j_mol),
         rate_ea_j_mol=values.get(f"{side}.rate_energy", electrode.rate_ea_j_mol),
     )
 
 
-def _sloped(electrode: Electrode, factor: float, slope: float) -> Relation:
-    """Diffusivity times a factor, and exponential in stoichiometry: `slope` e-folds across the window."""
-    if slope == 0.0 or not isinstance(electrode.diffusivity, Constant):
-        return scaled(electrode.diffusivity, factor)
-    middle = 0.5 * (electrode.theta_min + electrode.theta_max)
-    width = electrode.theta_max - electrode.theta_min
-    value = electrode.diffusivity.value * factor
-    return Expression(f"{value!r} * exp({slope / width!r} * (x - {middle!r}))")
+def _course(electrode: Electrode, side: str, what: str, values: Mapping[str, float]) -> LookupTable | None:
+    """Factor over stoichiometry, its logarithm a cubic spline through the knots; constant beyond the window."""
+    logs = np.log([values.get(course(side, what, k), 1.0) for k in range(len(PLACES))])
+    if not logs.any():
+        return None
+    places = electrode.theta_min + (electrode.theta_max - electrode.theta_min) * np.array(PLACES)
+    x = np.linspace(electrode.theta_min, electrode.theta_max, COURSE_POINTS)
+    y = np.exp(CubicSpline(places, logs, bc_type="natural")(x))
+    return LookupTable(tuple(map(float, x)), tuple(map(float, y)))
+
+
+def _times(factor: LookupTable | None, base: Relation) -> Relation:
+    """A relation times a course; a constant stays a short table."""
+    if factor is None:
+        return base
+    if isinstance(base, Constant):
+        return LookupTable(factor.x, tuple(base.value * v for v in factor.y))
+    return Product(base, factor)

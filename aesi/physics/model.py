@@ -98,7 +98,10 @@ class EspmModel:
             and self.regions == 1
             and self.heat is None
             and all(isinstance(d, Constant) for d in solids)
-            and all(x.rate_factor == UNITY for x in (self.cell.negative, self.cell.positive))
+            and all(
+                x.rate_factor == UNITY and x.double_layer_f_m2 == 0.0
+                for x in (self.cell.negative, self.cell.positive)
+            )
         )
 
 

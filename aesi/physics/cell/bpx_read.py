@@ -10,6 +10,7 @@ from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.parts import (
     CONTACT_RESISTANCE,
+    DOUBLE_LAYERS,
     FILM_ENERGY,
     FILM_RESISTANCE,
     HEAT_TRANSFER,
@@ -100,6 +101,7 @@ def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode
         ocp=relation(fields["OCP [V]"], f"{what}, OCP [V]"),
         rate_constant=float(fields["Reaction rate constant [mol.m-2.s-1]"]),
         entropic=optional_relation("Entropic change coefficient [V.K-1]") or Constant(0.0),
+        double_layer_f_m2=float(user.get(DOUBLE_LAYERS[side], 0.0)),
         rate_factor=UNITY if factor is None else relation(factor, f"{where}: {RATE_FACTORS[side]}"),
         diffusivity_ea_j_mol=float(fields.get("Diffusivity activation energy [J.mol-1]") or 0.0),
         rate_ea_j_mol=float(fields.get("Reaction rate constant activation energy [J.mol-1]") or 0.0),

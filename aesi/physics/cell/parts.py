@@ -22,10 +22,9 @@ CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FILM_RESISTANCE = "Film resistance [Ohm]"
 FILM_ENERGY = "Film resistance activation energy [J.mol-1]"
-RATE_FACTORS = {
-    side: f"{side} electrode reaction rate factor" for side in ("Negative", "Positive")
-}
+RATE_FACTORS = {side: f"{side} electrode reaction rate factor" for side in ("Negative", "Positive")}
 """The fields of `Electrode.rate_factor` in the user-defined section."""
+DOUBLE_LAYERS = {side: f"{side} electrode double-layer capacity [F.m-2]" for side in ("Negative", "Positive")}
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class Electrode:
     Lengths in m, concentrations in mol/m3, diffusivity in m2/s at stoichiometry x, open-circuit potential in
     V against Li/Li+, entropic coefficient in V/K, effective solid conductivity in S/m, rate constant in
     mol/(m2 s) so that the exchange current density is F K f(x) sqrt(c_e/c_e0 x (1 - x)) with f the rate factor at
-    stoichiometry x, activation energies in J/mol.
+    stoichiometry x, activation energies in J/mol, capacity of the double layer in F per m2 of reactive surface.
     """
 
     thickness_m: float
@@ -52,6 +51,7 @@ class Electrode:
     rate_constant: float
     entropic: Relation = NO_ENTROPY
     rate_factor: Relation = UNITY
+    double_layer_f_m2: float = 0.0
     diffusivity_ea_j_mol: float = 0.0
     rate_ea_j_mol: float = 0.0
     ocp_lithiation: Relation | None = None

@@ -118,7 +118,10 @@ def _electrodes(model: EspmModel) -> Electrodes:
     layer = gauss_layer(model.electrode_points)
     sides = ((n, model.negative), (p, model.positive))
     capacity = [
-        layer.weight * x.area_per_volume_1_m * x.thickness_m * interface.double_layer_f_m2
+        layer.weight
+        * x.area_per_volume_1_m
+        * x.thickness_m
+        * (x.double_layer_f_m2 + interface.double_layer_f_m2)
         for x, interface in sides
     ]
     exchange = [
@@ -135,7 +138,7 @@ def _electrodes(model: EspmModel) -> Electrodes:
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
         rate=rate_tables(cell),
         alpha=np.array([x.transfer_coefficient for _, x in sides]),
-        has_layers=any(x.double_layer_f_m2 > 0.0 for _, x in sides),
+        has_layers=any(x.double_layer_f_m2 + y.double_layer_f_m2 > 0.0 for x, y in sides),
         capacity=np.concatenate(capacity),
         exchange=np.concatenate(exchange),
         node_share=np.concatenate([layer.weight, layer.weight]),

@@ -122,7 +122,9 @@ def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, give
         moved = (
             -0.5 * y[u] * d_eta
         )  # with the logarithm of the salt, or of the occupancy, in the exchange current
-        n.slope[u] = max(d_eta - t.give[u] * (falls + moved * (d_room + 2.0 * d_quicker)), SMALLEST_SLOPE * d_eta)
+        n.slope[u] = max(
+            d_eta - t.give[u] * (falls + moved * (d_room + 2.0 * d_quicker)), SMALLEST_SLOPE * d_eta
+        )
         n.by_salt[u] = moved / s if salt[r] > SMALLEST_SALT else 0.0
         if first and (u == 0 or p.place[u - 1] != r):
             psi[r] = n.pot[u]

@@ -6,7 +6,8 @@ between its collector and the electrolyte at the separator's edge:
     Phi = U(theta_u) + eta(y_u) + (L/sigma S + L/kappa E) y + chi ln(c_r / c_mean),   sum y + capacitive + plating = J
 
 with y_u the current of unit u per cell area, positive for delithiation, J = I/A in the negative electrode and -I/A
-in the positive. Newton's method on all y and Phi; one plain unit has a closed form.
+in the positive. Newton's method on all y and Phi, of one unit on its y alone: without a double layer it is there at
+once.
 """
 
 import math
@@ -142,9 +143,13 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                     d_extra += ((1.0 - plating[1]) * up + plating[1] * down) / thermal
                 region_total[first + r] += extra
                 gain[i] += d_extra * slope[i]
-        if n == 1 and capacity == 0.0 and plating[0] == 0.0:
-            delta[first] = potential[0]
-            return potential[0] + ohm[0, 0] * total + chi * log_salt[first]
+        if n == 1:
+            phi = potential[0] + ohm[0, 0] * region_total[first] + chi * log_salt[first]
+            off = region_total[first] - total
+            if abs(off) * slope[0] < NEWTON_TOLERANCE_V * gain[0]:
+                break
+            y[lo] -= off / gain[0]
+            continue
         if step == 0:
             phi = potential[0]
         worst = 0.0

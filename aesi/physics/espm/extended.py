@@ -150,7 +150,7 @@ def interface_capacity(model: EspmModel, side: int) -> float:
     cell = model.cell
     electrode, interface = ((cell.negative, model.negative), (cell.positive, model.positive))[side]
     area = electrode.area_per_volume_1_m * electrode.thickness_m / model.regions
-    return interface.double_layer_f_m2 * area
+    return (electrode.double_layer_f_m2 + interface.double_layer_f_m2) * area
 
 
 def ohmic_drops(model: EspmModel) -> tuple[Array, Array]:

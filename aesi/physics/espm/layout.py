@@ -136,7 +136,8 @@ class Surfaces(NamedTuple):
     """Constants of both electrodes' surfaces.
 
     ocp, entropic, rate : (2, table) V, V/K and factor of the rate constant.  alpha : (2,) transfer coefficients.
-    capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and transfer coefficient.  plating_to_c : mol/m3 per C/m2.
+    capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and transfer coefficient.
+    plating_to_c : mol/m3 per C/m2.
     solid : (2, regions, regions) ohm m2.  salt : the same times the conductivity, by region crossed.
     """
 
