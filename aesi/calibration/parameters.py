@@ -18,7 +18,7 @@ from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation
 
 LIMIT_SD = 4.0
 """No parameter goes further than this many of its prior's deviations."""
-PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
+PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 9)))
 """Knots of a diffusivity's and of a rate's course, shares of an electrode's window: dense at both ends, where either
 falls off. Pulse tests come at ten states of charge or more."""
 COURSE_POINTS = 65
@@ -54,8 +54,8 @@ class Free:
 RATE_SD, SALT_SD = 0.8, 0.35
 """Deviations of logarithms. Wider ones let a drive at one temperature trade kinetics for a slow electrolyte, and an LG
 18650HG2 then runs out of salt under its US06."""
-RATE_ENERGY = 40e3
-"""J/mol, the mean of 53 and 44 (Ecker et al. 2015), 35 and 18 (Chen et al. 2020), 55 and 35 (About:Energy 2022)."""
+RATE_ENERGY, RATE_ENERGY_SD = 55e3, 12e3
+"""J/mol: what lithium pays to leave its solvent. Values of 18 to 35 are of rates that hold contacts and films too."""
 CONTACT_V = 0.03
 """Of the drop at 1C: what contacts, and films, are expected to take at most."""
 FULLEST = 0.95
@@ -64,7 +64,7 @@ RATES = "rates of commercial cells of one chemistry scatter by a factor of three
 TORTUOSITY = "scatter of tortuosities, Landesfeind et al. 2016, doi:10.1149/2.1141607jes"
 ENERGIES = "30 to 81 kJ/mol in Ecker et al. 2015, doi:10.1149/2.0551509jes; 12 to 25 in O'Regan et al. 2022"
 KINETIC_ENERGIES = (
-    "44 to 53 kJ/mol in Ecker et al. 2015; 18 to 35 in Chen et al. 2020, doi:10.1149/1945-7111/ab9050"
+    "50 to 68 kJ/mol at graphite and NCA, Jow et al. 2018, doi:10.1149/2.1221802jes; 44 to 53 in Ecker et al. 2015"
 )
 SALT_ENERGIES = (
     "17.1 kJ/mol in Ecker et al. 2015; 12 to 25 over concentration in Landesfeind & Gasteiger 2019"
@@ -74,9 +74,9 @@ COURSES = "a decade and more over the window of graphite and NMC, Ecker et al. 2
 RATE_COURSES = (
     "exchange currents of both electrodes leave the square root by factors, Ecker et al. 2015, figure 11"
 )
-COURSE_SD = 0.8
-DOUBLE_LAYER_F_M2, LAYER_SD = 0.2, 0.7
-LAYERS = "0.1 to 0.5 F/m2 of true surface, Ong & Newman 1999, doi:10.1149/1.1392643; rough surfaces have more"
+COURSE_SD = 1.2
+DOUBLE_LAYER_F_M2, LAYER_SD = 1.0, 1.2
+LAYERS = "0.1 to 0.5 F/m2 of true surface, Ong & Newman 1999, doi:10.1149/1.1392643; up to 50 of the smooth spheres'"
 HALF_CELLS = "scatter of half-cell potentials, tens of millivolts, Chen et al. 2020"
 
 
@@ -113,8 +113,8 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
         out += [
             Free("negative.diffusivity_energy", n.diffusivity_ea_j_mol, 20e3, "J/mol", ENERGIES, low=0.0),
             Free("positive.diffusivity_energy", p.diffusivity_ea_j_mol, 20e3, "J/mol", ENERGIES, low=0.0),
-            Free("negative.rate_energy", RATE_ENERGY, 13e3, "J/mol", KINETIC_ENERGIES, low=0.0),
-            Free("positive.rate_energy", RATE_ENERGY, 13e3, "J/mol", KINETIC_ENERGIES, low=0.0),
+            Free("negative.rate_energy", RATE_ENERGY, RATE_ENERGY_SD, "J/mol", KINETIC_ENERGIES, low=0.0),
+            Free("positive.rate_energy", RATE_ENERGY, RATE_ENERGY_SD, "J/mol", KINETIC_ENERGIES, low=0.0),
             Free("electrolyte.conductivity_energy", e.conductivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
             Free("electrolyte.diffusivity_energy", e.diffusivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
             Free("film.resistance", cell.film_resistance_ohm, ohm, "ohm", FILMS, low=0.0),

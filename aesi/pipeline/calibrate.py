@@ -60,8 +60,9 @@ def calibrate_files(
         temperatures_degc=asked.temperatures_degc,
         physics=model,
     )
-    if asked.title is not None:
-        found = replace(found, cell=replace(found.cell, name=asked.title, description=_made_from(found)))
+    name = declared.name if asked.title is None else asked.title
+    described = replace(found.cell, name=name, description=_made_from(found), fitted_with=found.model.physics)
+    found = replace(found, cell=described)
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra = held_against(found.cell, asked.impedance, model=model)
     content = to_json(found, [note for m in measurements for note in m.notes], posterior, spectra)
@@ -79,7 +80,8 @@ def calibrate_files(
 
 def _made_from(found: Calibration) -> str:
     records = ", ".join(e.name for e in found.errors)
-    return f"Fitted by aesi calibrate to {records}, from {found.declared.name}."
+    with_model = MODEL_WORDS[found.model.physics]
+    return f"Fitted by aesi calibrate with {with_model} to {records}, from {found.declared.name}."
 
 
 def to_json(

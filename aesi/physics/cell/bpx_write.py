@@ -9,6 +9,7 @@ from aesi.physics.cell.parts import (
     DOUBLE_LAYERS,
     FILM_ENERGY,
     FILM_RESISTANCE,
+    FITTED_WITH,
     HEAT_TRANSFER,
     RATE_FACTORS,
     UNITY,
@@ -64,6 +65,7 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
     own: dict[str, Any] = {
         CONTACT_RESISTANCE: cell.contact_resistance_ohm,
         FILM_RESISTANCE: cell.film_resistance_ohm,
+        FITTED_WITH: cell.fitted_with,
     }
     if cell.film_resistance_ohm:
         own[FILM_ENERGY] = cell.film_ea_j_mol
