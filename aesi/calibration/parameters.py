@@ -18,7 +18,7 @@ from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation
 
 LIMIT_SD = 4.0
 """No parameter goes further than this many of its prior's deviations."""
-PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 9)))
+PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
 """Knots of a diffusivity's and of a rate's course, shares of an electrode's window: dense at both ends, where either
 falls off. Pulse tests come at ten states of charge or more."""
 COURSE_POINTS = 65
@@ -63,9 +63,7 @@ FULLEST = 0.95
 RATES = "rates of commercial cells of one chemistry scatter by a factor of three either way"
 TORTUOSITY = "scatter of tortuosities, Landesfeind et al. 2016, doi:10.1149/2.1141607jes"
 ENERGIES = "30 to 81 kJ/mol in Ecker et al. 2015, doi:10.1149/2.0551509jes; 12 to 25 in O'Regan et al. 2022"
-KINETIC_ENERGIES = (
-    "50 to 68 kJ/mol at graphite and NCA, Jow et al. 2018, doi:10.1149/2.1221802jes; 44 to 53 in Ecker et al. 2015"
-)
+KINETIC_ENERGIES = "50 to 68 kJ/mol, Jow et al. 2018, doi:10.1149/2.1221802jes; 44 to 53, Ecker et al. 2015"
 SALT_ENERGIES = (
     "17.1 kJ/mol in Ecker et al. 2015; 12 to 25 over concentration in Landesfeind & Gasteiger 2019"
 )

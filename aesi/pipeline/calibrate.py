@@ -62,7 +62,8 @@ def calibrate_files(
     )
     name = declared.name if asked.title is None else asked.title
     described = replace(found.cell, name=name, description=_made_from(found), fitted_with=found.model.physics)
-    found = replace(found, cell=described)
+    shares = tuple((e.name, found.capacities[e.name]) for e in found.errors)
+    found = replace(found, cell=replace(described, capacity_shares=shares))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra = held_against(found.cell, asked.impedance, model=model)
     content = to_json(found, [note for m in measurements for note in m.notes], posterior, spectra)

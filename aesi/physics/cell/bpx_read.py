@@ -9,6 +9,7 @@ from typing import Any
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.parts import (
+    CAPACITY_SHARES,
     CONTACT_RESISTANCE,
     DOUBLE_LAYERS,
     FILM_ENERGY,
@@ -68,6 +69,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         contact_resistance_ohm=float(user.get(CONTACT_RESISTANCE, 0.0)),
         film_resistance_ohm=float(user.get(FILM_RESISTANCE, 0.0)),
         film_ea_j_mol=float(user.get(FILM_ENERGY, 0.0)),
+        capacity_shares=tuple((str(k), float(v)) for k, v in (user.get(CAPACITY_SHARES) or {}).items()),
         fitted_with=str(user.get(FITTED_WITH, "")),
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aesi.physics.cell.parts import (
+    CAPACITY_SHARES,
     CONTACT_RESISTANCE,
     DOUBLE_LAYERS,
     FILM_ENERGY,
@@ -66,6 +67,7 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
         CONTACT_RESISTANCE: cell.contact_resistance_ohm,
         FILM_RESISTANCE: cell.film_resistance_ohm,
         FITTED_WITH: cell.fitted_with,
+        CAPACITY_SHARES: dict(cell.capacity_shares),
     }
     if cell.film_resistance_ohm:
         own[FILM_ENERGY] = cell.film_ea_j_mol

@@ -21,6 +21,7 @@ CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
 HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FITTED_WITH = "Fitted with model"
+CAPACITY_SHARES = "Capacity share by record"
 FILM_RESISTANCE = "Film resistance [Ohm]"
 FILM_ENERGY = "Film resistance activation energy [J.mol-1]"
 RATE_FACTORS = {side: f"{side} electrode reaction rate factor" for side in ("Negative", "Positive")}
@@ -94,7 +95,8 @@ class CellParameters:
     thermal data), contact resistance in ohm in series with the whole cell; it is that
     of metal, the same at any temperature. That of films on the particles, ohm at the reference temperature, falls as
     exp(E/R (1/T - 1/T_ref)) with its activation energy in J/mol.  fitted_with : the model whose parameters these are,
-    "espm" or "dfn", where they were fitted.
+    "espm" or "dfn", where they were fitted.  capacity_shares : (record, share of this capacity that the cell had then)
+    of the records that they were fitted to.
     """
 
     negative: Electrode
@@ -118,6 +120,7 @@ class CellParameters:
     film_resistance_ohm: float = 0.0
     film_ea_j_mol: float = 0.0
     fitted_with: str = ""
+    capacity_shares: tuple[tuple[str, float], ...] = ()
     name: str = "cell"
     description: str = ""
     references: str = ""

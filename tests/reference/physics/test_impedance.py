@@ -19,7 +19,9 @@ SOC = 0.6
 LAYER_F_M2 = 0.2
 
 
-def sine_response(cell, frequency_hz, soc, degc, effects, amplitude_a=0.1, cycles=4, rows=400, model="espm") -> complex:
+def sine_response(
+    cell, frequency_hz, soc, degc, effects, amplitude_a=0.1, cycles=4, rows=400, model="espm"
+) -> complex:
     """First harmonic of the last cycle of a small sine, its drift taken out."""
     time = np.linspace(0.0, cycles / frequency_hz, rows * cycles + 1)
     angle = 2.0 * np.pi * frequency_hz * time
