@@ -123,7 +123,9 @@ class DfnTrial(NamedTuple):
 
     reach, give : (units,) surface = reach - give y.  force (units, modes + 1), forcing (salt modes,) : at the end.
     q, c, kappa : at the end.  salt_before : (places,) over rest, a step ago.  forcing_before : the same.
-    ohm : (places, points of an electrode) ohm m2.  layer_c A/(V m2), layer_old A/m2 : (places,) double layers.
+    ohm : (places, points of an electrode) ohm m2.
+    layer_c A/(V m2), layer_old A/m2, skew, lag A/m2 : (places,) double layers.
+    y_back, psi_start : (units,), (places,) as they were before the step.
     total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
     between.  faster : (3,) factors of diffusion, negative, positive, salt.
     no_spread : zeros, for an instant.  rates : (7,) Arrhenius factors, by `Electrodes.energies`.
@@ -137,6 +139,8 @@ class DfnTrial(NamedTuple):
     give: Array
     y_start: Array
     given_start: Array
+    psi_start: Array
+    y_back: Array
     force: Array
     force_end: Array
     forcing: Array
@@ -150,6 +154,8 @@ class DfnTrial(NamedTuple):
     ohm: Array
     layer_c: Array
     layer_old: Array
+    skew: Array
+    lag: Array
     no_spread: Array
     z_end: Array
     rates: Array

@@ -60,7 +60,7 @@ def occupancy(theta):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def rate_factor(rate, side, theta):  # type: ignore[no-untyped-def]
+def rate_course(rate, side, theta):  # type: ignore[no-untyped-def]
     """Factor of the rate constant at a surface stoichiometry, and the slope of its logarithm."""
     last = rate.shape[1] - 1
     s = min(max(theta, 0.0), 1.0) * last

@@ -20,7 +20,7 @@ from aesi.physics.dfn.local_kernels import (
     equilibrium,
     kinetic_drop,
     occupancy,
-    rate_factor,
+    rate_course,
     salt_logarithm,
 )
 from aesi.physics.espm.electrode_kernels import bounded_exp
@@ -32,7 +32,7 @@ UPDATE_TOLERANCE_V = 5e-5
 0.05 uV."""
 EASY_STEPS = 6
 """So many without looking back; most steps need two."""
-MOST_STEPS = 100
+MOST_STEPS = 40
 SMALLEST_SHARE = 1.0 / 256.0
 """Of a Newton step, below which it is taken although it does not bring the solution nearer."""
 SMALLEST_SLOPE = 1e-3
@@ -113,7 +113,7 @@ def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, give
         theta[u] = surface
         s = max(salt[r], SMALLEST_SALT)
         room, d_room = occupancy(surface)
-        quicker, d_quicker = rate_factor(e.rate, side, surface)
+        quicker, d_quicker = rate_course(e.rate, side, surface)
         eta, d_eta = kinetic_drop(
             y[u], t.rates[2 + side] * p.exchange[u] * quicker * math.sqrt(s * room), e.alpha[side], thermal
         )

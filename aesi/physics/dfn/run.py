@@ -6,6 +6,7 @@ import numpy as np
 
 from aesi.errors import InputError
 from aesi.numerics.modes.collocation import gauss_layer
+from aesi.numerics.modes.galerkin import gauss_lobatto
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
@@ -40,17 +41,20 @@ def run_porous_electrode(
     given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
     state, trial, newton, weights = _memory(particles, stack, electrodes)
-    profile = np.zeros((0 if profiles is None else len(time), 4, len(electrodes.node_share)))
+    kept = 0 if profiles is None else len(time)
+    profile = np.zeros((kept, 4, len(electrodes.node_share)))
+    salt_profile = np.zeros((kept, len(stack.to_nodes)))
     fault_at, fault = run_porous(
         time, current, kelvin, given, hold == "backward", LONGER_STEPS * model.substep_s, model.most_substeps,
         np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, newton, weights,
-        out, profile,
+        out, profile, salt_profile,
     )  # fmt: skip
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]
     if profiles is not None:
         profiles.update(_named(model, profile))
+        profiles.update({"electrolyte_x_m": _nodes(model), "electrolyte_nodes_mol_m3": salt_profile})
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
 
 
@@ -81,6 +85,17 @@ def _named(model: EspmModel, profile: Array) -> dict[str, Array]:
     }
 
 
+def _nodes(model: EspmModel) -> Array:
+    """(nodes,) m: where the electrolyte is known, from the negative collector to the positive one."""
+    cell = model.cell
+    inside = 0.5 * (gauss_lobatto(model.electrode_points + 1)[0] + 1.0)
+    out, start = [np.zeros(1)], 0.0
+    for layer in (cell.negative, cell.separator, cell.positive):
+        out.append(start + layer.thickness_m * inside[1:])
+        start += layer.thickness_m
+    return np.concatenate(out)
+
+
 def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, NewtonScratch, Weights]:
     """State and scratch at rest."""
     units, modes, kinds = len(p.place), len(p.gains), len(p.side)
@@ -98,6 +113,7 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
     trial = DfnTrial(
         calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
         reach=of(units), give=of(units), y_start=of(units), given_start=of(places),
+        psi_start=of(places), y_back=of(units), skew=of(places), lag=of(places),
         force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
         salt_before=np.ones(places), q=of(salt_modes), c=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
         kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),

@@ -1,5 +1,7 @@
 """Compiled step of the porous electrode, and its state at an instant at which the current jumps."""
 
+import math
+
 from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import (
@@ -26,6 +28,17 @@ SURFACE_TOLERANCE = 1e-6
 PASSES = 6
 LARGEST_GROWTH = 4.0
 """Of a step over the last one: beyond it nothing is extrapolated."""
+
+
+@compiled
+def take_back(state, t):  # type: ignore[no-untyped-def]
+    """The start of a step whose end was not found: `commit` alone changes the rest of the state."""
+    for u in range(state.y.shape[0]):
+        state.y[u] = t.y_back[u]
+    for r in range(state.given.shape[0]):
+        state.given[r] = t.given_start[r]
+        state.psi[r] = t.psi_start[r]
+        state.salt[r] = t.salt_before[r]
 
 
 @compiled
@@ -60,23 +73,34 @@ def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-un
 
 
 @compiled
-def hold_layers(e, state, t, dt, thermal):  # type: ignore[no-untyped-def]
-    """Double layers over a step as a conductance and a current; exact for one that relaxes by its own kinetics."""
+def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
+    """Double layers over a step as a conductance and a current; exact for one that relaxes by its own kinetics, as
+    they are at the start of the step: what the last solution left as the conductance of each place.
+
+    What a layer takes falls off faster than straight within a step, and the particles get the rest: `t.lag` is how much
+    more than a straight line from their current at the start, as a current at the start.
+    """
     for r in range(e.capacity.shape[0]):
+        kinetic = newton.conductance[r] - t.layer_c[r]
         t.layer_c[r], t.layer_old[r] = 0.0, 0.0
         if e.capacity[r] > 0.0:
-            weight = end_weight(dt * e.exchange[r] / (e.capacity[r] * thermal))
+            constants = dt * kinetic / e.capacity[r]
+            weight = end_weight(constants)
+            t.skew[r] = 2.0 * weight - 1.0
+            t.lag[r] = t.skew[r] * state.layer[r] * (1.0 - math.exp(-constants))
             t.layer_c[r] = e.capacity[r] / (dt * weight)
             t.layer_old[r] = t.layer_c[r] * state.psi[r] + (1.0 - weight) / weight * state.layer[r]
 
 
 @compiled
 def advance(  # type: ignore[no-untyped-def]
-    p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k
+    p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k,
+    last_try,
 ):  # fmt: skip
     """One step to the currents `total` (2,), which changed by `change` (2,); temperature t_k at its end.
 
-    last_dt : of the step before, 0 after a jump.  Returns as `solve_reaction`.
+    last_dt : of the step before, 0 after a jump.  last_try : take the step although it solves nothing.
+    Returns as `solve_reaction`.
     """
     predict(p, s, e, state, t, dt, last_dt, taken, change)
     varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
@@ -100,7 +124,8 @@ def advance(  # type: ignore[no-untyped-def]
             settled = end_forces(p, state, t, dt, w) < SURFACE_TOLERANCE and settled
         if settled:
             break
-    commit(p, s, e, state, t, dt, w, change, varies)
+    if steps > 0 or last_try:
+        commit(p, s, e, state, t, dt, w, change, varies)
     return phi_n, phi_p, steps
 
 
@@ -111,13 +136,18 @@ def predict(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-u
     ahead = dt / last_dt if dt < LARGEST_GROWTH * last_dt else 0.0
     for r in range(2 * half):
         t.given_start[r] = state.given[r]
+        t.psi_start[r] = state.psi[r]
         t.salt[r] = state.salt[r] + ahead * (state.salt[r] - t.salt_before[r])
         t.salt_before[r] = state.salt[r]
     for j in range(state.forcing.shape[0]):
         t.forcing[j] = state.forcing[j] + ahead * (state.forcing[j] - t.forcing_before[j])
         t.forcing_before[j] = state.forcing[j]
     for u in range(p.place.shape[0]):
+        t.y_back[u] = state.y[u]
         t.y_start[u] = state.y[u]
+        if e.has_layers:
+            r = p.place[u]
+            t.y_start[u] += p.share[u] / e.node_share[r] * t.lag[r]
         trend = state.trend[u] * dt if ahead > 0.0 else 0.0
         state.y[u] += p.share[u] * change[0 if p.place[u] < half else 1] + trend
         t.give[u] = p.scale[u] * taken[p.kind[u]]
@@ -153,7 +183,7 @@ def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped
         for j in range(p.gains.shape[0]):
             state.z[u, j] = end_mode(p, t, u, j, state.y[u], w)
         moved = p.share[u] * change[0 if p.place[u] < half else 1]
-        state.trend[u] = (state.y[u] - t.y_start[u] - moved) / dt
+        state.trend[u] = (state.y[u] - t.y_back[u] - moved) / dt
         if varies:
             for j in range(p.gains.shape[0] + 1):
                 state.force[u, j] = t.force[u, j]
@@ -163,5 +193,16 @@ def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped
     for i in range(state.c.shape[0]):
         state.c[i] = t.c[i]
     if e.has_layers:
-        for r in range(2 * half):
-            state.layer[r] = t.layer_c[r] * state.psi[r] - t.layer_old[r]
+        commit_layers(p, e, state, t, dt)
+
+
+@compiled
+def commit_layers(p, e, state, t, dt):  # type: ignore[no-untyped-def]
+    """Currents into double layers at the end of the step; particles get to the last digit what layers do not take."""
+    for r in range(e.capacity.shape[0]):
+        begun = state.layer[r]
+        state.layer[r] = t.layer_c[r] * state.psi[r] - t.layer_old[r]
+        t.lag[r] -= t.skew[r] * (begun - state.layer[r])
+    for u in range(p.place.shape[0]):
+        r = p.place[u]
+        state.mean[u] += 1.5 * p.scale[u] * dt * p.share[u] / e.node_share[r] * t.lag[r]

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.pipeline.experiment.outputs import PHYSICS, Result, published
+from aesi.pipeline.experiment.outputs import Result, published_by
+from aesi.pipeline.experiment.physics_models import DECLARED
 from aesi.pipeline.report.arrays.binning import error_map
 from aesi.pipeline.report.views import RecordTrace
 
@@ -24,20 +25,21 @@ def comparison(result: Result) -> dict[str, Any]:
     """JSON content: 90 % intervals of the test figures by model, and genes, terms and maps of the chosen one."""
     tests = [trace for trace in result.evaluation.traces if trace.role == "test"]
     chosen = result.best
+    shown = published_by(result.loaded.model)
     names = [str(row["name"]) for row in result.evaluation.rows]
     sparse = result.chosen.stability if chosen == result.chosen.stability.name else result.chosen.bagging
     return {
         "schema": SCHEMA,
-        "intervals": {published(name): _intervals(tests, name, result.config.seed) for name in names},
+        "intervals": {shown(name): _intervals(tests, name, result.config.seed) for name in names},
         "genome": {k: v for k, v in result.chosen.genome.to_dict().items() if k != "terms"},
         "terms": sparse.coefficient_table() if chosen == sparse.name else {},
-        "maps": {published(name): _map(tests, name) for name in dict.fromkeys((PHYSICS, chosen))},
+        "maps": {shown(name): _map(tests, name) for name in dict.fromkeys((DECLARED, chosen))},
     }
 
 
 def _left(trace: RecordTrace, name: str) -> Array:
     """(n,) V that the model leaves in free run; the error of the physics where the model is not among the traces."""
-    if name == PHYSICS or name not in trace.predictions:
+    if name == DECLARED or name not in trace.predictions:
         return trace.measured_v - trace.physics_v
     return trace.measured_v - trace.predictions[name].free_run_v
 
@@ -45,7 +47,7 @@ def _left(trace: RecordTrace, name: str) -> Array:
 def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list[float]]:
     """Percentiles over resampled blocks of the test records; the same blocks for the model and the physics."""
     squares = np.concatenate([_block_sums(trace, _left(trace, name)) for trace in tests])
-    bare = np.concatenate([_block_sums(trace, _left(trace, PHYSICS)) for trace in tests])
+    bare = np.concatenate([_block_sums(trace, _left(trace, DECLARED)) for trace in tests])
     rows = np.concatenate([_block_sums(trace, np.ones(len(trace.time_s))) for trace in tests])
     drawn = np.random.default_rng([seed, 7]).integers(len(rows), size=(DRAWS, len(rows)))
     total = squares[drawn].sum(axis=1)

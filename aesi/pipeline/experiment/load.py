@@ -35,9 +35,7 @@ if TYPE_CHECKING:
     from aesi.data.virtual import VirtualExperiment
 
 
-DFN_NOTE = (
-    "The physics model is the porous electrode (dfn); tables and figures call it ESPM as they call the other."
-)
+DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from aesi.physics import ModelName
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.evaluate import EvaluatedModels
 from aesi.pipeline.experiment.fit import Fitted
@@ -26,7 +27,8 @@ from aesi.sparse.ranking import svd_ranking
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
 ENSEMBLES = ("AESI I", "AESI II")
-PHYSICS = DECLARED
+SHORT: Mapping[ModelName, str] = {"espm": DECLARED, "dfn": "DFN"}
+"""How tables and figures call the physics."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +67,14 @@ class Result:
 def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     """Write everything below `folder`; returns the content of summary.json."""
     folder.mkdir(parents=True, exist_ok=True)
-    rows = [finite({**row, "name": published(row["name"])}) for row in result.evaluation.rows]
+    shown = published_by(result.loaded.model)
+    rows = [finite({**row, "name": shown(row["name"])}) for row in result.evaluation.rows]
     summary = {
         "schema": SCHEMA,
         "experiment": result.config.name,
         "mlflow_run_id": result.run_id,
         "candidates": len(result.candidates) + result.failed,
-        "chosen": published(result.best),
+        "chosen": shown(result.best),
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
         "data": result.loaded.config.data.kind,
@@ -96,13 +99,18 @@ def notes(result: Result) -> tuple[str, ...]:
     return together((*result.loaded.notes, *result.problem.notes, *without_intervals))
 
 
-def published(name: str) -> str:
-    """A model of the error as the hybrid that it makes with the physics; the physics alone keeps its name."""
-    return name if name in PHYSICS_NAMES else f"{PHYSICS} + {name}"
+def published_by(model: ModelName) -> Callable[[str], str]:
+    """Names a model of the error as the hybrid that it makes with that physics; the physics alone by what it is."""
+    short = SHORT[model]
+
+    def published(name: str) -> str:
+        return name.replace(DECLARED, short, 1) if name in PHYSICS_NAMES else f"{short} + {name}"
+
+    return published
 
 
-def _published_trace(trace: RecordTrace) -> RecordTrace:
-    return replace(trace, predictions={published(name): each for name, each in trace.predictions.items()})
+def _published_trace(trace: RecordTrace, shown: Callable[[str], str]) -> RecordTrace:
+    return replace(trace, predictions={shown(name): each for name, each in trace.predictions.items()})
 
 
 def hybrid(result: Result) -> HybridModel:
@@ -125,13 +133,14 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
     """What the report shows."""
     counts = result.problem.counts
     genome = result.chosen.genome
+    shown = published_by(result.loaded.model)
     return RunView(
         experiment=result.config.name,
         note=result.config.note,
         cell=result.loaded.cell_name,
-        chosen=published(result.best),
+        chosen=shown(result.best),
         models=tuple(rows),
-        traces=tuple(_published_trace(trace) for trace in result.evaluation.traces),
+        traces=tuple(_published_trace(trace, shown) for trace in result.evaluation.traces),
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result)),
         bootstrap=BootstrapView(
@@ -149,7 +158,8 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},
         mlflow_run_id=result.run_id,
         seconds=result.seconds,
-        corrected=RECALIBRATED if result.loaded.config.cell.start == "recalibrated" else DECLARED,
+        physics=shown(DECLARED),
+        corrected=shown(RECALIBRATED if result.loaded.config.cell.start == "recalibrated" else DECLARED),
         fallback=result.loaded.fallback,
     )
 

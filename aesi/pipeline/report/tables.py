@@ -32,7 +32,7 @@ MILLIVOLT_PER_VOLT = 1e3
 
 
 def free_run_table(models: Sequence[Row]) -> Table:
-    """Table 1: mean squared error reduction against the bare ESPM, in free run."""
+    """Table 1: mean squared error reduction against the bare physics, in free run."""
     columns: list[Column] = [
         ("MSER train, %", lambda row: _number(row, "free_run.train_mser_pct", 2)),
         ("MSER valid, %", lambda row: _number(row, "free_run.valid_mser_pct", 2)),
@@ -43,11 +43,12 @@ def free_run_table(models: Sequence[Row]) -> Table:
         ("terms", lambda row: _number(row, "terms", 0)),
         ("time, s", lambda row: _number(row, "seconds", 1)),
     ]
+    physics = next((row["name"] for row in models if row["name"] in ("ESPM", "DFN")), "physics")
     caption = (
-        "Table 1. Mean squared error reduction (MSER) of the voltage against the declared ESPM, and on the test set "
-        "against the ESPM recalibrated on the training set. Regime: free run, the error estimate feeds back on itself "
-        "and no measured voltage is used after the first sample. Drives that chose nothing: each training drive under "
-        "physics fitted, and a model chosen, without it."
+        f"Table 1. Mean squared error reduction (MSER) of the voltage against the declared {physics}, and on the test "
+        f"set against the {physics} recalibrated on the training set. Regime: free run, the error estimate feeds back "
+        "on itself and no measured voltage is used after the first sample. Drives that chose nothing: each training "
+        "drive under physics fitted, and a model chosen, without it."
     )
     seeds = _seeds(models)
     if seeds:
