@@ -1,6 +1,7 @@
-"""Constants of nature and of clocks (CODATA 2018, exact)."""
+"""Constants of nature (CODATA 2018, exact), of clocks, and of the units of reports."""
 
 FARADAY_C_MOL = 96485.33212331001
 GAS_CONSTANT_J_MOL_K = 8.31446261815324
 SECONDS_PER_HOUR = 3600.0
 ZERO_CELSIUS_K = 273.15
+MV_PER_V = 1000.0

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 LONGEST_IN_SECONDS = 20_000.0
+"""Axes of longer tests are in hours."""
 PANEL_HEIGHT = 190
+"""Pixels."""
 COLOURS = ("#1f2328", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
 """Ink, then Okabe and Ito's palette, safe for colour-blind readers."""
 BAND = "rgba(0,114,178,0.2)"

@@ -8,8 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from aesi.errors import ParameterError
 
 
@@ -76,20 +74,6 @@ class Parameter:
             f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit}, "
             f"the range from {self.source}. If the cell warrants it, widen it where {name} is declared."
         )
-
-    def to_unit_interval(self, value: float) -> float:
-        """Map [low, high] to [0, 1], on the logarithm where `log`."""
-        low, high = self.bounds
-        if self.log:
-            return float(np.log(value / low) / np.log(high / low))
-        return (value - low) / (high - low)
-
-    def from_unit_interval(self, u: float) -> float:
-        """Inverse of `to_unit_interval`."""
-        low, high = self.bounds
-        if self.log:
-            return float(low * (high / low) ** u)
-        return low + u * (high - low)
 
 
 def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> dict[str, float]:

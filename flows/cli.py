@@ -54,7 +54,7 @@ def _version(version: bool = typer.Option(False, "--version", help="Print the ve
 
 def main() -> NoReturn:
     """Entry point of the `aesi` script."""
-    environment.prepare()
+    environment.prepare_process()
     try:
         with ending_soon_on_interrupt():
             app(args=repeated(sys.argv[1:]))

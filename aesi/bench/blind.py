@@ -18,14 +18,15 @@ import numpy as np
 
 from aesi.bench.limit import OutOfTime, processor_limit
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
+from aesi.constants import MV_PER_V
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, plan, small_plan
 from aesi.errors import AesiError
 from aesi.physics import Cell
-from aesi.pipeline.discovery.discover import to_json
+from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 
-MV = 1e3
 LIMIT_S = 180.0
+"""Processor time of a case, after which it counts as not answered."""
 
 
 def chosen(
@@ -72,7 +73,7 @@ def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
     try:
         with processor_limit(limit_s):
             found = discover(Cell.from_bpx(case.declared), case.measurements, soc0=case.soc0)
-            content = to_json(found)
+            content = discovery_content(found)
     except AesiError as error:
         row |= {"verdict": "error", "error": str(error)}
     except OutOfTime:
@@ -102,7 +103,7 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
     for state in ("before", "recalibrated", "after"):
         row[f"{state}_test_mv"] = content[state]["test"]["rmse_mv"]
     judgement = judge(case.label, case.also, case.neutral, content)
-    noise_mv = MV * case.spec.voltage_noise_v
+    noise_mv = MV_PER_V * case.spec.voltage_noise_v
     after_over_noise = row["after_test_mv"] / noise_mv
     errors, covered = _parameters(case, content)
     return row | {

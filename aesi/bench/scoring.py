@@ -20,6 +20,7 @@ CERTAIN = 0.95
 TO_THE_NOISE = 1.1
 """An error on unseen data of at most so many times the noise is the noise."""
 TENTHS = 10
+"""Bins of confidence."""
 
 
 @dataclass(frozen=True)

@@ -35,14 +35,18 @@ beyond : as repeats, but the training drives never charge, and the test drives d
 INPUTS = ("I", "I_next", "I_60s", "c_sp", "c_sn", "c_e0", "c_eL")
 DT_S = 1.0
 NOISE_V = 5e-4
+"""White noise of the voltage."""
 OPEN_CIRCUIT_V = 3e-3
+"""Standard deviation of each of OPEN_CIRCUIT_TERMS terms by which the true open-circuit voltage is off."""
 OPEN_CIRCUIT_TERMS = 7
 N_REPEATS = 5
 BEYOND = 1.3
+"""Against the training's largest current."""
 SOC_START, SOC_END = 0.97, 0.06
 TEST_REPEATS = (2, 4)
 TRAIN_REPEATS = (1, 3, 5)
 MOST_TRIES = 20
+"""Random cells that are drawn until one can be driven like that."""
 
 DrawnValues = dict[str, float]
 

@@ -23,9 +23,13 @@ from aesi.physics.cell import Cell
 from aesi.physics.simulation import simulate
 
 LEAST_RISE_K = 2.0
+"""A record that warms by less tells nothing of heat."""
 AMBIENT_SD_K = 0.5
+"""Of a chamber, between its set point and the cell."""
 READING_K = 0.3
+"""Of a thermocouple."""
 TYPICAL_W_K = 0.1
+"""Start of the fit: a small cylindrical cell in still air."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ SOLID_ORDER = 8
 ELECTRODE_POINTS = 4
 """Of the porous electrode: to 0.14 mV on discharges of the shipped cells to 1C."""
 MOST_STEPS = 4
+"""Of a model between two rows: they are thinned to where little happens between them."""
 ERROR_V = 5e-3
 """What a calibrated single-particle model is expected to miss."""
 REPEATS = 10
@@ -32,6 +33,7 @@ NEWER = 0.1
 ZERO_SHARE = 5e-4
 """Of the largest current among the records: what a cycler's zero is uncertain by, 0.1 % of its range being usual."""
 STEP = 0.02
+"""Of finite differences, in deviations of the prior."""
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,18 @@ from aesi.physics.cell.relations import Constant, LookupTable, Relation, Sum
 
 SPAN_K = 8.0
 """Records have to span this many kelvins before activation energies and entropy move."""
-POSITIVE_KNOTS, NEGATIVE_KNOTS, ENTROPY_KNOTS = 23, 13, 5
+POSITIVE_KNOTS, NEGATIVE_KNOTS = 23, 13
+"""Of the corrections of both potentials, dense where they are steep."""
+ENTROPY_KNOTS = 5
+"""Of the correction of an entropy, which is smoother."""
 TABLE_POINTS = 513
+"""Of the table that a corrected potential becomes."""
 BEYOND = 0.06
+"""Of the stoichiometry window, that the table reaches further: surfaces leave it under load."""
 OCP_SD_V = 0.04
+"""Of a potential at each knot: what half-cell measurements of one material differ by."""
 ENTROPY_SD_V_K = 1.5e-4
+"""Of an entropic coefficient at each knot: its own size."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -22,6 +22,7 @@ electrolyte as in the BPX example cell."""
 OPEN_SHARE = 1e-3
 """Of the largest current of a record: below this a cycler has its relay open, whatever it reads."""
 FULL_WINDOW_V = 0.15
+"""A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
 LONG_CHARGE = 0.3
 """Of the capacity: a charge that changes the branch of the hysteresis, where there is one."""
 

@@ -16,10 +16,13 @@ from aesi.records import Hold, Measurement
 WINDOW_S = 1.0
 """Of a drive: solid diffusion and the electrolyte are slower than this."""
 STEADY_ROWS = 400
+"""Rows that a steady record is spread over, besides those after its steps."""
 STEP_C_RATE = 0.01
+"""A change of the current by more than this is a step."""
 STEADY_SHARE = 0.01
 """A record whose current changes in fewer of its rows than this is one of steady currents."""
 FIRST_S = 0.2
+"""Distance of the first rows after a step."""
 SOON_S = 1.0
 """A row after a step that another follows this soon need not be believed."""
 GROWTH = 0.4

@@ -47,11 +47,14 @@ WHOLE_DRIVE = math.inf
 N_PIECES = 8
 """Records longer than this share of all are cut, so that a scale can be scored on what it has not seen."""
 MIN_PIECES = 3
+"""Fewer pieces cannot say how much one differs from the next: where the rows inside the trained range make fewer, all
+rows are used and the band says so; where even these do, there is none."""
 MIN_ROWS = 30
 """Rows from which a piece counts."""
 FORGOTTEN = 100
 """Horizons after which errors count as independent; a judgement, `aesi bench bands` shows what it gives."""
 N_LEVELS = 101
+"""Quantiles that stand for the scores of a piece: coverage is kept to about one per cent."""
 HALVINGS = 14
 """Of the interval that holds the half-width: to a ten-thousandth of it."""
 

@@ -21,7 +21,10 @@ from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
 
 LOW_SOC = 0.25
+"""Below it open-circuit potentials turn steep. A convention, like MEMORY_S; `aesi bench bands` shows what the bands
+are worth."""
 MEMORY_S = 60.0
+"""Of the mean current: about as long as the electrolyte's salt takes to follow."""
 RELATIVE_FLOOR = 0.1
 """s stays above this share of the mean |error|: a scale near zero would claim a perfect model."""
 MOST_ROWS = 6000

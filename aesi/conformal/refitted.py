@@ -26,11 +26,14 @@ from aesi.numerics.typing import Array
 
 NAME = "spci_refitted"
 REFIT = 500
+"""Steps of the record between two forests; with MOST_FORESTS it bounds the time that a long record takes."""
 MOST_FORESTS = 40
 MEMORY = 10
 """Residuals that a forest is grown on, in windows."""
 TREES = 10
+"""As in Xu and Xie's algorithm 1. Their depth of two is replaced by a least number of residuals in a leaf."""
 LEAF = 10
+"""Residuals in a leaf, at least: a convention."""
 FEATURES = 1 / 3
 """Share of the lags that a split may choose from, the usual one for regression."""
 

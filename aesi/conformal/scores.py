@@ -17,10 +17,14 @@ from aesi.conformal.intervals import Intervals
 from aesi.numerics.typing import Array, IntArray
 
 CURRENT_BINS = 8
+"""Bins of current and of charge, and rows from which one counts: conventions of the tables, and so are the
+minutes."""
 SOC_BIN_WIDTH = 0.1
 MIN_BIN_SAMPLES = 200
+"""At 200 rows a coverage of 90 % scatters by 2 %, were they independent."""
 MINUTE_S = 60.0
 LOW_MINUTE_COVERAGE = 0.70
+"""A minute in which fewer than these are inside is one in which the interval failed."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class Scores:
     low_minutes: float
 
 
-def score(
+def scores_of(
     intervals: Intervals,
     residuals: Array,
     alpha: float,

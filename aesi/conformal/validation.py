@@ -8,12 +8,13 @@ import numpy as np
 
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.method import Method
-from aesi.conformal.scores import Scores, score
+from aesi.conformal.scores import Scores, scores_of
 from aesi.numerics.typing import Array
 
 MAX_RESIDUALS = 20_000
 """Calibration residuals that are used: enough for half a per cent of coverage, and a fraction of a second."""
 PIECES = 20
+"""Runs that calibration residuals are thinned to, spread over all records."""
 
 
 def validation_scores(
@@ -33,7 +34,7 @@ def validation_scores(
     one (n_i,) array a record, A, both or neither.  max_residuals : calibration is thinned to evenly spaced
     pieces of about this many samples in all. Raises as `Method.fit` does.
     """
-    records, currents = thinned(residuals, current_a, max_residuals)
+    records, currents = spaced_pieces(residuals, current_a, max_residuals)
     calibrated = method.fit(records, alpha, window, rng, currents)
     parts = [
         calibrated.intervals(record, None if valid_current_a is None else valid_current_a[i])
@@ -44,10 +45,10 @@ def validation_scores(
         np.concatenate([part.upper_v for part in parts]),
         np.concatenate([part.warm for part in parts]),
     )
-    return score(together, np.concatenate(list(valid_residuals)), alpha)
+    return scores_of(together, np.concatenate(list(valid_residuals)), alpha)
 
 
-def thinned(
+def spaced_pieces(
     records: Sequence[Array], currents: Sequence[Array] | None, max_samples: int
 ) -> tuple[list[Array], list[Array] | None]:
     """The records and their currents, cut down to about `max_samples` in PIECES evenly spaced pieces (each a

@@ -118,12 +118,7 @@ SETS = (
 )
 
 
-def list_sets() -> tuple[DataSet, ...]:
-    """All data sets of the catalogue."""
-    return SETS
-
-
-def listing() -> tuple[str, ...]:
+def catalogue_lines() -> tuple[str, ...]:
     """The catalogue as lines of text, with where each set is on this machine or how to get it."""
     lines: list[str] = []
     for one in SETS:

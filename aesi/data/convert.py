@@ -47,7 +47,7 @@ def convert_file(
     return record
 
 
-def summary(record: Measurement) -> list[str]:
+def record_lines(record: Measurement) -> list[str]:
     """What a record holds, a sentence each, for whoever checks a conversion."""
     step = np.diff(record.time_s)
     charge = record.current_a[1:] * step / SECONDS_PER_HOUR

@@ -16,6 +16,7 @@ from aesi.errors import DataAway, DataError
 from aesi.records import Measurement
 
 TIMEOUT_S = 30
+"""Of a server that does not answer."""
 
 
 @dataclass(frozen=True)

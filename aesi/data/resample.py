@@ -20,6 +20,7 @@ from aesi.records import Measurement
 DENSE = 0.75
 """Below this share of the new step the old rows count as denser, and the voltage is averaged."""
 MOST_EVEN_ROWS = 20_000_000
+"""A fortnight at 10 Hz and more: beyond, a wrong step is likelier than a wish."""
 
 
 @dataclass(frozen=True, eq=False)

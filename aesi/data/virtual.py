@@ -6,7 +6,7 @@ extended single-particle model does not know; `DEFAULT_MIX` is what it has unles
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from aesi.data.laboratory.changes import find_change
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, run
+from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, simulate_truth
 from aesi.data.profiles.profile import OTHER_LOAD, PULSE_C, Profile, paper_profiles
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -24,7 +24,9 @@ DEFAULT_MIX = ("ocv_hysteresis", "series_resistance")
 """8 mV of hysteresis on the negative electrode, and contacts that drop 8 mV at 1C."""
 
 DROP_AT_1C_V = 0.008
+"""Of a contact or a film at magnitude 1: of the size of the voltage error of a calibrated model."""
 PARASITIC_SHARE = 0.005
+"""Of the capacity an hour, at magnitude 1."""
 INSTRUMENT = Instrument()
 
 STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
@@ -81,7 +83,7 @@ class Laboratory:
         mix = ", ".join(self.effects) or "nothing added"
         note = f"{profile.name}: virtual, {self.model} of {self.bpx.name} with {mix}; seed {self.seed}."
         warm = "self_heating" in self.effects
-        trace = run(self.setup(), profile)
+        trace = simulate_truth(self.setup(), profile)
         notes = (note, *self._outside(profile.name, trace.voltage_v))
         return self.instrument.write(trace, profile.name, rng, warm, notes)
 
@@ -148,10 +150,3 @@ def _declared(bpx: Path, name: str) -> float:
         raise DataError(f"The cell file {bpx} cannot be opened: {error.strerror}.") from None
     except (ValueError, KeyError, TypeError) as error:
         raise DataError(f"{bpx.name} states no {name!r} ({error}).") from None
-
-
-def spans(train: Sequence[Array], test: Sequence[Array]) -> bool:
-    """Whether the range of the training arrays contains that of every test array."""
-    low = min(float(a.min()) for a in train)
-    high = max(float(a.max()) for a in train)
-    return all(low <= float(a.min()) and float(a.max()) <= high for a in test)

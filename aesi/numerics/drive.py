@@ -14,11 +14,10 @@ from aesi.numerics.typing import Array
 
 N_RECENT = 4
 """Currents that one row needs: of the sample itself and of the three before it."""
-N_DRIVE = 7
 
 
 def drive_features(current_a: Array) -> Array:
-    """(n, N_DRIVE) of a continuous record of currents (n,) A."""
+    """(n, 7) features of a continuous record of currents (n,) A."""
     jumps = np.diff(current_a, prepend=current_a[:1])
     before = np.concatenate([np.zeros(min(2, len(jumps))), jumps])
     last, last_but_one = before[1 : len(jumps) + 1], before[: len(jumps)]
@@ -28,7 +27,7 @@ def drive_features(current_a: Array) -> Array:
 
 
 def drive_row(recent: Array) -> Array:
-    """(N_DRIVE,) of the last up to N_RECENT currents, the sample's own at the end."""
+    """(7,) features of the last up to N_RECENT currents, the sample's own at the end."""
     padded = np.full(N_RECENT, recent[0])
     padded[N_RECENT - len(recent) :] = recent
     return np.asarray(drive_features(padded)[-1])

@@ -22,6 +22,7 @@ from aesi.numerics.typing import Array
 STAGES = (8.0, 2.0, 1.0)
 """Smoothing widths, in units of the final one."""
 MAX_NEWTON = 40
+"""Newton steps at most; convergence ends them before."""
 RIDGE = 1e-8
 """Relative to the mean diagonal of the Hessian: keeps collinear columns (overlapping means) solvable."""
 

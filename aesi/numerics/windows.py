@@ -21,7 +21,9 @@ from numba import njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
 N_LAGS = 10
+"""A convention; the spans beyond carry the slower past."""
 SPANS = (5, 20, 60)
+"""Samples; a convention."""
 
 
 def spans(window: int) -> IntArray:

@@ -18,7 +18,10 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 
 EDGE = 1e-6
+"""How near a stoichiometry comes to 0 or 1, where potentials have poles."""
 SOC_BEYOND = 0.05
+"""How far beyond full and empty voltages are looked up; GRID points over that range, between which a root is
+bracketed."""
 GRID = 257
 
 

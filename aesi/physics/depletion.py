@@ -10,7 +10,7 @@ import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
-from aesi.physics.espm.plain import arrhenius, stack_of
+from aesi.physics.espm.plain import rate_factor, stack_of
 from aesi.physics.model import EspmModel
 
 LAYERS = {1: "negative electrode", 2: "positive electrode"}
@@ -56,7 +56,7 @@ def sentence(
             f"{head}{surface}, at a state of charge of {100 * soc:.1f} %: the record asks for more charge than the "
             f"cell has. Check soc0, the capacity and the sign of the current, {tail}"
         )
-    slower = arrhenius(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
+    slower = rate_factor(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
     cause = f"{head}{surface}, while its particles hold {100 * mean:.1f} % in the mean: solid diffusion cannot follow "
     cause += f"{abs(current_a[at]):.3g} A"
     if slower < 0.9:
@@ -68,7 +68,7 @@ def carried_a(model: EspmModel, kelvin: float) -> float:
     """A, the steady current at which the salt of one electrode is used up, at a diffusivity as at rest."""
     cell, stack = model.cell, stack_of(model)
     e = cell.electrolyte
-    faster = arrhenius(e.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
+    faster = rate_factor(e.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
     rates = stack.lam[1:] * float(e.diffusivity(np.array([e.c0_mol_m3]))[0]) * faster
     regions = model.regions
     enters = stack.gain[:regions, 1:].mean(axis=0) - stack.gain[regions:, 1:].mean(axis=0)

@@ -31,7 +31,7 @@ from aesi.physics.cell.relations import Relation
 from aesi.physics.effect import ActiveEffect, Record, Trace
 from aesi.physics.espm.extended import interface_capacity, ohmic_drops, particle_units
 from aesi.physics.espm.layout import Units
-from aesi.physics.espm.plain import arrhenius, shifted_ocp, stack_of
+from aesi.physics.espm.plain import rate_factor, shifted_ocp, stack_of
 from aesi.physics.espm.tables import solid_diffusion
 from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, model_with
@@ -39,6 +39,7 @@ from aesi.physics.simulation import ModelName, model_with
 SLOPE_STEP = 1e-4
 """Of stoichiometry: tables of potentials have steps of 1.2e-4."""
 SMALL_A = 1e-6
+"""Current whose response is a slope: far below any exchange current, far above round-off."""
 
 
 def impedance(
@@ -122,9 +123,11 @@ class _Linear:
             matrix[:, n + side, :n] = into[:, of_side].sum(axis=1)
             right[:, n + side] = (1.0 if side == 0 else -1.0) / cell.total_area_m2
         solved = np.linalg.solve(matrix, right[:, :, None])[:, :, 0]
-        warmer = arrhenius(cell.electrolyte.conductivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+        warmer = rate_factor(
+            cell.electrolyte.conductivity_ea_j_mol, self.kelvin, cell.reference_temperature_k
+        )
         gap = cell.separator.thickness_m / cell.separator.transport_efficiency / (self._kappa() * warmer)
-        film = cell.film_resistance_ohm / arrhenius(
+        film = cell.film_resistance_ohm / rate_factor(
             cell.film_ea_j_mol, self.kelvin, cell.reference_temperature_k
         )
         contact = cell.contact_resistance_ohm + film
@@ -139,9 +142,9 @@ class _Linear:
             at = self.rest[side]
             here = np.flatnonzero(units.place[:, 0] == side)
             slope = slopes[side]
-            kinetic = arrhenius(electrode.rate_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+            kinetic = rate_factor(electrode.rate_ea_j_mol, self.kelvin, cell.reference_temperature_k)
             thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
-            faster = arrhenius(electrode.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+            faster = rate_factor(electrode.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
             faster *= (
                 float(electrode.diffusivity(np.array([at]))[0]) / solid_diffusion(electrode.diffusivity).d0
             )
@@ -157,7 +160,7 @@ class _Linear:
         """(frequencies, 2 regions, 2 regions) ohm m2: potential of a region's salt per current that enters a region."""
         cell, regions = self.model.cell, self.model.regions
         e, stack = cell.electrolyte, stack_of(self.model)
-        faster = arrhenius(e.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
+        faster = rate_factor(e.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
         rates = stack.lam * float(e.diffusivity(np.array([e.c0_mol_m3]))[0]) * faster
         enters = (1.0 - e.transference) / FARADAY_C_MOL * stack.gain[:, 1:]
         gauss = stack.gauss[: 6 * regions].reshape(2 * regions, 3, -1)
@@ -175,7 +178,7 @@ class _Linear:
         """(2 regions, 2 regions) ohm m2, as in time."""
         regions = self.model.regions
         e = self.model.cell.electrolyte
-        warmer = arrhenius(e.conductivity_ea_j_mol, self.kelvin, self.model.cell.reference_temperature_k)
+        warmer = rate_factor(e.conductivity_ea_j_mol, self.kelvin, self.model.cell.reference_temperature_k)
         solid, salt = ohmic_drops(self.model)
         out = np.zeros((2 * regions, 2 * regions))
         for side in range(2):

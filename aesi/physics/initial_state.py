@@ -15,7 +15,7 @@ A voltage is as good as the open-circuit potentials, so that a flat potential gi
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -46,7 +46,9 @@ MOVING_V = 4e-3
 BEYOND_V = 0.05
 """A voltage this far beyond the declared full or empty still belongs to a full or an empty cell of this kind."""
 CALM_ROWS = 60
+"""First rows that are looked at for a rest."""
 GRID = 4001
+"""States of charge at which potentials are looked up."""
 FLOWED_S = (0.0, 20.0, 200.0, 2000.0)
 """How long the first current may have flowed: after the last, it has drawn all but the slowest of its drops."""
 HISTORY_C_RATE = 0.25
@@ -55,10 +57,12 @@ what this current leaves once it has flowed for long."""
 DROP_ERROR = 0.2
 """Share of its drop that a model misses at the first row of a record."""
 JUDGED_S = 300.0
+"""First part of a record whose shape tells how long its current had flowed, of at most JUDGED_ROWS rows."""
 JUDGED_ROWS = 3000
 SHAPE_V = 2e-3
 """What the shape of a voltage over the first minutes is simulated to."""
 ROUNDS = 4
+"""Of drop and state of charge in turn: the drop hardly depends on it."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
 """A given state of charge further than this from that of a record's voltage is contradicted by it."""
@@ -70,6 +74,7 @@ class InitialState:
 
     basis : what it rests on.  sentence : the same for a reader, with the figures.  contradicted : True where a given
     state of charge is far from that of the voltage.  rest_voltage_v : at which the cell rests there, as read.
+    doubt : how far the reading of the voltage is from what was given.
     """
 
     soc: float
@@ -78,6 +83,7 @@ class InitialState:
     sentence: str
     contradicted: bool = False
     rest_voltage_v: float | None = None
+    doubt: float = 0.0
 
 
 def initial_state(
@@ -111,8 +117,10 @@ def initial_state(
             return _given(record, soc0, None)
         allowed = OTHER_STATE if read.basis in ("rest", "full charge") else OTHER_STATE_LOADED
         if abs(read.soc - soc0) <= allowed + 2.0 * read.sd:
-            return _given(record, soc0, None)
-        return read_instead(record, read, soc0) if shared else _given(record, soc0, read)
+            return replace(_given(record, soc0, None), doubt=abs(read.soc - soc0))
+        if shared:
+            return read_instead(record, read, soc0)
+        return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
     return start.read()
 
 
@@ -127,13 +135,6 @@ def _given(record: Measurement, soc0: float, other: InitialState | None) -> Init
     if other is not None:
         words += f"; its first voltage ({record.voltage_v[0]:.3f} V) rather says {other.soc:.3f}"
     return InitialState(soc0, GIVEN_SD, "given", words + ".", other is not None)
-
-
-def initial_states(
-    cell: Cell, records: Sequence[Measurement], soc0: float | None = None, hold: Hold = "backward"
-) -> tuple[InitialState, ...]:
-    """`initial_state` of several records of one cell; `soc0`, where given, is meant for all of them."""
-    return tuple(initial_state(cell, r, soc0, hold, shared=len(records) > 1) for r in records)
 
 
 class _Start:

@@ -16,11 +16,16 @@ from aesi.physics.cell.parts import UNITY
 from aesi.physics.cell.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
+"""Against 24, it moves the voltage by 0.02 mV RMS at most: LG M50 to 2C, the load of `aesi bench espm`; 8 by 0.2
+mV."""
 DEFAULT_ELECTROLYTE_ORDER = 3
+"""Against 8, it moves that voltage by 0.007 mV RMS at most; 2 by 0.09 mV."""
 DEFAULT_ELECTRODE_POINTS = 6
 """Twice as many move the voltage by 0.16 mV RMS at worst: LG M50 at 2C until the salt is all but gone."""
 DEFAULT_SUBSTEP_S = 1.0
+"""A convention; the effect `numerical_error` tells what a shorter one changes."""
 ANY_NUMBER = 2**31
+"""No limit."""
 
 
 @dataclass(frozen=True)

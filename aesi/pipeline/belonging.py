@@ -19,6 +19,7 @@ from aesi.physics import Cell
 from aesi.records import Measurement
 
 ROWS = 300
+"""Of a record that are looked at, evenly spread: each pair of them bounds the capacity."""
 TELLING_SHARE = 0.3
 """Of the charge moved: less between two rows is within hysteresis and relaxation."""
 TELLING_SOC, FEWEST_SOC = 0.25, 0.02
@@ -32,9 +33,13 @@ TOO_LARGE, TOO_SMALL = 2.0, 1.4
 """By how much the declared capacity may exceed, or fall short of, what the record allows: ageing and batches of one
 cell move it by less."""
 ABOVE_FULL_V = 0.1
+"""A voltage at rest further above that of a full cell belongs to another chemistry."""
 SMALL_C_RATE = 0.1
+"""Below it a cell all but rests."""
 SOC_GRID = 1201
+"""States of charge at which a voltage is looked up."""
 SOC_MARGIN = 0.1
+"""What a voltage beyond the window stands for."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import numpy as np
 from aesi.calibration import Calibration, calibrate
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
+from aesi.constants import MV_PER_V
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
@@ -21,7 +22,6 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement, Spectrum
 
 SCHEMA = "aesi.calibration/2"
-MV = 1e3
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def calibrate_files(
     found = replace(found, cell=replace(described, capacity_shares=shares))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra = held_against(found.cell, asked.impedance, model=model)
-    content = to_json(found, [note for m in measurements for note in m.notes], posterior, spectra)
+    content = calibration_content(found, [note for m in measurements for note in m.notes], posterior, spectra)
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
     report = out.with_suffix(".report.json")
@@ -85,7 +85,7 @@ def _made_from(found: Calibration) -> str:
     return f"Fitted by aesi calibrate with {with_model} to {records}, from {found.declared.name}."
 
 
-def to_json(
+def calibration_content(
     found: Calibration,
     read: Sequence[str] = (),
     posterior: PosteriorSamples | None = None,
@@ -104,8 +104,8 @@ def to_json(
             {
                 "name": e.name,
                 "temperature_degc": e.temperature_degc,
-                "before_rmse_mv": MV * e.before_v,
-                "after_rmse_mv": MV * e.after_v,
+                "before_rmse_mv": MV_PER_V * e.before_v,
+                "after_rmse_mv": MV_PER_V * e.after_v,
                 "capacity_share": found.capacities[e.name],
             }
             for e in found.errors

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading
 from aesi.errors import DataError, InputError
@@ -25,7 +26,6 @@ from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
 if TYPE_CHECKING:
     import pandas as pd
 
-MV = 1e3
 SayNotes = Callable[[Iterable[str]], None]
 
 
@@ -132,7 +132,7 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
     """
     said = [f"{record.name}: state of charge {soc[0]:.3f} at the start, {soc[-1]:.3f} at the end."]
     if np.all(np.isfinite(record.voltage_v)):
-        error = MV * (record.voltage_v - voltage_v)
+        error = MV_PER_V * (record.voltage_v - voltage_v)
         said.append(
             f"{record.name}: against the measured voltage {np.sqrt(np.mean(error**2)):.2f} mV RMSE, "
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
@@ -157,7 +157,7 @@ def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> li
         )
     if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
         inside = (record.voltage_v >= prediction.lower_v) & (record.voltage_v <= prediction.upper_v)
-        width = MV * float(np.nanmean(prediction.upper_v - prediction.lower_v))
+        width = MV_PER_V * float(np.nanmean(prediction.upper_v - prediction.lower_v))
         said.append(
             f"{record.name}: the {100 * prediction.nominal:.0f} % band holds {100 * np.mean(inside):.1f} % of the "
             f"measured voltage; it is {width:.1f} mV wide in the mean."

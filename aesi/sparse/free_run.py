@@ -18,7 +18,7 @@ LIMIT = 10.0
 
 
 @njit(cache=True)
-def run(drive: Array, functions: IntArray, start: float, clip: bool, limit: float) -> tuple[Array, int]:
+def run_one(drive: Array, functions: IntArray, start: float, clip: bool, limit: float) -> tuple[Array, int]:
     """One model along one record, in scaled error.
 
     drive : (n_functions, n), g_q at each sample.  Returns (n,) predictions of samples 1 to n, and the index

@@ -21,6 +21,7 @@ from aesi.numerics.typing import Array
 from aesi.sparse.stridge import triangle
 
 UPPER_QUARTILE = 0.75
+"""Of the leverage of the fitted rows: above it a row lies at their edge."""
 LEAST_RIDGE = 1e-12
 """Of the largest squared diagonal: collinear terms and no ridge leave directions without any information."""
 

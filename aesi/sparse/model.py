@@ -204,7 +204,7 @@ class SparseModel:
         """(n,) V from the error `start`, and where the scaled run diverged, or -1."""
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
         if self.has_feedback:
-            scaled, diverged = free_run.run(
+            scaled, diverged = free_run.run_one(
                 drive[:, :-1], self._functions, scaled0, self._clip, free_run.LIMIT
             )
         else:

@@ -28,7 +28,7 @@ from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
 from aesi.tracer.report.outcome import FileOutcome, State, States, outcomes, test_rmse_v
 from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
-from aesi.tracer.report.tell_apart import experiment
+from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.yardstick import Yardstick, measure
 
 
@@ -200,7 +200,7 @@ def _told(
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,
-        experiments=tuple((g, experiment(g, problem.effects)) for g in verdict.groups),
+        experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,
         notes=(choice.sentence, *_notes(evidence, tested)),
         warnings=_warnings(files),

@@ -47,7 +47,7 @@ def state() -> Path:
     return workspace() / ".aesi"
 
 
-def prepare() -> None:
+def prepare_process() -> None:
     """Set what is not set: one thread a process (processes are the unit of parallel work), no telemetry."""
     for name in THREAD_VARIABLES:
         os.environ.setdefault(name, "1")

@@ -39,7 +39,7 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
     from flows.tracking.store import Store
     from flows.tracking.tracker import Subject, Tracker
 
-    environment.prepare()
+    environment.prepare_process()
     digest = sha256(repr(cases.specs).encode()).hexdigest()[:16]
     quiet = TrackingConfig(system_metrics=False, log_model=False)
     tracker = Tracker(Store(), Subject(cases.name, cases.seed, digest, quiet), Console().say)

@@ -28,6 +28,7 @@ HEAVIER = (
     "search.timeout_s=600",
 )
 WAIT_S = 600.0
+"""For workers that do not come."""
 
 
 def run(
@@ -44,7 +45,7 @@ def run(
     from aesi.pipeline.experiment.load import load
     from flows.base import environment
 
-    environment.prepare()
+    environment.prepare_process()
     config = read_experiment(experiment, overrides)
     problem = build_problem(load(config), config)
     genomes = _genomes(problem, candidates)

@@ -28,8 +28,10 @@ from aesi.sparse.terms.inputs import with_inputs
 from flows.base import environment
 
 METRICS = 10
+"""As many as a candidate logs; and parameters."""
 PARAMETERS = 14
 DELIVERY_S = 120.0
+"""Wait for the store at the end."""
 
 
 def run(
@@ -122,7 +124,7 @@ def _workspace() -> Iterator[None]:
     before = os.environ.get("AESI_HOME")
     with tempfile.TemporaryDirectory(prefix="aesi-bench-") as folder:
         os.environ["AESI_HOME"] = folder
-        environment.prepare()
+        environment.prepare_process()
         try:
             yield
         finally:

@@ -17,7 +17,7 @@ def list_() -> None:
     """Bundled and downloadable data sets, and whether they are on this machine."""
     from aesi.data import catalogue
 
-    for line in catalogue.listing():
+    for line in catalogue.catalogue_lines():
         typer.echo(line)
 
 
@@ -52,10 +52,10 @@ def convert(
     ] = "aesi",
 ) -> None:
     """Write a measurement as CSV in SI units, and say what was done to it."""
-    from aesi.data.convert import convert_file, summary
+    from aesi.data.convert import convert_file, record_lines
 
     record = convert_file(file, out, reading, to)
     options.say_notes(record.notes)
-    for line in summary(record):
+    for line in record_lines(record):
         typer.echo(line, err=True)
     typer.echo(str(out))

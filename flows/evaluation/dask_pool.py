@@ -18,6 +18,7 @@ from flows.evaluation.pool import guarded
 from flows.evaluation.scorer_recipe import build_scorer
 
 CONNECT_S = 15
+"""Wait for a scheduler that does not answer."""
 OWN_CLUSTER = {
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.interval": "10s",

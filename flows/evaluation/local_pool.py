@@ -22,6 +22,7 @@ from aesi.records import Failed
 from flows.evaluation.pool import Evaluate, guarded
 
 WATCH_S = 1.0
+"""How often a worker's memory and its parent are looked at."""
 MEGABYTE = 1 << 20
 
 

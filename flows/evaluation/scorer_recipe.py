@@ -17,6 +17,6 @@ def build_scorer(content: str, base: str) -> partial[ScoredCandidate | Failed]:
     from aesi.pipeline.experiment.fit import build_problem
     from aesi.pipeline.experiment.load import load
 
-    environment.prepare()
+    environment.prepare_process()
     config = parse_experiment(json.loads(content), Path(base))
     return scorer(build_problem(load(config), config), config)

@@ -29,7 +29,7 @@ def batch(
 
     Raises InputError for a plan that cannot be read; a job that fails is a row with its reason.
     """
-    environment.prepare()
+    environment.prepare_process()
     console = Console()
     started = time.monotonic()
     jobs = read_plan(source, cell)
@@ -89,4 +89,4 @@ def _quietly() -> None:
     import signal
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    environment.prepare()
+    environment.prepare_process()

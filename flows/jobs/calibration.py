@@ -17,7 +17,7 @@ def calibrate(
     cell: Path, measurements: Sequence[Measurement], out: Path, request: Request | None = None
 ) -> dict[str, Any]:
     """Calibrate and say what came of it; returns the report."""
-    environment.prepare()
+    environment.prepare_process()
     console = Console()
     console.say(f"Fitting the model's own parameters to {', '.join(m.name for m in measurements)} ...")
     read = together(note for m in measurements for note in m.notes)

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aesi.pipeline.discovery.discover import ARCHIVE, MV, Case, run_case, write_discovery
+from aesi.constants import MV_PER_V
+from aesi.pipeline.discovery.discover import ARCHIVE, Case, run_case, write_discovery
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import digest
 from flows.base import environment
@@ -100,8 +101,8 @@ class Follow:
         }
         metrics = {
             "gain_nats": tried.gain_nats,
-            "fit/rmse_mv": MV * tried.rmse_v,
-            "model_error_mv": MV * tried.delta_v,
+            "fit/rmse_mv": MV_PER_V * tried.rmse_v,
+            "model_error_mv": MV_PER_V * tried.delta_v,
             "simulations": float(tried.simulations),
         }
         self._tracker.nested(

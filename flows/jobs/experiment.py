@@ -49,7 +49,7 @@ def _stages(
     started: float,
 ) -> Path:
     from aesi.pipeline.experiment.comparison import comparison
-    from aesi.pipeline.experiment.evaluate import evaluate
+    from aesi.pipeline.experiment.evaluate import evaluate_models
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
     from aesi.pipeline.experiment.load import load
@@ -90,7 +90,7 @@ def _stages(
     )
     fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config, loaded.left_out))
     validation = validation_mser(loaded, problem, found.candidates())
-    evaluation = run("evaluation", lambda: evaluate(fitted, loaded.split, validation))
+    evaluation = run("evaluation", lambda: evaluate_models(fitted, loaded.split, validation))
     seconds = time.monotonic() - started
     rows = found.rows()
     result = Result(

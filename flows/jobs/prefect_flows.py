@@ -43,7 +43,7 @@ def experiment(
     use_cache: bool = True,
 ) -> Path:
     """The whole job of `aesi run`: data, physics, search, ensembles, intervals, tables, figures, report."""
-    environment.prepare()
+    environment.prepare_process()
     console = Console()
     request = RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
     limit_s = request.config().runner.stage_timeout_s
@@ -65,7 +65,7 @@ def discovery(
     path : an experiment file that describes the case, as a deployment gives it; else `case`, which only a process
     that has read the records can hand over: `cell` and `data` then say what it is about.
     """
-    environment.prepare()
+    environment.prepare_process()
     console = Console()
     folder = Path(out) if out else None
     if case is None:

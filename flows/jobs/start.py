@@ -31,7 +31,7 @@ def start(
     use_prefect: bool = True,
 ) -> Path:
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
-    environment.prepare()
+    environment.prepare_process()
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache)
     config = request.config()  # bad input is refused before anything is started
 
@@ -60,7 +60,7 @@ def discover(case: Case, out: Path, use_prefect: bool = True, tracked_as: str = 
 
     Raises AesiError, one sentence, for what cannot be used; nothing is started then.
     """
-    environment.prepare()
+    environment.prepare_process()
     check(case)
 
     def under_prefect() -> dict[str, Any]:

@@ -13,6 +13,7 @@ from aesi.pipeline.report.compare import ComparedRun, write_comparison
 from flows.tracking.store import KIND, Store
 
 SHORTEST_ID = 4
+"""Letters of a run's id that may stand for it."""
 OF_THE_RESULT = ("chosen_candidate",)
 """Parameters that are what came of a run, not what was asked for."""
 

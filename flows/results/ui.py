@@ -53,7 +53,7 @@ def serve_flows(port: int, host: str) -> None:
     """Prefect's server on the flow runs of the workspace, until interrupted."""
     if not _free(host, port):
         raise InputError(f"port {port} on {host} is taken; give another with --port.")
-    environment.prepare()
+    environment.prepare_process()
     environment.make_prefect_home()
     print(f"Prefect shows the flow runs at http://{host}:{port}/runs (Ctrl-C ends it)", flush=True)
     command = [sys.executable, "-m", "prefect", "server", "start", "--host", host, "--port", str(port)]

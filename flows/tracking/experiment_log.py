@@ -8,6 +8,7 @@ from math import log10
 from pathlib import Path
 from typing import Any
 
+from aesi.constants import MV_PER_V
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
@@ -20,7 +21,6 @@ from flows.base.files import write_atomically
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
 
-MILLIVOLT_PER_VOLT = 1e3
 INPUTS, RECORDS, DECLARED = "inputs", "records.bin", "declared"
 """What a candidate is made from: the error series by role, and the declared cell with its effects."""
 HEADLINES = ("free_run", "one_step", "intervals")
@@ -148,7 +148,7 @@ def candidate_metrics(candidate: Candidate) -> dict[str, float]:
         "pearson/train": candidate.pearson_train,
         "pearson/valid": candidate.pearson_valid,
         "free_run/valid_mser_pct": candidate.free_run_valid_mser_pct,
-        "one_step/valid_rmse_mv": MILLIVOLT_PER_VOLT * candidate.one_step_valid_rmse_v,
+        "one_step/valid_rmse_mv": MV_PER_V * candidate.one_step_valid_rmse_v,
     }
 
 

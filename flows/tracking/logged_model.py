@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 CODE = Path(__file__).with_name("served_model.py")
 DEFAULT_SOC0 = 0.5
+"""Of the example in a logged model's signature, where the model knows none."""
 NEEDS = ("bpx", "numba", "numpy", "pandas", "pyarrow", "pydantic", "quantile-forest", "scikit-learn", "scipy")
 
 

@@ -21,6 +21,7 @@ Deliver = Callable[[Item, bool], None]
 """Sends one item; the flag says that it may have been sent before."""
 
 RETRY_S = (1.0, 2.0, 5.0, 10.0, 20.0)
+"""Waits before each further try of a store that does not answer."""
 FLUSH_S = 60.0
 """How long a store may stand still before an ending run stops waiting for it."""
 REFUSED = "refused"

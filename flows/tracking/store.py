@@ -28,8 +28,10 @@ PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
 KIND = "aesi.kind"
 REACH_S = 5.0
+"""Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
 PAGE = 1000
+"""Runs asked for at a time."""
 
 
 class StoreAway(AesiError):

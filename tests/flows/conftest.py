@@ -30,7 +30,7 @@ def home(folder):
     """The folder as the workspace, for fixtures that outlive a test."""
     before = os.environ.get("AESI_HOME")
     os.environ["AESI_HOME"] = str(folder)
-    environment.prepare()
+    environment.prepare_process()
     try:
         yield
     finally:
@@ -73,7 +73,7 @@ def workspace(tmp_path, monkeypatch):
     monkeypatch.setenv("PREFECT_HOME", str(tmp_path / ".aesi" / "prefect"))
     monkeypatch.delenv("MLFLOW_TRACKING_URI", raising=False)
     monkeypatch.chdir(tmp_path)
-    environment.prepare()
+    environment.prepare_process()
     return tmp_path
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import aesi
 from aesi.conformal import METHODS
-from aesi.conformal.scores import score
+from aesi.conformal.scores import scores_of
 
 PIECE = 1800  # the drive repeats its schedule every 1,800 s
 
@@ -28,7 +28,7 @@ def test_holds_within_bins_and_minutes(pieces, name: str) -> None:
     past, future = pieces[0::2], pieces[1::2]
     calibrated = METHODS[name].fit([p[0] for p in past], current_a=[p[1] for p in past])
     for residual, current, soc in future:
-        scores = score(calibrated.intervals(residual, current), residual, 0.1, current, soc, dt_s=1.0)
+        scores = scores_of(calibrated.intervals(residual, current), residual, 0.1, current, soc, dt_s=1.0)
         # 1,800 samples whose misses the adaptive step spaces out: the share scatters by less than a per cent.
         assert 0.88 <= scores.coverage <= 0.925
         assert scores.worst_bin_coverage >= 0.85

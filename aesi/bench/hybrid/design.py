@@ -45,9 +45,11 @@ SETTINGS: dict[str, dict[str, Any]] = {
 """Name -> what differs from BASE."""
 
 WEIGHTS = FitnessWeights(0.45, 0.45, 0.10)
+"""Those of the experiment on the measured drive, and its ranges and population below."""
 SPACE = GenomeSpace(1, lambda1=(0.1, 1e3), lambda2=(1e-3, 0.3), p_c=(0, 3), d=(1, 2))
 POPULATION = 20
 USEFUL_PCT = 45.0
+"""A reduction of the squared error below this is counted."""
 
 
 def run(

@@ -34,6 +34,7 @@ CASES = ((60, 1e-3), (200, 1e-12), (626, 1e-3), (626, 1e-12))
 """Terms in the library, lambda1."""
 
 _DT_S = 0.1
+"""That of the paper's records."""
 _CAPACITY_AS = 30.0 * SECONDS_PER_HOUR
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.fit import Fitted
@@ -27,8 +28,6 @@ from aesi.pipeline.experiment.intervals.bands import reach
 from aesi.pipeline.experiment.physics_models import DECLARED
 from aesi.pipeline.experiment.sections import RepeatsConfig
 from aesi.records import ErrorSeries
-
-MV = 1e3
 
 
 @dataclass(frozen=True)
@@ -70,6 +69,7 @@ EXPERIMENTS = {
     "m50t": "lg_m50t_udds.yaml",
 }
 NMC_PARTS = (1, 2, 3, 4, 5)
+"""The published drive repeats itself after NMC_PERIOD_S, and that of the M50T after M50T_PERIOD_S."""
 NMC_PERIOD_S = 1800.0
 M50T_HALVES = ((1, 3, 5, 7), (2, 4, 6))
 M50T_PERIOD_S = 2600.0
@@ -125,7 +125,7 @@ def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
     declared = np.concatenate([series.left_by(DECLARED) for series in tests])
     left = truth - np.concatenate([run.error_v for run in runs])
     figures: dict[str, Any] = {
-        "rmse_mv": MV * float(np.sqrt(np.mean(left**2))),
+        "rmse_mv": MV_PER_V * float(np.sqrt(np.mean(left**2))),
         "mser_pct": float(100.0 * (1.0 - np.mean(left**2) / np.mean(declared**2))),
         "diverged": sum(run.diverged_at is not None for run in runs),
     }
@@ -144,8 +144,8 @@ def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
         "rows": len(left),
         "coverage_pct": 100.0 * float(covered.mean()),
         "worst_drive_coverage_pct": 100.0 * min(float(part.mean()) for part in np.split(covered, ends)),
-        "width_mv": MV * float(np.mean(high - low)),
-        "winkler_mv": MV * float(np.mean(_winkler(left, low, high, alpha))),
+        "width_mv": MV_PER_V * float(np.mean(high - low)),
+        "winkler_mv": MV_PER_V * float(np.mean(_winkler(left, low, high, alpha))),
     }
     return figures
 

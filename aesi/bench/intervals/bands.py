@@ -20,6 +20,7 @@ import numpy as np
 from aesi.bench.virtual_drives import SplitLayout, virtual_splits
 from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
 from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors, Unseen
@@ -28,9 +29,11 @@ from aesi.sparse import Genome, Options, Problem, evaluate
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 
 ALPHA = 0.1
+"""Bands for 90 %."""
 HORIZONS_S = (1.0, 10.0, 60.0)
-MV = 1e3
+"""Those of the tables of a run."""
 OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
+"""Those of the experiment on the measured drive."""
 RIDGE, THRESHOLD = 10.0, 1e-3
 
 
@@ -164,8 +167,8 @@ def _line(layout: str, design: str, horizon: float, seed: int, figures: Array) -
         "coverage_pct": round(100 * float(coverage.mean()), 2),
         "coverage_sd_pct": round(100 * float(coverage.std()), 2),
         "coverage_se_pct": round(100 * float(coverage.std()) / len(coverage) ** 0.5, 2),
-        "width_mv": round(MV * float(width.mean()), 3),
-        "interval_score_mv": round(MV * float(score.mean()), 3),
+        "width_mv": round(MV_PER_V * float(width.mean()), 3),
+        "interval_score_mv": round(MV_PER_V * float(score.mean()), 3),
         "worst_bin_coverage_pct": round(100 * float(np.nanmean(worst)), 2),
         "score_ratio": round(float(np.exp(np.log(ratio).mean())), 4),
     }

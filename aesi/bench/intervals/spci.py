@@ -24,7 +24,9 @@ from aesi.conformal.scores import interval_score
 from aesi.numerics.typing import Array
 
 ALPHA = 0.1
+"""Intervals for 90 %."""
 WINDOW = 200
+"""Residuals that a method sees: the default of an experiment."""
 NORMAL_95 = 1.6448536269514722
 """95 % quantile of the standard normal distribution."""
 

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError
@@ -28,8 +28,8 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import Cell, initial_state, simulate
 from aesi.records import Measurement
 
-MV = 1e3
 WINDOW_ROWS = 1024
+"""As ECM-UDE judges."""
 NCR, HG2, NMC, M50T = "panasonic_ncr18650pf", "lg_18650hg2", "about_energy_nmc", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
@@ -200,6 +200,7 @@ def cell_of(cells: Path, data: str, name: str | None) -> Cell:
 
 
 NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
+"""As the makers state them, for cell files of another size of the same chemistry."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +215,7 @@ def free_run(cell: Cell, data: Measurement) -> FreeRun:
     """A free run over all rows, held backward as loggers write, from the state of charge of the first."""
     error, gone = _errors(cell, data, initial_state(cell, data).soc)
     out_s = float(data.time_s[int(np.argmax(gone))]) if gone.any() else None
-    return FreeRun(round(MV * float(np.sqrt(np.mean(error**2))), 2), out_s)
+    return FreeRun(round(MV_PER_V * float(np.sqrt(np.mean(error**2))), 2), out_s)
 
 
 def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
@@ -228,7 +229,7 @@ def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
     soc = initial_state(cell, data).soc - moved_ah / cell.capacity_ah
     parts = [slice(k, k + rows) for k in range(0, len(data), rows)]
     errors = [_errors(cell, data.take(part), float(soc[part.start]))[0] for part in parts]
-    return round(MV * float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), 2)
+    return round(MV_PER_V * float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), 2)
 
 
 def _errors(cell: Cell, data: Measurement, soc0: float) -> tuple[Array, BoolArray]:

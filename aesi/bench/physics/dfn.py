@@ -16,7 +16,7 @@ from time import perf_counter
 import numpy as np
 
 from aesi.bench import CaseRow
-from aesi.bench.physics.espm import STEP_S, drive
+from aesi.bench.physics.espm import STEP_S, random_load
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, EspmModel
@@ -29,7 +29,7 @@ KELVIN = {"25 degC": 298.15, "0 degC": 273.15}
 LARGEST_RATE = {"nmc_30ah": 3.0, "lg_m50_chen2020": 2.0}
 """C-rate of the hardest load of each cell."""
 DRIVE_RATE = 3.0
-"""C-rate that `espm.drive` runs to."""
+"""C-rate that `espm.random_load` runs to."""
 OURS = ((3, 6), (4, 8), (6, 12), (8, 16), (12, 24))
 """(points across an electrode, modes in a particle); the third is in use."""
 PEERS = ((10, 10), (20, 20), (40, 40))
@@ -67,7 +67,7 @@ def run(
     worst: dict[str, float] = {}
     names = [cell] if cell else list(LARGEST_RATE)
     for name in names:
-        for load in loads(name, seed, seconds):
+        for load in benchmark_loads(name, seed, seconds):
             for line in curve(load, repeats):
                 if line.get("in_use"):
                     for key in ("rmse_mv", "max_mv", "doubling_mv"):
@@ -80,7 +80,7 @@ def run(
     yield {"summary": True, **worst}
 
 
-def loads(name: str, seed: int, seconds: int) -> Iterator[Load]:
+def benchmark_loads(name: str, seed: int, seconds: int) -> Iterator[Load]:
     """Drive, pulses and a discharge of a cell, warm and cold."""
     path = Path(name) if Path(name).suffix else CELLS / f"{name}.bpx.json"
     if not path.is_file():
@@ -95,12 +95,12 @@ def loads(name: str, seed: int, seconds: int) -> Iterator[Load]:
         for kind in ("drive", "pulses", "discharge"):
             level = rate if kelvin > KELVIN["0 degC"] or kind != "discharge" else 0.5 * rate
             if kind == "drive":
-                breaks, current = drive(round(seconds / STEP_S), capacity, np.random.default_rng(seed))
+                breaks, current = random_load(round(seconds / STEP_S), capacity, np.random.default_rng(seed))
                 current = current * level / DRIVE_RATE
             elif kind == "pulses":
-                breaks, current = pulses(level * capacity, seconds)
+                breaks, current = pulse_load(level * capacity, seconds)
             else:
-                breaks, current = discharge(level, capacity)
+                breaks, current = discharge_load(level, capacity)
             inside = np.arange(0.0, breaks[-1], 1.0)
             time = np.unique(np.concatenate([inside, breaks]))
             yield Load(
@@ -108,7 +108,7 @@ def loads(name: str, seed: int, seconds: int) -> Iterator[Load]:
             )
 
 
-def pulses(current_a: float, seconds: int) -> tuple[Array, Array]:
+def pulse_load(current_a: float, seconds: int) -> tuple[Array, Array]:
     """Break points and current: rests, discharges and charges of half a minute each, with edges of 0.1 s."""
     edges = np.arange(0.0, seconds + 1.0, 30.0)
     level = np.resize([0.0, 1.0, 0.0, -0.5, 0.3, 1.0, 0.0, 0.6], len(edges) - 1)
@@ -116,7 +116,7 @@ def pulses(current_a: float, seconds: int) -> tuple[Array, Array]:
     return breaks, current_a * np.repeat(level, 2)
 
 
-def discharge(rate: float, capacity_ah: float) -> tuple[Array, Array]:
+def discharge_load(rate: float, capacity_ah: float) -> tuple[Array, Array]:
     """Break points and current of 60 % of the capacity at a constant rate, and a rest."""
     end = 0.6 * 3600.0 / rate
     breaks = np.array([0.0, 10.0, 11.0, end, end + 1.0, end + 300.0])
@@ -144,7 +144,7 @@ def curve(load: Load, repeats: int) -> Iterator[CaseRow]:
 
 def timing(name: str, samples: int, repeats: int, seed: int) -> CaseRow:
     """Ours (median, warm) and the peer (its default mesh) on a drive at 10 Hz."""
-    load = next(iter(loads(name, seed, round(samples * STEP_S))))
+    load = next(iter(benchmark_loads(name, seed, round(samples * STEP_S))))
     time = np.arange(samples, dtype=np.float64) * STEP_S
     load = replace(load, time_s=time)
     model = EspmModel(load.cell)

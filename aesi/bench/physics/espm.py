@@ -33,7 +33,7 @@ def run(
     if not Path(cell).is_file():
         raise InputError(f"there is no cell file {cell}; name a BPX file with cell=...")
     model = Cell.from_bpx(cell)
-    breaks, current_at_breaks = drive(samples, model.nominal_capacity_ah, np.random.default_rng(seed))
+    breaks, current_at_breaks = random_load(samples, model.nominal_capacity_ah, np.random.default_rng(seed))
     time = np.arange(samples, dtype=np.float64) * np.float64(STEP_S)
     current = np.interp(time, breaks, current_at_breaks)
     first = _timed(model, time, current)[0]
@@ -58,7 +58,7 @@ def run(
     }
 
 
-def drive(samples: int, capacity_ah: float, rng: np.random.Generator) -> tuple[Array, Array]:
+def random_load(samples: int, capacity_ah: float, rng: np.random.Generator) -> tuple[Array, Array]:
     """Break points (s) and current there (A): a correlated random load, discharging on average, within 3C."""
     breaks = np.arange(0.0, samples * STEP_S + BREAK_POINT_S, BREAK_POINT_S)
     keep = np.exp(-BREAK_POINT_S / CORRELATION_S)

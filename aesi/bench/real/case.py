@@ -8,7 +8,7 @@ from typing import Literal
 
 from aesi.bench.real.faults import FaultKind
 
-Group = Literal["withheld", "fault", "physics", "ageing", "control"]
+Group = Literal["withheld", "fault", "physics", "ageing", "witness", "control"]
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,9 @@ class RealCase:
     cell : a file in the folder of cell files, or `set:file` of a data set.
     answers : any of these effects is the right name; none where no name is right.
     parameters : parameter of an effect -> its true value.  measured : where the true value is itself read off a
-    record: 'temperature' (mean of the thermocouple less the reference of the file) or 'capacity' (share lost against
-    the record in `against`).
+    record: 'temperature' (the thermocouple), 'capacity' (share lost against the record in `against`) or 'declared
+    capacity' (share that the record in `against` lacks of what the file declares).
+    spectra : file of impedance in the record's set, taken beside the record.
     matched : the case that is the same without what was put in or withheld.
     source : of the answer.  development : whether its figures choose anything.
     """
@@ -54,7 +55,8 @@ class RealCase:
     source: str
     parameters: Mapping[str, float] = field(default_factory=dict)
     fault: Fault | None = None
-    measured: Literal["temperature", "capacity"] | None = None
+    measured: Literal["temperature", "capacity", "declared capacity"] | None = None
     against: Take | None = None
+    spectra: str | None = None
     matched: str | None = None
     development: bool = False

@@ -4,30 +4,31 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.bench.real.answers import initial_state_row, scored
+from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
+from aesi.data.spectra import read_spectra
 from aesi.errors import AesiError, DataError
+from aesi.numerics.typing import Array
 from aesi.physics import Cell
-from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.discovery.discover import to_json
-from aesi.records import Measurement
+from aesi.pipeline.discovery.discover import discovery_content
+from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
 
-MV = 1e3
 LIMIT_S = 600.0
 MOST_ROWS = 20_000
 """Rows that a case is read with; more are averaged, as `aesi discover` does."""
-GROUP_OF = 2
-"""A name counts where it is given, or is one of a group of so many."""
 DRAWN = 160
 """Points of a residual that the report draws."""
 
@@ -52,8 +53,9 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         "matched": case.matched,
     }
     try:
-        data, truth = _load(case)
+        data = _read(case.take)
         declared = Cell.from_bpx(_cell(case.cell, Path(cells)))
+        known = _known(case, data, declared)
     except DataError as error:
         return row | {"verdict": "not run", "error": str(error), **_spent(began, processor)}
     soc0 = case.soc0
@@ -74,7 +76,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
             "named": False,
         }
     else:
-        answer = scored(case.answers, truth, to_json(found)) | {"residual": _residual(found)}
+        answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
     return row | answer | _spent(began, processor)
 
 
@@ -87,21 +89,55 @@ def _cell(name: str, folder: Path) -> Path:
     return locate(place, file) if colon else folder / name
 
 
-def _load(case: RealCase) -> tuple[Measurement, dict[str, float]]:
-    """The record as the finder gets it, and the true values of parameters."""
-    read = _read(case.take)
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What was measured beside a record: parameter of an effect -> true value, the thermocouple's course (n,) degC that
+    the finder was not given, the share of capacity lost, and spectra."""
+
+    parameters: Mapping[str, float]
+    temperature_degc: Array | None = None
+    lost: float | None = None
+    spectra: tuple[Spectrum, ...] = ()
+
+
+def _known(case: RealCase, data: Measurement, declared: Cell) -> Known:
     truth = dict(case.parameters)
-    if case.measured == "temperature":
-        full = _read(Take(case.take.set, case.take.file, case.take.stop_s))
+    course, lost = None, None
+    if case.group == "withheld":
+        full = _read(replace(case.take, temperature=True))
         if full.temperature_degc is None:
             raise DataError(f"{full.name} has no column of temperature.")
-        reference_degc = 298.15 - ZERO_CELSIUS_K
-        truth["ambient_temperature.shift_k"] = float(np.mean(full.temperature_degc)) - reference_degc
-    if case.measured == "capacity" and case.against:
-        before = _charge_ah(_read(case.against))
-        loss = 1 - _charge_ah(read) / before
-        truth["lithium_inventory_loss.loss"] = loss
-    return read, truth
+        course = full.temperature_degc
+    if case.measured == "temperature" and course is not None:
+        reference_degc = declared.initial_temperature_k - ZERO_CELSIUS_K
+        truth["ambient_temperature.shift_k"] = float(np.mean(course)) - reference_degc
+    if case.against is not None:
+        other_ah = _charge_ah(_read(case.against))
+        by_file = case.measured == "declared capacity"
+        lost = 1 - (other_ah / declared.capacity_ah if by_file else _charge_ah(data) / other_ah)
+    spectra = () if case.spectra is None else read_spectra(locate(case.take.set, case.spectra))
+    return Known(truth, course, lost, spectra)
+
+
+def _held_against(
+    case: RealCase,
+    known: Known,
+    found: Discovery,
+    content: Mapping[str, Any],
+    data: Measurement,
+    declared: Cell,
+    told: float | None,
+) -> dict[str, Any]:
+    row = scored(case.answers, known.parameters, content) | {"residual": _residual(found)}
+    if known.temperature_degc is not None:
+        row |= course_row(found, data, known.temperature_degc)
+    if known.lost is not None:
+        row |= capacity_row(found, declared, known.lost)
+    if known.spectra:
+        row |= witness_row(found, declared, known.spectra)
+    if case.fault and case.fault.kind == "wrong_soc0" and told is not None and case.soc0 is not None:
+        row |= initial_state_row(told, case.soc0, content)
+    return row
 
 
 def _read(take: Take) -> Measurement:
@@ -116,61 +152,12 @@ def _charge_ah(data: Measurement) -> float:
     return float(np.trapezoid(data.current_a, data.time_s)) / SECONDS_PER_HOUR
 
 
-def scored(
-    answers: tuple[str, ...], truth: Mapping[str, float], content: Mapping[str, Any]
-) -> dict[str, Any]:
-    """What the answer (as in discovery.json) is worth.
-
-    named : a right name is given, or is one of a group of two with one that is; with no right name, that none is
-    given.  size_* : of the parameter whose truth is known.
-    """
-    effects = list(content["effects"])
-    groups = {
-        name: {name}.union(*(g for g in content["indistinguishable"] if name in g and len(g) <= GROUP_OF))
-        for name in effects
-    }
-    hit = [name for name, group in groups.items() if group & set(answers)]
-    named = bool(hit) if answers else not effects
-    row: dict[str, Any] = {
-        key: content[key] for key in ("verdict", "effects", "indistinguishable", "confidence")
-    }
-    for state in ("before", "recalibrated", "after"):
-        row[f"{state}_test_mv"] = content[state]["test"].get("rmse_mv")
-    return row | {
-        "named": named,
-        "others": [name for name in effects if name not in hit],
-        **_size(truth, content),
-    }
-
-
-def _size(truth: Mapping[str, float], content: Mapping[str, Any]) -> dict[str, Any]:
-    for candidate in content["candidates"]:
-        if candidate["effect"] not in content["effects"]:
-            continue
-        for name, estimate in candidate["parameters"].items():
-            key = f"{candidate['effect']}.{name}"
-            if key not in truth or estimate["value"] is None:
-                continue
-            true, value = truth[key], float(estimate["value"])
-            neutral = CATALOGUE[candidate["effect"]].parameters[name].neutral or 0.0
-            known = estimate["low"] is not None and estimate["high"] is not None
-            return {
-                "parameter": key,
-                "size_true": true,
-                "size_found": value,
-                "size_error": abs(value - true) / abs(true - neutral),
-                "size_off": abs(value - true),
-                "size_covered": bool(estimate["low"] <= true <= estimate["high"]) if known else None,
-            }
-    return {}
-
-
 def _residual(found: Discovery) -> dict[str, list[float]]:
     """Time in s and residual in mV of each state over the record, thinned for drawing."""
     time_s = np.concatenate([f.time_s for f in found.files])
     kept = np.unique(np.linspace(0, len(time_s) - 1, DRAWN).astype(int))
     out = {"time_s": time_s[kept].round(1).tolist()}
     for state in ("before", "recalibrated", "after"):
-        residual = MV * np.concatenate([f.residual_v(state) for f in found.files])
+        residual = MV_PER_V * np.concatenate([f.residual_v(state) for f in found.files])
         out[f"{state}_mv"] = residual[kept].round(2).tolist()
     return out

@@ -1,4 +1,4 @@
-"""The cases on measured cells: withheld temperatures, faults put in, ageing, and controls."""
+"""The cases on measured cells: withheld temperatures, faults put in, ageing, witnesses, and controls."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from aesi.bench.real.faults import FaultKind
 HG2, PANASONIC, NMC, M50T = "lg_18650hg2", "panasonic_ncr18650pf", "about_energy_nmc", "lg_m50t_w8"
 CELLS = {
     HG2: "lg_18650hg2.bpx.json",
-    PANASONIC: "panasonic_ncr18650pf.bpx.json",
+    PANASONIC: "panasonic_ncr18650pf_25degc.bpx.json",
     NMC: f"{NMC}:cell.bpx.json",
     M50T: "lg_m50_chen2020.bpx.json",
 }
 """Files calibrated at 25 degC alone, or published."""
+FITTED = frozenset({(HG2, "25degC_mixed1"), (HG2, "25degC_cap_1c")})
+"""Records that a file was calibrated on: what is asked of them says nothing, so that they are no controls."""
 WINDOW_S = 3600.0
 """Of a drive: the first hour."""
 THERMOCOUPLE = "thermocouple on the case"
@@ -32,7 +34,7 @@ COLD_AND_HOT: dict[str, tuple[str, ...]] = {
     ),
 }
 WARMING: dict[str, tuple[str, ...]] = {
-    HG2: ("25degC_us06", "25degC_cap_1c"),
+    HG2: ("25degC_us06", "25degC_cap_1c_b"),
     PANASONIC: ("25degC_us06", "25degC_1c_start"),
 }
 SLOW_OR_PULSES = ("c20", "hppc")
@@ -47,14 +49,13 @@ CONTROLS: dict[str, tuple[str, ...]] = {
         "25degC_us06",
     ),
     NMC: ("drive_cycle", "C2", "1C"),
-    M50T: ("n0_udds", "n0_hppc"),
 }
 COLDER_CONTROLS: dict[str, tuple[str, ...]] = {
     HG2: ("10degC_us06", "0degC_mixed1", "40degC_la92"),
     PANASONIC: ("10degC_cycle_1", "0degC_cycle_1", "n10degC_cycle_1"),
 }
 """The thermocouple is given: what is left is what a file calibrated at 25 degC lacks there, and no temperature."""
-FAULTY = {HG2: "25degC_mixed1", PANASONIC: "25degC_cycle_1", NMC: "drive_cycle"}
+FAULTY = {HG2: "25degC_mixed2", PANASONIC: "25degC_cycle_1", NMC: "drive_cycle"}
 FAULTS: dict[FaultKind, tuple[tuple[float, ...], tuple[str, ...], str]] = {
     "current_offset": (
         (0.05, 0.1, 0.3),
@@ -73,9 +74,13 @@ MORE_IN_FILE = 0.05
 LOSSES = ("lithium_inventory_loss", "active_material_loss_negative", "active_material_loss_positive")
 
 
+SPECTRA = {"25degC": "25degC_eis", "10degC": "10degC_eis"}
+"""Of the Panasonic: start of a record's name -> the spectra of the same month."""
+
+
 def plan() -> tuple[RealCase, ...]:
     """All cases in a fixed order; every other one of a group is for development."""
-    cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing()]
+    cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing(), *_witnesses()]
     there = {case.name for case in cases}
     seen: dict[str, int] = {}
     out = []
@@ -83,7 +88,7 @@ def plan() -> tuple[RealCase, ...]:
         number = seen[case.group] = seen.get(case.group, -1) + 1
         matched = case.matched if case.matched in there else None
         out.append(replace(case, development=number % 2 == 0, matched=matched))
-    return tuple(out)
+    return tuple(c for c in out if c.group != "control" or (c.take.set, c.take.file) not in FITTED)
 
 
 def chosen(
@@ -110,6 +115,10 @@ def _soc0(cell: str, file: str) -> float | None:
     return 0.7816 if file == "n0_udds" else None
 
 
+def _spectra(cell: str, file: str) -> str | None:
+    return SPECTRA.get(file.partition("_")[0]) if cell == PANASONIC else None
+
+
 def _controls() -> Iterator[RealCase]:
     for given in (CONTROLS, COLDER_CONTROLS):
         for cell, files in given.items():
@@ -122,6 +131,7 @@ def _controls() -> Iterator[RealCase]:
                     soc0=_soc0(cell, file),
                     answers=(),
                     source="the same cell at the temperature given, nothing put in",
+                    spectra=_spectra(cell, file),
                 )
 
 
@@ -213,4 +223,30 @@ def _ageing() -> Iterator[RealCase]:
             source="charge of the 1C discharges of March and July 2017",
             measured="capacity" if answers else None,
             against=march if answers else None,
+        )
+    for file in ("n0_hppc", "n0_udds"):
+        yield RealCase(
+            name=f"fresh-{M50T}-{file}",
+            group="ageing",
+            cell=CELLS[M50T],
+            take=Take(M50T, file),
+            soc0=_soc0(M50T, file),
+            answers=(),
+            source="charge of the C/20 discharge of the fresh cell",
+            measured="declared capacity",
+            against=Take(M50T, "n0_c20_discharge"),
+        )
+
+
+def _witnesses() -> Iterator[RealCase]:
+    for month, spectra in SPECTRA.items():
+        yield RealCase(
+            name=f"witness-{month}_hppc",
+            group="witness",
+            cell=CELLS[PANASONIC],
+            take=Take(PANASONIC, f"{month}_hppc"),
+            soc0=1.0,
+            answers=(),
+            source=f"impedance at half charge, {spectra}",
+            spectra=spectra,
         )

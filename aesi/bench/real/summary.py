@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,12 @@ from aesi.bench import CaseRow
 from aesi.bench.scoring import rate
 
 NEAR_K = 2.0
+NEAR_PP = 2.0
+NEAR_SHARE = 0.15
+HALVED = 0.5
+WORSE = 1.05
+NO_ANSWER = ("error", "out of time")
+SOC0 = "wrong_soc0"
 
 
 def summary(rows: Sequence[CaseRow]) -> CaseRow:
@@ -30,43 +37,108 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
     def of(group: str) -> list[CaseRow]:
         return [r for r in rows if r["group"] == group]
 
-    withheld = [r for r in of("withheld") if "ambient_temperature" in r["answer"][:1]]
-    near = [{"near": r.get("size_off") is not None and r["size_off"] <= NEAR_K} for r in withheld]
-    halved = [
-        {"halved": _at_most(r, 0.5)} for r in withheld if r.get("after_test_mv") is not None and r["named"]
-    ]
     faults = [r for r in of("fault") if r["answer"]]
     sized = [r for r in [*faults, *of("physics")] if r.get("size_error") is not None]
     return {
         "ran": len(rows),
-        "no_answer": sum(r["verdict"] in ("error", "out of time") for r in rows),
-        **rate(withheld, "named").named("withheld_named"),
-        **rate(near, "near").named("withheld_within_2k"),
-        **rate(halved, "halved").named("withheld_error_halved"),
+        "no_answer": sum(r["verdict"] in NO_ANSWER for r in rows),
+        **_withheld([r for r in of("withheld") if "ambient_temperature" in r["answer"][:1]]),
+        **rate([r for r in of("withheld") if "self_heating" in r["answer"][:1]], "named").named(
+            "warming_named"
+        ),
         **rate(faults, "named").named("fault_named"),
+        "fault_named_by_kind": _by_kind(faults),
         **rate(of("physics"), "named").named("physics_named"),
-        "size_error_median": _median([r["size_error"] for r in sized]),
-        **rate([r for r in sized if r["size_covered"] is not None], "size_covered").named("size_covered"),
-        **rate(of("control"), "named").named("control_silent"),
+        "size_error_median": _median(sized, "size_error"),
+        **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named("size_covered"),
+        **_initial_state([r for r in of("fault") if r["put_in"].startswith(SOC0)]),
+        **_controls(of("control"), rows),
         **rate(of("ageing"), "named").named("ageing_named"),
-        **rate([{"worse": not _at_most(r, 1.05)} for r in rows if _errors(r)], "worse").named("after_worse"),
-        "processor_s_median": _median([r["processor_s"] for r in rows]),
+        **_near([r for r in of("ageing") if "lost_off_pp" in r], "lost_off_pp", NEAR_PP).named(
+            "ageing_within_2pp"
+        ),
+        **_witnesses([r for r in rows if "ohmic_off" in r]),
+        **rate([{"worse": not _at_most(r, WORSE)} for r in rows if _errors(r)], "worse").named("after_worse"),
+        "processor_s_median": _median(rows, "processor_s"),
+        "processor_s_total": float(sum(r["processor_s"] for r in rows)),
     }
 
 
+def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
+    """A mean counts where the temperature is named; the course is that of the written model, whatever is named."""
+    near = [
+        {"near": r["named"] and abs(r["mean_off_k"]) <= NEAR_K} if "mean_off_k" in r else {"near": False}
+        for r in rows
+    ]
+    halved = [{"halved": _at_most(r, HALVED)} for r in rows if r["named"] and _errors(r)]
+    return {
+        **rate(rows, "named").named("withheld_named"),
+        **rate(near, "near").named("withheld_within_2k"),
+        "withheld_course_rms_k_median": _median([r for r in rows if r["named"]], "course_rms_k"),
+        **rate(halved, "halved").named("withheld_error_halved"),
+    }
+
+
+def _initial_state(rows: Sequence[CaseRow]) -> CaseRow:
+    return {
+        **rate(rows, "named").named("wrong_soc0_silent"),
+        "wrong_soc0_error_median": _median(rows, "size_error"),
+    }
+
+
+def _controls(controls: Sequence[CaseRow], rows: Sequence[CaseRow]) -> CaseRow:
+    """Silence of the controls, and how often one shows a name that a case matched to it has as its answer."""
+    expected: dict[str, set[str]] = {}
+    for row in rows:
+        if row.get("matched"):
+            expected.setdefault(row["matched"], set()).update(row["answer"])
+    matched = [
+        {"false": bool(expected[r["case"]] & set(r["effects"]))} for r in controls if r["case"] in expected
+    ]
+    return {
+        **rate(controls, "named").named("control_silent"),
+        **rate(matched, "false").named("control_matched_false"),
+        "control_false_names": {r["case"]: r["effects"] for r in controls if r["effects"]},
+    }
+
+
+def _witnesses(rows: Sequence[CaseRow]) -> CaseRow:
+    """Of the found model's resistances at half charge, at the temperature of the spectra."""
+    both = [{"off": r[key]} for r in rows for key in ("ohmic_off", "transfer_off")]
+    return {
+        **_near(both, "off", NEAR_SHARE).named("witness_within_15pct"),
+        "witness_ohmic_off_median": _median(rows, "ohmic_off"),
+        "witness_transfer_off_median": _median(rows, "transfer_off"),
+    }
+
+
+def _near(rows: Sequence[CaseRow], key: str, limit: float) -> Any:
+    return rate([{"near": r[key] <= limit} for r in rows], "near")
+
+
+def _by_kind(rows: Sequence[CaseRow]) -> dict[str, str]:
+    """Kind of fault and its size as put in -> 'named of cases'."""
+    out: dict[str, list[bool]] = {}
+    for row in rows:
+        out.setdefault(row["put_in"], []).append(bool(row["named"]))
+    return {put_in: f"{sum(named)} of {len(named)}" for put_in, named in out.items()}
+
+
 def _errors(row: CaseRow) -> bool:
-    return row.get("after_test_mv") is not None and row.get("recalibrated_test_mv") is not None
+    return all(row.get(f"{state}_test_mv") is not None for state in ("before", "recalibrated", "after"))
 
 
 def _at_most(row: CaseRow, times: float) -> bool:
-    """Whether the error on unseen data is at most so many times the better of declared and recalibrated."""
-    better = min(row["before_test_mv"], row["recalibrated_test_mv"])
-    if times < 1:
-        better = row["before_test_mv"]
+    """Whether the error on unseen data is at most so many times that of the declared model, or, for a factor above one,
+    that of the better of declared and recalibrated."""
+    better = row["before_test_mv"]
+    if times > 1:
+        better = min(better, row["recalibrated_test_mv"])
     return bool(row["after_test_mv"] <= times * better)
 
 
-def _median(values: Sequence[float]) -> float | None:
+def _median(rows: Sequence[Mapping[str, Any]], key: str) -> float | None:
+    values = [row[key] for row in rows if row.get(key) is not None]
     return float(np.median(values)) if values else None
 
 

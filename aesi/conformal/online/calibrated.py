@@ -10,7 +10,7 @@ from aesi.conformal.bands.band import Band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.records import checked_current, checked_record
 from aesi.conformal.online.scale import Scale
-from aesi.conformal.online.tracker import move, replay, scaled
+from aesi.conformal.online.tracker import move, replay, scaled_band
 from aesi.errors import InputError
 from aesi.numerics.drive import N_RECENT
 from aesi.numerics.typing import Array, SavedState
@@ -169,7 +169,7 @@ class Stream:
         raw = calibrated.band.row(self._past.values, recent)
         if raw is None:
             return _Pending(current_a, *calibrated.marginal_v, group, warm=False)
-        low, high = scaled(raw[0], raw[1], self._log_ratio[group], calibrated.floor_v)
+        low, high = scaled_band(raw[0], raw[1], self._log_ratio[group], calibrated.floor_v)
         return _Pending(current_a, low, high, group, warm=True)
 
 

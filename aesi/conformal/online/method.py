@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,6 +22,7 @@ RELATIVE_FLOOR = 1e-3
 """No interval is narrower than this share of the marginal one: at rest the residual is constant to the sensor's
 quantisation, and a fitted width would shrink to zero."""
 MIN_WINDOW = 10
+"""The lags alone are ten residuals (`aesi.numerics.windows`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +77,6 @@ class Method(ABC):
     @abstractmethod
     def band(self, data: CalibrationData) -> tuple[Band, Scale]:
         """The raw band, and the factor on its half-width that calibrates it."""
-
-    def adaptive(self, rate: float) -> Method:
-        """The same method with another rate of the adaptive step."""
-        return replace(self, rate=rate)
 
 
 def marginal_interval(records: Sequence[Array], alpha: float) -> tuple[float, float]:

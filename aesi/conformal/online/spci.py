@@ -25,7 +25,9 @@ from aesi.errors import FitError
 from aesi.numerics.typing import Array, BoolArray
 
 N_BLOCKS = 25
+"""Contiguous runs that the rows are cut into: long against the correlation of neighbours, and enough of them."""
 N_FOLDS = 5
+"""Every fifth run is held out in turn, as is usual in cross-validation."""
 ENOUGH_ROWS = 20_000
 """Above it a fifth of the rows scales the band to within half a per cent of coverage."""
 

@@ -25,6 +25,8 @@ from aesi.numerics.typing import Array, BoolArray, IntArray
 SHARED = 0.4
 """Part of the rate with which a miss in one group moves all: a cell that drifts does so at every current."""
 AIM = 0.95
+"""Share of alpha that is aimed at. On 1,000 draws of 3,000 normal residuals an aim of alpha covers less than 1 -
+alpha on 42 %, one of 0.95 alpha on none (docs/theory/conformal.md)."""
 LOG_RATIO_LIMIT = 7.0
 """|log r| is held below this (a factor of 1,100): a sensor that is stuck for hours must not drive r to zero
 or infinity, from where it would take as long to come back."""
@@ -40,7 +42,7 @@ def move(log_ratio: Array, group: int, missed: bool, rate: float, alpha: float) 
 
 
 @njit(cache=True)
-def scaled(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float]:
+def scaled_band(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float]:
     """The raw band scaled by r about its middle, at least `floor` wide."""
     middle = 0.5 * (low + high)
     half = 0.5 * max(abs(high - low), floor) * np.exp(log_ratio)
@@ -68,7 +70,7 @@ def replay(
     for k in range(low.size):
         if not ready[k]:
             continue
-        low[k], high[k] = scaled(low[k], high[k], log_ratio[groups[k]], floor)
+        low[k], high[k] = scaled_band(low[k], high[k], log_ratio[groups[k]], floor)
         if rate > 0 and np.isfinite(residuals[k]):
             missed = residuals[k] < low[k] or residuals[k] > high[k]
             move(log_ratio, groups[k], missed, rate, alpha)

@@ -16,6 +16,7 @@ from aesi.numerics.trees.forest import Splits, flatten, forest_quantiles
 from aesi.numerics.typing import Array, SavedState
 
 GRID_POINTS = 512
+"""Levels of probability at which a forest's quantiles are kept; between them they are interpolated."""
 TAIL = 2e-4
 """The grid is even in probability between the tails and even in its logarithm within them."""
 

@@ -14,11 +14,17 @@ from aesi.numerics.typing import Array
 
 SCHEDULES = ("udds", "hwfet", "us06", "wltc_3b", "artemis_urban", "sc03", "nedc")
 FIRST_REST_S = 120.0
+"""Every test begins with it, so that a first voltage is one of rest."""
 SHORTEST_S = 1500.0
+"""Tests run from here to LONGEST_S: long enough for salt and heat to follow, short enough for a PyBaMM run of
+seconds."""
 LONGEST_S = 3600.0
 PULSE_C = 2.0
+"""Of a charge pulse."""
 SLOW_DT_S = 10.0
+"""Seconds a row of a slow discharge, as loggers write it."""
 SLOW_C = 0.2
+"""Rate of a slow discharge; it ends at LEAST_SOC."""
 LEAST_SOC = 0.1
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.data.blind.case import BlindCase, CaseSpec
 from aesi.data.blind.cells import CELLS
 from aesi.data.blind.duty import TESTS, Asked
@@ -16,7 +17,7 @@ from aesi.data.blind.recipes import RECIPES, Recipe, Written
 from aesi.data.blind.spread import parametrisation
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, run
+from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, simulate_truth
 from aesi.data.profiles.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
 from aesi.errors import DataError
@@ -27,10 +28,11 @@ COARSE_POINTS = 15
 """Radial points of the runs that find the size of an effect, always with the single particle: the error of mesh and
 model cancels in a difference to within what `CLOSE_ENOUGH` allows."""
 CLOSE_ENOUGH = 0.2
+"""An effect is scaled until it moves the voltage by the size asked for, to within this share of it, in MOST_TRIES at
+most."""
 MOST_TRIES = 4
 SHOWN = 0.6
 """Of the target, that an effect has to move the voltage by at least."""
-MILLIVOLTS = 1e3
 CHAMBER_K = 15.0
 """A chamber stands at most so far from the reference of the cell file, either way."""
 RISE_K, RISE_S = (2.0, 8.0), (300.0, 1500.0)
@@ -61,7 +63,7 @@ class _Bench:
     ) -> list[TrueRun]:
         """The cell with these changes under its tests."""
         setup = Setup(self.declared, model or self.spec.model, (*self.own, *applied), radial_points)
-        return [run(setup, profile) for profile in profiles or self.profiles]
+        return [simulate_truth(setup, profile) for profile in profiles or self.profiles]
 
     def unexplained(
         self,
@@ -97,7 +99,7 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     written = [Written(t.time_s, t.current_a, t.voltage_v) for t in traces]
     for name in known:
         written = [RECIPES[name].instrument(one, sizes[name]) for one in written]
-    truth["rms_mv"] = MILLIVOLTS * _rms(bench.unexplained(written))
+    truth["rms_mv"] = MV_PER_V * _rms(bench.unexplained(written))
     label, also = _label(known, strange)
     neutral = (REDUCTION,) if spec.model == "DFN" else ()
     measurements = tuple(_measured(spec, one, t, rng) for one, t in zip(written, traces, strict=True))
@@ -123,7 +125,7 @@ def _shown(
         bench = _prepare(there, cells, rng)
         sizes = {n: _scaled(RECIPES[n], bench) for n in there.recipes if n in RECIPES}
         tried.append((bench, {n: values for n, (values, _) in sizes.items()}, rng))
-        if all(moved >= SHOWN * spec.target_mv / MILLIVOLTS for _, moved in sizes.values()):
+        if all(moved >= SHOWN * spec.target_mv / MV_PER_V for _, moved in sizes.values()):
             return tried[-1]
     return tried[0]
 
@@ -170,7 +172,7 @@ def _warmth(spec: CaseSpec, rng: np.random.Generator) -> tuple[Applied, ...]:
 def _scaled(recipe: Recipe, bench: _Bench) -> tuple[dict[str, float], float]:
     """Values at which the recipe alone moves the voltage by about the target, or its least or most; and by how much
     it does, V RMS."""
-    target = bench.spec.target_mv / MILLIVOLTS
+    target = bench.spec.target_mv / MV_PER_V
 
     def values_at(magnitude: float) -> dict[str, float]:
         return recipe.values(magnitude, bench.capacity_ah, bench.spec.soc0)
@@ -231,7 +233,7 @@ def _with_stranger(
     shifts = [
         STRANGERS[name].shift(trace, bench.capacity_ah, np.random.default_rng(seed)) for trace in traces
     ]
-    magnitude = bench.spec.target_mv / MILLIVOLTS / _rms(np.concatenate(shifts))
+    magnitude = bench.spec.target_mv / MV_PER_V / _rms(np.concatenate(shifts))
     truth[f"{name}.magnitude"] = magnitude
     return [_shifted(trace, magnitude * shift) for trace, shift in zip(traces, shifts, strict=True)]
 

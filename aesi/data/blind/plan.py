@@ -38,6 +38,7 @@ RECORDS: tuple[tuple[RecordKind, ...], ...] = (
 )
 WARMTHS: tuple[Warmth, ...] = ("none", "ambient", "none", "course")
 ROWS_S = (1.0, 1.0, 0.1)
+"""Seconds a row, drawn in turn: two cases in three at 1 Hz, one at 10 Hz."""
 FAST_CHARGE_SOC0 = (0.65, 0.75)
 """Fast charges go on from there without leaving the window of voltage by more than pulses do."""
 PAIRS = (

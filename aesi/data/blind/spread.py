@@ -24,12 +24,14 @@ import numpy as np
 from aesi.data.laboratory.simulator import Applied
 
 DIFFERENCES = {"diffusivity": 0.61, "kinetics": 0.31, "electrolyte_diffusivity": 0.49, "conductivity": 0.038}
+"""Absolute natural logarithms of the ratios; `python -m aesi.data.blind.spread` prints them."""
 SPREADS = {name: value / math.sqrt(2) for name, value in DIFFERENCES.items()}
 """Standard deviation of the natural logarithm."""
 FURTHEST = 2.0
 """Standard deviations at which draws end. What is beyond 2.5 of them is a wrong parameter and not a spread."""
 BEYOND = 2.5
 REFERENCE_K = 298.15
+"""Temperature at which the two parametrisations are compared."""
 
 
 def parametrisation(rng: np.random.Generator) -> tuple[Applied, ...]:

@@ -17,20 +17,33 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 
 HIGHEST_VOLTAGE_V = 6.0
+"""No lithium cell reaches it, and two in series exceed it."""
 HIGHEST_PLAIN_VOLT = 1000.0
+"""A typical voltage above it is one in millivolts."""
 TEMPERATURE_RANGE_DEGC = (-60.0, 150.0)
+"""Colder than any cell is cycled, warmer than any survives; kelvins lie above."""
 HIGHEST_CURRENT_A = 20_000.0
+"""Above what any single cell takes; a smaller current in mA is told by `check_scale`."""
 GAP_FLOOR_S = 5.0
+"""A gap is an interval longer than this, and longer than GAP_RATIO times the longest of NEIGHBOURS intervals either
+side: loggers that write by change of voltage stay within that."""
 GAP_RATIO = 10.0
 NEIGHBOURS = 10
 REST_GAP_S = SECONDS_PER_HOUR
 REST_CURRENT_SHARE = 0.02
+"""A gap is a rest where the current beside it is below this share of the largest and the voltage moved by less than
+REST_VOLTAGE_V."""
 REST_VOLTAGE_V = 0.005
 STEP_SHARE = 0.05
+"""A step of the current counts where it is above this share of the largest step; ENOUGH_STEPS of them have to."""
 ENOUGH_STEPS = 5
 CLEAR_CORRELATION = 0.5
+"""Of current and voltage steps: beyond it they say which sign the current has. Voltage falls with the current, so
+that measured records lie near -1."""
 VOLTAGE_TREND_V = 0.05
+"""A voltage that moves by less than this along the test has no trend."""
 TREND_POINTS = 200
+"""Strides that a record is cut into, over which noise averages out."""
 
 
 @dataclass(frozen=True)

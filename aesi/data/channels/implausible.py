@@ -19,24 +19,31 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 HIGHEST_CHARGE_AH = 1_500.0
+"""The largest cells sold hold about 1,000 Ah: more that flows one way is a current in mA."""
 LOWEST_RESISTANCE_OHM = 30e-6
 """Cells of 1,000 Ah have some 150 microohm."""
 CLEAR_CORRELATION = 0.5
 HIGHEST_CHARGE_RESISTANCE_OHM_AH = 10.0
 """Capacity times resistance is 0.05 to 0.8 ohm Ah for those 46 records: a thousand times more is time in ms."""
 CONTRADICTING_SHARE = 0.04
+"""Between the 1.4 % and the 6 % above; fewer than CONTRADICTING_STEPS say nothing."""
 CONTRADICTING_STEPS = 5
 RISE_V = 0.5
+"""Between the 0.37 V and the 1.2 V above."""
 ENOUGH_ROWS = 10
+"""Of a stretch of one current, to tell a trend from noise."""
 SMALL_SHARE = 0.02
 """Of the largest current: below, the cell rests."""
 FASTEST_SLIDE_S = 30.0
+"""No cell slides by more than SLIDE_V faster than this under a held current: time is then in minutes or hours. Only
+records shorter than SHORT_RECORD_S are asked."""
 SLIDE_V = 0.5
 SHORT_RECORD_S = 200.0
 
 
 def check_scale(columns: Columns, context: Context) -> None:
-    """Current in mA, and time in ms, hours or minutes, betray themselves by charge, resistance and pace."""
+    """Refuse a current in mA and a time in ms, hours or minutes: the charge that would have moved, the resistance and
+    the rate of change of the voltage would be those of no cell."""
     time, current = columns["time_s"], columns["current_a"]
     charge = np.concatenate([[0.0], np.cumsum(current[1:] * np.diff(time))]) / SECONDS_PER_HOUR
     moved = float(np.ptp(charge))
@@ -68,7 +75,8 @@ def check_scale(columns: Columns, context: Context) -> None:
 
 
 def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> None:
-    """A current that never changes its sign belongs to a voltage that never answers as to the other one."""
+    """Refuse a current without its sign: one that only discharges (or charges), while the voltage also answers as to
+    the other direction."""
     current = columns["current_a"]
     largest = float(np.max(np.abs(current)))
     if largest == 0 or (np.min(current) < -SMALL_SHARE * largest and np.max(current) > SMALL_SHARE * largest):

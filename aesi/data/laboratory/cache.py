@@ -55,7 +55,7 @@ def key_of(parts: Mapping[str, Any]) -> str:
     return sha.hexdigest()[:24]
 
 
-def remember(kind: str, key: str, make: Callable[[], dict[str, Array]]) -> dict[str, Array]:
+def cached(kind: str, key: str, make: Callable[[], dict[str, Array]]) -> dict[str, Array]:
     """The arrays kept under kind and key, made and kept where they are not there yet.
 
     Those that come with the package (`SHIPPED`) are found first.

@@ -23,6 +23,7 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, SECONDS_PER_HOUR
 
 REFERENCE_K = 298.15
+"""The temperature of the published parameters."""
 CHARGE_AH_MOL = FARADAY_C_MOL / SECONDS_PER_HOUR
 COLDER_K, WARMER_K = 290.65, 305.65
 """7.5 K either side, over which an activation energy is taken."""

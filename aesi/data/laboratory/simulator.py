@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.laboratory.cache import key_of, remember
+from aesi.data.laboratory.cache import cached, key_of
 from aesi.data.laboratory.changes import CONTACT_RESISTANCE, Change, find_change
 from aesi.data.profiles.profile import Profile
 from aesi.errors import DataError, SimulationError
@@ -31,7 +31,9 @@ VERSION = 4
 EDGE_SHARE = 0.15
 """A change of the current between two rows by this share of its range is an edge."""
 MOST_EDGES = 400
+"""Of the current that the solver is told of, the largest: each costs a restart."""
 MOST_STEPS = 40_000
+"""Steps that the limit on the solver's step may ask for: longer records have a longer limit."""
 CHARGE_TOLERANCE = 6e-4
 """Of the nominal capacity. The solver's own error has been seen at 3.8e-4 over 8,820 s at 10 Hz; a pulse of 2 s at
 2C that is stepped over makes 1.1e-3."""
@@ -85,7 +87,7 @@ class Setup:
         return [(find_change(a.change), find_change(a.change).complete(a.values)) for a in self.applied]
 
 
-def run(setup: Setup, profile: Profile) -> TrueRun:
+def simulate_truth(setup: Setup, profile: Profile) -> TrueRun:
     """The trace of a set-up under a profile, from the cache where it is there.
 
     Raises SimulationError where the model stops early or loses charge; DataError for a cell file that cannot
@@ -112,7 +114,7 @@ def run(setup: Setup, profile: Profile) -> TrueRun:
             "soc0": profile.soc0,
         }
     )
-    kept = remember("laboratory", key, lambda: _simulate(setup, profile))
+    kept = cached("laboratory", key, lambda: _simulate(setup, profile))
     return TrueRun(
         profile.time_s, profile.current_a, kept["voltage_v"], kept["temperature_degc"], kept["soc"]
     )

@@ -69,6 +69,8 @@ class Bench:
 TRAIN = ("udds", "hwfet", "us06", "wltc_3b", "udds", "hwfet", "us06")
 VALID = ("artemis_urban",)
 LEAD_S = 12.0
+"""Rest at the start; BEFORE_PULSE_S, PULSE_S and AFTER_PULSE_S make the pulse after each drive, at PULSE_C, as in the
+paper's experiment."""
 BEFORE_PULSE_S = 60.0
 PULSE_S = 20.0
 AFTER_PULSE_S = 140.0

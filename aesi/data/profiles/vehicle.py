@@ -21,6 +21,7 @@ from aesi.numerics.typing import Array
 
 GRAVITY_M_S2 = 9.81
 AIR_DENSITY_KG_M3 = 1.2
+"""At 20 degC and sea level."""
 
 
 @dataclass(frozen=True)

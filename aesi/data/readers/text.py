@@ -27,7 +27,9 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 HEAD_BYTES = 1 << 18
+"""Read to find the header in: more than any maker's preamble."""
 BLOCK_BYTES = 1 << 22
+"""Of a file that is converted at a time; it bounds the memory beyond the numbers."""
 COMMENT = "#"
 MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None", "-nan", "-NaN")
 BYTE_ORDER_MARKS = (

@@ -18,6 +18,7 @@ from numba import njit
 from aesi.numerics.typing import Array, IntArray
 
 CORRELATION_LENGTHS_S = (2.0, 60.0, 1800.0)
+"""From just slower than a sample to the slowest that a drive of an hour shows; a convention."""
 
 
 @njit(cache=True, nogil=True)

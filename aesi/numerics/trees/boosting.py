@@ -20,6 +20,7 @@ from numba import njit
 from aesi.numerics.typing import AnyArray, Array, IntArray
 
 N_BINS = 64
+"""Ranges that a feature is cut into; their numbers fit into a byte. A convention of histogram boosting."""
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from aesi.physics.cell.parts import (
 from aesi.physics.cell.relations import Constant, Relation, relation
 
 DEFAULT_TEMPERATURE_K = 298.15
+"""Where a file names no reference temperature."""
 
 Fields = Mapping[str, Any]
 

@@ -40,7 +40,9 @@ class Cell(CellParameters):
 
 
 SOC_GRID = 4001
+"""Points at which a rest voltage is inverted: 2.6e-4 of the charge apart."""
 SOC_MARGIN = 0.02
+"""How far beyond full and empty it is inverted."""
 
 
 def initial_soc(cell: Cell, voltage_v: float) -> float:

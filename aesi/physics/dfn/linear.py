@@ -19,7 +19,7 @@ from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack
-from aesi.physics.espm.plain import arrhenius
+from aesi.physics.espm.plain import rate_factor
 from aesi.physics.espm.tables import electrolyte_diffusion, solid_diffusion
 from aesi.physics.model import EspmModel, activation_energies
 
@@ -39,7 +39,7 @@ def porous_impedance(
     particles, stack, electrodes = porous_arguments(model)
     rates = np.array(
         [
-            arrhenius(energy, kelvin, model.cell.reference_temperature_k)
+            rate_factor(energy, kelvin, model.cell.reference_temperature_k)
             for energy in activation_energies(model.cell)
         ]
     )

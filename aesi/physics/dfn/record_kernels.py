@@ -55,7 +55,7 @@ def run_porous(  # type: ignore[no-untyped-def]
     """
     half = s.at.shape[0] // 2
     total, before, change, faster = t.total, t.before, t.change, t.faster
-    start(p, s, state, t, half, theta0)
+    start_at_rest(p, s, state, t, half, theta0)
     t_k, t_weights, t_rates = temperature[0], -1.0, temperature[0]
     set_rates(e, t, t_k)
     watts, last_dt = 0.0, 0.0
@@ -173,7 +173,7 @@ def run_porous(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def start(p, s, state, t, half, theta0):  # type: ignore[no-untyped-def]
+def start_at_rest(p, s, state, t, half, theta0):  # type: ignore[no-untyped-def]
     """Rest: uniform particles, uniform salt, no reaction."""
     state.c.fill(s.c0)
     if s.strength > 0.0:

@@ -102,7 +102,7 @@ def advance(  # type: ignore[no-untyped-def]
     last_dt : of the step before, 0 after a jump.  last_try : take the step although it solves nothing.
     Returns as `solve_reaction`.
     """
-    predict(p, s, e, state, t, dt, last_dt, taken, change)
+    extrapolate(p, s, e, state, t, dt, last_dt, taken, change)
     varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
     if varies:
         calm_particles(p, state, t, faster, dt, w)
@@ -130,7 +130,7 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def predict(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-untyped-def]
+def extrapolate(p, s, e, state, t, dt, last_dt, taken, change):  # type: ignore[no-untyped-def]
     """Start values at the end of the step: each share of the current and its trend; salt and forcing as last moved."""
     half = s.at.shape[0] // 2
     ahead = dt / last_dt if dt < LARGEST_GROWTH * last_dt else 0.0

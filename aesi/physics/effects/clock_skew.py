@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.parameters import Parameter
+from aesi.parameters import Parameter, Spread
 from aesi.physics.effect import Effect, Record, Trace
 
 PARAMETERS = {
@@ -32,6 +32,7 @@ PARAMETERS = {
         bounds=(-10.0, 10.0),
         neutral=0.0,
         expected=2.0,
+        spread=Spread(None, 0.2, "channels of a cycler are read in turn; three measured cells, RMS"),
         source="filters and polling of loggers, up to 10 s",
         description="delay of the voltage channel behind the current channel",
     ),

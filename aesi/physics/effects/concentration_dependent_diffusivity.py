@@ -21,7 +21,9 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 POINTS = 129
+"""Of the table that the diffusivity becomes; between them it is linear."""
 BEYOND_LIMITS = 0.1
+"""Of the stoichiometry window: surfaces leave it under load."""
 RANGE = "measured curves span some two orders of magnitude; the slope may go to e**10, so that no steep one is cut off"
 SLOPE, CURVATURE = 10.0, 4.0
 

@@ -19,6 +19,7 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel, Plating
 
 TRANSFER_COEFFICIENT = 0.65
+"""Of plating; 1 less it of stripping. From the source."""
 PARAMETERS = {
     "rate_m_s": Parameter(
         1e-9,

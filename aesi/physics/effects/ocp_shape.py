@@ -26,12 +26,15 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 ORDER = 8
+"""Highest wave: LENGTH leaves the next ones nothing to add."""
 EXPECTED_V = 0.01
 """Root mean square of d over the range that is expected, V."""
 LENGTH = 0.12
 """Share of the range over which d changes; it sets how fast the expected size of a_k falls with k."""
 BOUND_V = 0.06
+"""Of each wave; six times what is expected of all."""
 POINTS = 129
+"""Of the table that the potential's correction becomes."""
 
 
 def _expected_v() -> Array:

@@ -19,6 +19,7 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 SIZES = 5
+"""Particles that stand for the distribution, of equal parts of it."""
 RANGE = "laser diffraction of battery powders gives none to 60 %; the rest, to 80 %, is room for a fit"
 PARAMETERS = {
     f"{side}_sd": Parameter(

@@ -19,6 +19,7 @@ from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 REGIONS = 4
+"""Layers across an electrode."""
 PARAMETERS = {
     "strength": Parameter(
         1.0,

@@ -193,7 +193,7 @@ def local_conductivity(table, salt, first, unit):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
-def drops(solid, salt, kappa, first, contrast, ohm):  # type: ignore[no-untyped-def]
+def region_drops(solid, salt, kappa, first, contrast, ohm):  # type: ignore[no-untyped-def]
     """ohm[r, v] : drop of region r per current of region v, differences between regions times `contrast`."""
     regions = ohm.shape[0]
     for v in range(regions):

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.electrode_kernels import drops, local_conductivity, solve_electrode
+from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops, solve_electrode
 from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
 from aesi.physics.espm.layout import Memory, SaltMemory
 from aesi.physics.espm.transport_kernels import (
@@ -153,7 +153,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 for u in range(lo, hi):  # start from the last deviations
                     held = y[u] - share[u] * (last_j if side == 0 else -last_j)
                     y[u] = share[u] * total + held
-                drops(surfaces.solid[side], surfaces.salt[side], kappa, side * regions, contrast, ohm)
+                region_drops(surfaces.solid[side], surfaces.salt[side], kappa, side * regions, contrast, ohm)
                 quicker = arrhenius(energies[2 + side], t_k, reference_k)
                 phi = solve_electrode(
                     lo, hi, side, total, dt, thermal, rise, chi, quicker, particles, surfaces, memory

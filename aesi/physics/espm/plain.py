@@ -33,7 +33,7 @@ def run_plain(
     return out, fault_at, fault
 
 
-def arrhenius(energy_j_mol: float, temperature_k: float, reference_k: float) -> float:
+def rate_factor(energy_j_mol: float, temperature_k: float, reference_k: float) -> float:
     """Factor of a rate at `temperature_k` over that at `reference_k`."""
     return float(np.exp(energy_j_mol / GAS_CONSTANT_J_MOL_K * (1.0 / reference_k - 1.0 / temperature_k)))
 
@@ -80,7 +80,7 @@ def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]
     rates = np.array([sphere.lam[1:] * _solid_rate(x, temperature, reference) for x in (n, p)])
     scale = np.array([stoichiometry_per_coulomb(cell, x) for x in (n, p)])
     diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)
-    faster = arrhenius(e.diffusivity_ea_j_mol, temperature, reference)
+    faster = rate_factor(e.diffusivity_ea_j_mol, temperature, reference)
     salt_gain = _salt_gain(stack) * (1.0 - e.transference) / (FARADAY_C_MOL * cell.total_area_m2)
     return (
         PlainSolid(rates, scale[:, None] * sphere.gain[None, 1:], 3.0 * scale),
@@ -103,7 +103,7 @@ def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]
 
 def _solid_rate(electrode: Electrode, temperature: float, reference: float) -> float:
     d = float(electrode.diffusivity(np.array([0.5]))[0])
-    faster = arrhenius(electrode.diffusivity_ea_j_mol, temperature, reference)
+    faster = rate_factor(electrode.diffusivity_ea_j_mol, temperature, reference)
     return d * faster / electrode.particle_radius_m**2
 
 
@@ -118,18 +118,18 @@ def _cell(model: EspmModel, temperature: float, top: float) -> PlainCell:
     return PlainCell(
         ocp_n=ocp_table(shifted_ocp(n, rise), "negative"),
         ocp_p=ocp_table(shifted_ocp(p, rise), "positive"),
-        kappa=conductivity * arrhenius(e.conductivity_ea_j_mol, temperature, reference),
+        kappa=conductivity * rate_factor(e.conductivity_ea_j_mol, temperature, reference),
         area=cell.total_area_m2,
         c0=e.c0_mol_m3,
         top=top,
         reactive_n=n.area_per_volume_1_m * n.thickness_m,
         reactive_p=p.area_per_volume_1_m * p.thickness_m,
-        exchange_n=FARADAY_C_MOL * n.rate_constant * arrhenius(n.rate_ea_j_mol, temperature, reference),
-        exchange_p=FARADAY_C_MOL * p.rate_constant * arrhenius(p.rate_ea_j_mol, temperature, reference),
+        exchange_n=FARADAY_C_MOL * n.rate_constant * rate_factor(n.rate_ea_j_mol, temperature, reference),
+        exchange_p=FARADAY_C_MOL * p.rate_constant * rate_factor(p.rate_ea_j_mol, temperature, reference),
         thermal_v=thermal_v,
         salt_v=2.0 * (1.0 - e.transference) * thermal_v,
         path=through_layers + p.thickness_m / (3.0 * p.transport_efficiency),
         solid=(n.thickness_m / n.conductivity_s_m + p.thickness_m / p.conductivity_s_m) / 3.0,
         contact=cell.contact_resistance_ohm
-        + cell.film_resistance_ohm / arrhenius(cell.film_ea_j_mol, temperature, reference),
+        + cell.film_resistance_ohm / rate_factor(cell.film_ea_j_mol, temperature, reference),
     )

@@ -13,7 +13,10 @@ from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Constant, Relation, tabulated
 
 OCP_POINTS = 8193
+"""Four times as many points move the voltage by less than 1e-4 mV RMS under the load of `aesi bench espm`, and so for
+the electrolyte's."""
 RATE_POINTS = 513
+"""Courses of rates are smooth in their logarithm; a point every 0.2 % of stoichiometry follows them."""
 ELECTROLYTE_POINTS = 2049
 ELECTROLYTE_SPAN = 4.0
 """Tables of electrolyte properties run from zero to this many times the rest concentration."""
@@ -25,6 +28,7 @@ from two steps, so that it cannot grow, however long the step."""
 CORRECTED_MARGIN = 0.55
 """Half of it is enough where the rest is predicted and corrected within the step."""
 SMALLEST_DIFFUSIVITY_RATIO = 1e-3
+"""Of the value at rest: a polynomial outside the range of its fit may turn negative."""
 
 
 def ocp_table(ocp: Relation, what: str) -> Array:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
@@ -28,7 +29,6 @@ from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
 ARCHIVE = "hypotheses.jsonl"
-MV = 1e3
 ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
 """Words of effect ids that a title writes in another way."""
 
@@ -84,7 +84,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
     from aesi.pipeline.report import write_discovery_report
 
-    content = to_json(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
+    content = discovery_content(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content, indent=1, allow_nan=False)
     (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
@@ -106,7 +106,7 @@ def found_model(found: Discovery) -> HybridModel:
     return HybridModel(inside.cell, left, soc0=found.soc0, hold=found.hold, model=found.choice.model)
 
 
-def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
+def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
     """The content of discovery.json.  read : what a reader dropped, mapped or averaged in the files."""
     verdict = found.verdict
     return {
@@ -118,17 +118,17 @@ def to_json(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
         "reason": verdict.reason,
         "model": _model(found),
         **{state: {part: _errors(found, state, part) for part in ("fit", "test")} for state in STATES},
-        "noise_floor_mv": MV * found.noise_floor_v,
-        "explainable_mv": MV * found.after.yardstick.explained_v,
-        "structured_mv": MV * verdict.structured_v,
-        "tolerance_mv": MV * verdict.tolerance_v,
+        "noise_floor_mv": MV_PER_V * found.noise_floor_v,
+        "explainable_mv": MV_PER_V * found.after.yardstick.explained_v,
+        "structured_mv": MV_PER_V * verdict.structured_v,
+        "tolerance_mv": MV_PER_V * verdict.tolerance_v,
         "margin": verdict.margin,
         "candidates": [
             {
                 "effect": c.effect,
                 "kind": c.kind,
                 "score": c.score,
-                "test_rmse_mv": MV * c.test_rmse_v,
+                "test_rmse_mv": MV_PER_V * c.test_rmse_v,
                 "parameters": {
                     name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
                     for name, p in c.parameters.items()
@@ -155,7 +155,7 @@ def _model(found: Discovery) -> dict[str, Any]:
     choice, told = found.choice, found.choice.reduction
     out: dict[str, Any] = {"name": choice.model, "sentence": choice.sentence}
     if told is not None:
-        out |= {"differ_rms_mv": MV * told.shift_v, "of_noise": told.shift_v / told.noise_v}
+        out |= {"differ_rms_mv": MV_PER_V * told.shift_v, "of_noise": told.shift_v / told.noise_v}
     return out
 
 
@@ -164,7 +164,11 @@ def _errors(found: Discovery, state: State, part: Part) -> dict[str, float]:
     if not residuals:
         return {}
     errors = Errors.of(np.concatenate(residuals))
-    return {"rmse_mv": MV * errors.rmse_v, "mae_mv": MV * errors.mae_v, "max_mv": MV * errors.max_v}
+    return {
+        "rmse_mv": MV_PER_V * errors.rmse_v,
+        "mae_mv": MV_PER_V * errors.mae_v,
+        "max_mv": MV_PER_V * errors.max_v,
+    }
 
 
 def _own_row(one: OwnParameter) -> dict[str, Any]:
@@ -182,8 +186,8 @@ def _own_row(one: OwnParameter) -> dict[str, Any]:
 def _file_rows(found: Discovery) -> list[dict[str, Any]]:
     rows = []
     for f in found.files:
-        gain, low, high = (MV * v for v in f.gain_v)
-        rmse = {f"{s}_mv": MV * f.errors(s).rmse_v for s in STATES}
+        gain, low, high = (MV_PER_V * v for v in f.gain_v)
+        rmse = {f"{s}_mv": MV_PER_V * f.errors(s).rmse_v for s in STATES}
         gains = {"gain_mv": gain, "gain_low_mv": low, "gain_high_mv": high}
         rows.append({"name": f.name, "part": f.part, **rmse, **gains})
     return rows

@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from aesi.pipeline.discovery.discover import Case, found_model, to_json, view, write_discovery
+from aesi.pipeline.discovery.discover import Case, discovery_content, found_model, view, write_discovery
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.tracer import Discovery
 
@@ -71,7 +71,7 @@ class Finding:
     def content(self) -> dict[str, Any]:
         """What discovery.json holds."""
         records = (*self.case.measurements, *self.case.tests)
-        return to_json(self.found, [note for m in records for note in m.notes])
+        return discovery_content(self.found, [note for m in records for note in m.notes])
 
     @cached_property
     def model(self) -> HybridModel:

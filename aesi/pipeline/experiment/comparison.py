@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.outputs import Result, published_by
 from aesi.pipeline.experiment.physics_models import DECLARED
@@ -16,9 +17,10 @@ SCHEMA = "aesi.comparison/1"
 BLOCK_S = 60.0
 """Errors forget each other within about this time; whole blocks of it are drawn again."""
 DRAWS = 1000
+"""Block-bootstrap resamples: the ends of a 90 % interval are then known to about a percentile."""
 LEVEL_PCT = 90.0
 BINS = 16
-MILLIVOLT_PER_VOLT = 1e3
+"""Of current and of state of charge."""
 
 
 def comparison(result: Result) -> dict[str, Any]:
@@ -51,7 +53,7 @@ def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list
     rows = np.concatenate([_block_sums(trace, np.ones(len(trace.time_s))) for trace in tests])
     drawn = np.random.default_rng([seed, 7]).integers(len(rows), size=(DRAWS, len(rows)))
     total = squares[drawn].sum(axis=1)
-    rmse = MILLIVOLT_PER_VOLT * np.sqrt(total / rows[drawn].sum(axis=1))
+    rmse = MV_PER_V * np.sqrt(total / rows[drawn].sum(axis=1))
     reduction = 100.0 * (1.0 - total / bare[drawn].sum(axis=1))
     ends = (50 - LEVEL_PCT / 2, 50 + LEVEL_PCT / 2)
     return {
@@ -71,7 +73,7 @@ def _map(tests: list[RecordTrace], name: str) -> dict[str, Any]:
     """Mean error in bins over current and state of charge, mV; None where a bin has too few samples."""
     current = np.concatenate([trace.current_a for trace in tests])
     soc = np.concatenate([trace.soc for trace in tests])
-    error = MILLIVOLT_PER_VOLT * np.concatenate([_left(trace, name) for trace in tests])
+    error = MV_PER_V * np.concatenate([_left(trace, name) for trace in tests])
     binned = error_map(current, soc, error, BINS)
     return {
         "current_a": [round(float(v), 3) for v in binned.current_a],

@@ -15,7 +15,8 @@ import numpy as np
 
 from aesi.conformal import FreeRunBands, Intervals
 from aesi.conformal.free_run import HorizonBand
-from aesi.conformal.scores import score
+from aesi.conformal.scores import scores_of
+from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rmse
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.fit import Fitted
@@ -24,8 +25,8 @@ from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
 
-MILLIVOLT_PER_VOLT = 1e3
 HORIZONS_S = (1.0, 10.0, 60.0)
+"""A sample, a manoeuvre, a minute: those of the tables."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ class _Judged:
     compared: dict[str, Intervals]
 
 
-def evaluate(
+def evaluate_models(
     fitted: Sequence[Fitted], split: Split, validation: Mapping[str, float] | None = None
 ) -> EvaluatedModels:
     """Figures of every model on train, validation and test records, and the traces that the report draws.
@@ -110,9 +111,9 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
         for key, against in (("mser_pct", DECLARED), ("mser_recalibrated_pct", RECALIBRATED)):
             physics = _joined(r.series.left_by(against) for r in records)
             free[f"{role}_{key}"] = 100.0 * (1.0 - float(np.mean(left**2) / np.mean(physics**2)))
-        free[f"{role}_rmse_mv"] = MILLIVOLT_PER_VOLT * rmse(error, _joined(r.free.error_v for r in records))
+        free[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, _joined(r.free.error_v for r in records))
         after = _joined(r.series.error_v[1:] for r in records)
-        step[f"{role}_rmse_mv"] = MILLIVOLT_PER_VOLT * rmse(after, _joined(r.one_step[1:] for r in records))
+        step[f"{role}_rmse_mv"] = MV_PER_V * rmse(after, _joined(r.one_step[1:] for r in records))
     test = judged["test"]
     free["diverged"] = sum(r.free.diverged_at is not None for r in test)
     free["outside_pct"] = 100.0 * float(np.mean(_joined(r.free.outside for r in test)))
@@ -155,7 +156,7 @@ def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> 
     figures = {}
     for horizon in HORIZONS_S:
         left = _joined(each[_steps(test, horizon) :] for each in ahead[horizon])
-        figures[_seconds(horizon)] = MILLIVOLT_PER_VOLT * rmse(left, np.zeros(len(left)))
+        figures[_seconds(horizon)] = MV_PER_V * rmse(left, np.zeros(len(left)))
     return figures
 
 
@@ -193,7 +194,7 @@ def _persistence_mv(test: Sequence[_Judged], steps: int) -> float:
     """RMSE of holding the last measured error for `steps` steps."""
     truth = _joined(r.series.error_v[steps:] for r in test)
     held = _joined(r.series.error_v[:-steps] for r in test)
-    return MILLIVOLT_PER_VOLT * rmse(truth, held)
+    return MV_PER_V * rmse(truth, held)
 
 
 def _interval_figures(
@@ -206,7 +207,7 @@ def _interval_figures(
         upper_v=_joined(each.upper_v for each in known),
         warm=_joined(each.warm for each in known),
     )
-    scores = score(
+    scores = scores_of(
         together,
         _joined(residuals),
         alpha,

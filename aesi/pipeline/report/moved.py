@@ -11,6 +11,7 @@ from aesi.pipeline.report.views import Row
 TELLING = 1.0
 """Standard deviations of its tolerance: what moved less is as it was declared, for all that these data say."""
 MOST_NAMED = 3
+"""Parameters that one sentence names."""
 INITIAL_STATE = "soc0"
 """Stands for the effect of a row where a record's initial state of charge moved."""
 STATES = {"recalibrated": "Recalibrating", "after": "Beside the finding the fit"}

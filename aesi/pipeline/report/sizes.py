@@ -12,14 +12,16 @@ from aesi.physics.effects import CATALOGUE
 SAME_SHARE = 0.98
 """An error after that is not below this share of the recalibrated one is no better than a refit."""
 MOST_PARAMETERS = 3
+"""Of an effect, in one sentence."""
 ADDED = "added to what"
 """How a parameter's description says that it comes on top of the declared value."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
+"""Unit -> that of its thousandths or millionths, and how many make one."""
 SMALL = 0.5
 """In its own unit; what is less is written in thousandths."""
 
 
-def sized(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
+def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
     """The effect's name with its fitted parameters and their 90 % intervals; the name alone where there are none."""
     name = title or effect.replace("_", " ")
     row = next((c for c in discovery["candidates"] if c["effect"] == effect), None)
@@ -62,7 +64,7 @@ def rounded(value: float, unit: str) -> str:
 
 def finding_line(discovery: Mapping[str, Any]) -> str:
     """The verdict in one line, with what was found and how much of it; a confidence where it belongs to a name."""
-    effects = [sized(effect, discovery) for effect in discovery["effects"]]
+    effects = [with_size(effect, discovery) for effect in discovery["effects"]]
     verdict = discovery["verdict"]
     if verdict == "none":
         return "none: nothing is missing that these data could show"

@@ -29,8 +29,6 @@ KIND_PATTERNS = {
 DIVERGING = "PuOr_r"
 SEQUENTIAL = "Cividis"
 
-MILLIVOLT = 1e3
-
 
 def figure(title: str, caption: str, height: int = 380, **layout: Any) -> Figure:
     """An empty figure; title and caption travel in its `meta` for the page to set."""

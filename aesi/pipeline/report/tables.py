@@ -23,12 +23,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
+from aesi.constants import MV_PER_V
 from aesi.pipeline.report.table_formats import ABSENT, Table, to_csv, to_latex, to_markdown
 from aesi.pipeline.report.views import Row
 
 TableFormat = Literal["md", "tex", "csv"]
-
-MILLIVOLT_PER_VOLT = 1e3
 
 
 def free_run_table(models: Sequence[Row]) -> Table:
@@ -176,8 +175,8 @@ def _interval_columns(group: str) -> list[Column]:
         ("coverage, %", lambda row: _number(row, f"{group}.coverage_pct", 2)),
         ("worst bin, %", lambda row: _number(row, f"{group}.worst_bin_coverage_pct", 2)),
         ("low minutes, %", lambda row: _number(row, f"{group}.low_minutes_pct", 2)),
-        ("average width, mV", lambda row: _number(row, f"{group}.average_width_v", 3, MILLIVOLT_PER_VOLT)),
-        ("Winkler, mV", lambda row: _number(row, f"{group}.winkler_v", 3, MILLIVOLT_PER_VOLT)),
+        ("average width, mV", lambda row: _number(row, f"{group}.average_width_v", 3, MV_PER_V)),
+        ("Winkler, mV", lambda row: _number(row, f"{group}.winkler_v", 3, MV_PER_V)),
     ]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
-from aesi.pipeline.report.sizes import SAME_SHARE, sized
+from aesi.pipeline.report.sizes import SAME_SHARE, with_size
 from aesi.pipeline.report.views import DiscoveryView, Row, RunView
 
 LARGE_SHARE = 0.5
@@ -175,7 +175,7 @@ def _named(view: DiscoveryView, effects: Sequence[str]) -> str:
     kinds = {row["effect"]: row["kind"] for row in view.discovery["candidates"]}
     groups: dict[str, list[str]] = {}
     for effect in effects:
-        name = sized(effect, view.discovery, _title(view.titles, effect))
+        name = with_size(effect, view.discovery, _title(view.titles, effect))
         groups.setdefault(kinds.get(effect, "physics"), []).append(name)
     parts = []
     if "physics" in groups:

@@ -23,6 +23,7 @@ from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.scaling import Scaling
 
 _ITERATIONS = 200
+"""Boosting rounds at most; early stopping ends them before."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,10 @@ from aesi.sparse.stridge import STRidge
 
 NAME = "PySINDy ensemble"
 MEMBERS = 20
+"""Models of the ensemble: the default of PySINDy."""
 MOST_ROWS = 20_000
 THRESHOLD = 1e-3
+"""Coefficients below are dropped."""
 _RIDGES = (1.0, 10.0, 100.0, 1000.0)
 
 

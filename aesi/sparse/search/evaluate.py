@@ -76,7 +76,6 @@ class Candidate:
     stability: SparseModel
     residuals: tuple[HonestResiduals, ...]
     fold_sums: Array
-    oob_by_resample: Array
     valid_losses: tuple[float, float]
 
     @property
@@ -154,7 +153,6 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         stability=stability,
         residuals=_honest(problem, runs),
         fold_sums=runs.sums[:2],
-        oob_by_resample=losses,
         valid_losses=valid_losses,
     )
 

@@ -16,6 +16,7 @@ from aesi.sparse.model import SparseModel
 from aesi.sparse.search.problem import Problem, balanced_weights, spans_of
 
 _MOST_MEMORY = 0.9999
+"""Of what is left of an error after a step; at 1 the first error would never be forgotten."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from aesi.sparse.search.judge import drive_of, free_predictions, one_step_predic
 from aesi.sparse.search.problem import Problem
 
 _ROWS_AT_ONCE = 1024
+"""They bound the memory; nothing else depends on them."""
 
 
 def out_of_bag(problem: Problem, active: IntArray, fits: Array, resamples: IntArray) -> Array:

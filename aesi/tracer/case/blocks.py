@@ -12,10 +12,14 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.problem import InverseProblem
 
 BLOCKS = 24
+"""Pieces that are left out in turn, all records together: enough to tell, and each long against the correlation of a
+model error. A convention."""
 FEWEST = 4
 """Blocks of all records together, and the fewest of one."""
 SEEN_SHARE = 2.0 / 3.0
 """Of a single record: what is fitted where its end is left out."""
+FEWEST_MEASURED = 6
+"""Of one record of a measured cell, whose model error lasts longer."""
 RANGES = 3
 """Ranges of rate, and of charge."""
 
@@ -48,6 +52,8 @@ def blocks_of(problem: InverseProblem) -> Blocks:
     for i, rows in enumerate(problem.slices):
         length = rows.stop - rows.start
         pieces = max(FEWEST, round(BLOCKS * length / total))
+        if problem.trust == "measured":
+            pieces = min(pieces, max(FEWEST_MEASURED, int(problem.independent[rows].sum())))
         edges = np.linspace(rows.start, rows.stop, pieces + 1).astype(int)[:-1]
         starts += edges.tolist()
         record += [i] * pieces

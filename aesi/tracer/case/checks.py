@@ -12,10 +12,15 @@ from aesi.records import Measurement
 from aesi.tracer.case.records import PreparedRecord
 
 VOLTAGE_MARGIN_V = 0.3
+"""Beyond the voltage limits of the file that a record may go: fast pulses and old cells do."""
 SOC_MARGIN = 0.12
+"""Beyond full and empty, by the declared capacity: new cells hold more than they are sold for."""
 FEWEST_SAMPLES = 200
+"""For a record of less than ten times SHORTEST_S."""
 SHORTEST_S = 300.0
+"""Less shows neither diffusion nor a slope of the open-circuit voltage."""
 LEAST_C_RATE = 0.02
+"""A current that stays below moves the voltage by no more than the open-circuit potentials are off."""
 FOREIGN_CELL_V = 0.25
 """A model of the right chemistry, however badly parametrised, is closer than this to the voltage in the
 median."""
@@ -29,10 +34,8 @@ def check_measurement(cell: Cell, data: Measurement) -> None:
         row = int(outside[0])
         raise DataError(
             f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s (row {row}) is outside "
-            "the range of "
-            f"{cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to "
-            "another cell, or "
-            "the voltage is not in volts."
+            f"the range of {cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to "
+            "another cell, or the voltage is not in volts."
         )
 
 
@@ -44,8 +47,7 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
     if (record.n_fit < FEWEST_SAMPLES and duration < 10 * SHORTEST_S) or duration < SHORTEST_S:
         raise DataError(
             f"{record.name}: {record.n_fit} samples over {duration:.0f} s are too little to decide "
-            "anything; give at "
-            f"least {FEWEST_SAMPLES} samples over {SHORTEST_S:.0f} s for the fit."
+            f"anything; give at least {FEWEST_SAMPLES} samples over {SHORTEST_S:.0f} s for the fit."
         )
     rate = float(np.max(np.abs(thin.current_a[: record.n_fit]))) / cell.nominal_capacity_ah
     if rate < LEAST_C_RATE:

@@ -19,20 +19,26 @@ from aesi.physics.initial_state import Basis, initial_state
 from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
 
 THIN_STEP_S = 1.0
-"""Fits see at most one sample a second: nothing in the catalogue is faster than a sample and slower than
-noise."""
+"""Fits see at most one sample a second: nothing in the catalogue is faster than that and yet
+above the noise."""
 FIT_SAMPLES = 12_000
+"""Of all records together: above it windows are doubled, since the time of a fit grows with its rows."""
 STEADY_SAMPLES = 600
+"""Rows that a record of steady currents is spread over."""
 STEADY_C_RATE = 0.01
+"""A change of the current by more than this is a step; a record with fewer steps than STEADY_SHARE of its rows is one
+of steady currents."""
 STEADY_SHARE = 0.01
 UNEVEN_SHARE = 0.01
 """Of the samples: averages over equal numbers of rows need equal times between them."""
 FIRST_STEP_S = 0.5
+"""Distance of the first rows after a step."""
 STEP_GROWTH = 0.25
 """Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 SMALLEST_NOISE_V = 5e-5
+"""No cycler writes less: a virtual record without noise would count each microvolt."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +48,7 @@ class PreparedRecord:
     data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
     fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of charge
     and what it is uncertain by.  seen_rows : rows at the start that only lead to what is judged.
+    soc0_doubt : how far the voltage's own reading is from a state of charge that was given.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
     the white noise in each row of `thin`.  noise_full_v : of that in `data`.
     """
@@ -58,6 +65,7 @@ class PreparedRecord:
     noise_full_v: float
     rest_voltage_v: float | None = None
     basis: Basis = "rest"
+    soc0_doubt: float = 0.0
     seen_rows: int = 0
     notes: tuple[str, ...] = ()
 
@@ -92,9 +100,8 @@ class PreparedRecord:
 def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
     """Deviation of the white noise, from second differences where the current is steady.
 
-    voltage_v, current_a : (n,).  The scale is robust to the steps that remain; half the smallest voltage
-    step is
-    the least it can be.
+    voltage_v, current_a : (n,).  The scale is robust to the steps that remain; the smallest
+    voltage step over the root of twelve is the least it can be.
     """
     if len(voltage_v) < 8:
         return SMALLEST_NOISE_V
@@ -135,7 +142,7 @@ def prepare(
     if uneven or float(np.mean(steps)) < STEADY_SHARE:
         thin, rows = condensed(data, steps, duration / STEADY_SAMPLES)
     else:
-        thin, rows = thinned(data, step_s), None
+        thin, rows = averaged_over(data, step_s), None
     thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
@@ -161,6 +168,7 @@ def prepare(
         noise_full,
         start.rest_voltage_v,
         start.basis,
+        start.doubt,
         notes=notes,
     )
 
@@ -236,7 +244,7 @@ def prepare_all(
         step *= 2.0
 
 
-def thinned(data: Measurement, step_s: float) -> Measurement:
+def averaged_over(data: Measurement, step_s: float) -> Measurement:
     """At most one sample in `step_s`: centred averages of current, voltage and temperature.
 
     Records sampled more slowly than 0.75 of `step_s` on average are returned as they are.

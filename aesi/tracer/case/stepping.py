@@ -13,7 +13,9 @@ from aesi.physics.model import DEFAULT_SUBSTEP_S, EspmModel
 from aesi.records import Measurement
 
 LONGEST_STEP_S = 60.0
+"""A minute is short beside diffusion at C/20."""
 STEPS_A_SAMPLE = 4
+"""Steps of the model between two rows."""
 
 PARAMETERS = {
     "substep_s": Parameter(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from aesi.tracer.decide.verdict import (
     beyond,
     judged,
     noise_v,
+    partly,
     structured_v,
     tolerance_v,
 )
@@ -95,12 +96,15 @@ def gathered(
     elif verdict.word == "none" and not _as_declared(replace(problem, trust="exact"), path, archive):
         exact = path_of("exact")
         path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
-    verdict = _with_confidence(verdict)
     recalibrated = _recalibrated(problem, paths["tight"], archive)
     if verdict.word != "unknown":
-        return _adopted(path, paths, verdict, recalibrated)
-    loose = path_of("loose") if len(problem.records) > 1 else None
-    return _best_carried(path, loose, paths, verdict, recalibrated)
+        return _adopted(path, paths, _with_confidence(verdict), recalibrated)
+    others = [path, path_of("measured")]
+    if len(problem.records) > 1:
+        others.append(path_of("loose"))
+    if paths["measured"].chosen.hypothesis:
+        path, verdict = paths["measured"], partly(paths["measured"], verdict, thresholds)
+    return _best_carried(path, others, paths, _with_confidence(verdict), recalibrated)
 
 
 def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
@@ -181,7 +185,7 @@ def _adopted(
 
 def _best_carried(
     path: Path,
-    loose: Path | None,
+    others: Sequence[Path],
     paths: dict[Trust, Path],
     verdict: Verdict,
     recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
@@ -196,12 +200,7 @@ def _best_carried(
         other = ModelState.of(problem, fit)
         if range_fault(other) is None:  # what cannot be adopted itself is no yardstick for what can
             basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
-    tried: list[tuple[InverseProblem, FittedHypothesis]] = [
-        (path.problem, path.base),
-        (path.problem, path.chosen),
-    ]
-    if loose is not None:
-        tried.append((loose.problem, loose.chosen))
+    tried = [(other.problem, fit) for other in others for fit in (other.base, other.chosen)]
     more = [
         Option(ModelState.of(problem, fit), left_out_errors(problem, path.blocks, fit), fit)
         for problem, fit in dict.fromkeys(tried)

@@ -20,7 +20,8 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.archive import Archive, fit_name
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter, held_out_residual
 from aesi.tracer.likelihood.growth import Explanation, Grown, Parent, grow, promise
-from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
+from aesi.tracer.likelihood.model_error import PRIORS
+from aesi.tracer.likelihood.surrogates import admission_nats
 
 BASE_STEPS = 8
 REFIT_STEPS = 3
@@ -37,20 +38,19 @@ HOPELESS_SHARE = 0.7
 """Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
 ALIKE_NATS = 3.0
 """Hypotheses within this of each other say as much."""
-ADMITTED_NATS = 15.0
-"""What an effect has to say more of unseen data than the hypothesis without it."""
 LEAST_V = 1.5e-4
 """And what it has to take off the error on unseen data: less is within what two solvers of one model differ by."""
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step: what the parents grew, best first, and what was fitted in full."""
+    """One step: what the parents grew, best first, what was fitted in full, and the nats that admit an effect."""
 
     parents: tuple[FittedHypothesis, ...]
     grown: tuple[Grown, ...]
     fitted: tuple[FittedHypothesis, ...]
     admitted: FittedHypothesis | None
+    admission_nats: float = 0.0
 
     @property
     def best_gain(self) -> float:
@@ -79,6 +79,11 @@ class Path:
             for one in tried:  # a full fit takes the place of a linear one
                 best[frozenset(one.hypothesis)] = one
         return list(best.values())
+
+    @property
+    def admission_nats(self) -> float:
+        """What an effect had to say more of unseen data at the strictest step."""
+        return max((step.admission_nats for step in self.steps), default=0.0)
 
     def gain(self, one: Explanation) -> float:
         """Nats that a hypothesis says more than the base."""
@@ -117,13 +122,9 @@ def _fitted(
     x = archive.get(name, len(fitter.free))
     if x is None:
         x0 = np.zeros(len(fitter.free)) if placed is None else coordinates_of(fitter.free, placed)
-        x = fitter.descend(x0, _nearest(delta_v), steps)
+        x = fitter.descend(x0, PRIORS[problem.trust].nearest(delta_v), steps)
         archive.put(name, x)
     return fitter.finished(x)
-
-
-def _nearest(delta_v: float) -> float:
-    return min(SIZES_V, key=lambda s: abs(np.log(s / delta_v)))
 
 
 def searched(
@@ -156,9 +157,10 @@ def searched(
         chosen = step.admitted
         if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
             break
-        others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
+        alone = enough(blocks, chosen) or problem.trust == "measured"
+        others = () if alone else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
-    chosen = _pruned(problem, blocks, chosen, archive, report)
+    chosen = _pruned(problem, blocks, chosen, steps, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
 
 
@@ -185,9 +187,15 @@ def with_wrong_parameters(path: Path, archive: Archive) -> Path:
 
 
 def _pruned(
-    problem: InverseProblem, blocks: Blocks, chosen: FittedHypothesis, archive: Archive, report: Report
+    problem: InverseProblem,
+    blocks: Blocks,
+    chosen: FittedHypothesis,
+    steps: Sequence[Step],
+    archive: Archive,
+    report: Report,
 ) -> FittedHypothesis:
     """The hypothesis without effects that it does not need once the others are in."""
+    least_nats = max((step.admission_nats for step in steps), default=0.0)
     while len(chosen.hypothesis) > 1:
         best: FittedHypothesis | None = None
         for name in chosen.hypothesis[:-1]:  # the last one was admitted on top of the others
@@ -197,7 +205,9 @@ def _pruned(
             if fit is None:
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
-            if not _admitted(blocks, fit, chosen) and (best is None or fit.score.total > best.score.total):
+            if not _admitted(blocks, fit, chosen, least_nats) and (
+                best is None or fit.score.total > best.score.total
+            ):
                 best = fit
         if best is None:
             break
@@ -247,8 +257,10 @@ def _step(
         if key not in grown or one.score.total > grown[key].score.total:
             grown[key] = one
     ranked = sorted(grown.values(), key=lambda g: -g.score.total)
+    slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in ranked}}
+    least_nats = admission_nats(Parent(problem, blocks, best), slopes)
     fitted = []
-    for one in (g for g in ranked[:FINALISTS] if g.score.total - best.score.total > ADMITTED_NATS / 2):
+    for one in (g for g in ranked[:FINALISTS] if g.score.total - best.score.total > least_nats / 2):
         fit = _fitted(
             problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, REFIT_STEPS, archive
         )
@@ -256,14 +268,14 @@ def _step(
             report(problem, fit, fit.score.total - best.score.total)
             fitted.append(fit)
     fitted.sort(key=lambda f: -f.score.total)
-    admitted = next((f for f in fitted if _admitted(blocks, best, f)), None)
-    return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted), refused
+    admitted = next((f for f in fitted if _admitted(blocks, best, f, least_nats)), None)
+    return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
 
-def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis) -> bool:
+def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
     off = unseen_rmse_v(blocks, without) ** 2 - unseen_rmse_v(blocks, fit) ** 2
     says = fit.score.total - without.score.total
-    return says > ADMITTED_NATS and off > LEAST_V**2 and not fit.at_bounds
+    return says > least_nats and off > LEAST_V**2 and not fit.at_bounds
 
 
 def _promising(parent: Parent, slopes: Mapping[str, Array]) -> list[str]:
@@ -315,4 +327,5 @@ def _side_by_side(wanted: Sequence[tuple[Parent, str]], archive: Archive) -> Ite
 
 def _growth_size(parent: Parent) -> float:
     """Size of the model error at which the parameters of an effect are fitted: what a right hypothesis leaves."""
-    return _nearest(PRIORS[parent.problem.trust].median_v)
+    prior = PRIORS[parent.problem.trust]
+    return prior.nearest(prior.median_v)

@@ -5,13 +5,15 @@ Thresholds are in one place, `Thresholds`, each with the command that measured i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from aesi.tracer.decide.search import Path, unseen_rmse_v
 from aesi.tracer.likelihood.growth import Explanation
+from aesi.tracer.likelihood.model_error import MEASURED_V
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
@@ -25,14 +27,12 @@ class Thresholds:
     (which is itself estimated) and this much (V), added as squares.
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
     fewer nats, are not told apart.
-    alike_gain_nats : what a look-alike has to say more than the hypothesis without it.
     """
 
     noise_share: float = 0.45
     solver_v: float = 4e-4
     alike_sds: float = 1.64
     alike_nats: float = 3.0
-    alike_gain_nats: float = 7.5
 
 
 @dataclass(frozen=True)
@@ -93,9 +93,31 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
             "within what a right model leaves"
         )
         return Verdict("none", (), (), 0.0, left, allowed, reason, -_best_gain(path))
-    groups, margin = look_alikes(path, thresholds)
+    groups, margin = look_alikes(path, thresholds, allowed)
     reason = f"{1e3 * before:.2f} mV beyond the noise on unseen data before, {1e3 * left:.2f} mV after"
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
+
+
+def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
+    """An `unknown` with the names that hold beyond what models of measured cells are off by.
+
+    path : the search at the trust `measured`.
+    """
+    before, left = structured_v(path, path.base), structured_v(path, path.chosen)
+    groups, margin = look_alikes(path, thresholds, max(left, MEASURED_V))
+    reason = (
+        f"what is named takes the error on data that the fit has not seen from {1e3 * before:.1f} to "
+        f"{1e3 * left:.1f} mV beyond the noise, by more than a model of a measured cell is usually off; the rest is "
+        "not explained by any effect of the catalogue"
+    )
+    return replace(
+        verdict,
+        effects=path.chosen.hypothesis,
+        groups=groups,
+        margin=margin,
+        structured_v=left,
+        reason=reason,
+    )
 
 
 def _best_gain(path: Path) -> float:
@@ -109,30 +131,48 @@ def lag(better: Explanation, other: Explanation) -> tuple[float, float]:
     return better.score.total - other.score.total, deviation
 
 
-def look_alikes(path: Path, thresholds: Thresholds) -> tuple[tuple[tuple[str, ...], ...], float]:
+def look_alikes(
+    path: Path, thresholds: Thresholds, allowed_v: float
+) -> tuple[tuple[tuple[str, ...], ...], float]:
     """Groups of effects that these data do not tell apart (a model confidence set, Hansen, Lunde & Nason, Econometrica
-    79 (2011) 453, over paired block differences), and how many standard deviations the closest other one lags."""
-    chosen = path.chosen
-    allowed = tolerance_v(noise_v(path), thresholds)
+    79 (2011) 453, over paired block differences), and how many standard deviations the closest other one lags.
+
+    allowed_v : what a right hypothesis may leave on unseen data beyond the noise.
+    """
     groups, margin = [], np.inf
     tried = {frozenset(e.hypothesis): e for e in path.explanations()}
-    for name in chosen.hypothesis:
-        rest = set(chosen.hypothesis) - {name}
+    for name in path.chosen.hypothesis:
         alike = []
-        for other in path.explanations():
-            added = set(other.hypothesis) - rest
-            if len(other.hypothesis) != len(chosen.hypothesis) or len(added) != 1 or name in other.hypothesis:
+        for anchor, other, added in _rivals(path, name, tried):
+            without = tried.get(frozenset(anchor.hypothesis) - {name})
+            if without is not None and other.score.total - without.score.total < path.admission_nats:
                 continue
-            nats, deviation = lag(chosen, other)
-            without = tried.get(frozenset(rest))
-            if without is not None and other.score.total - without.score.total < thresholds.alike_gain_nats:
-                continue
+            nats, deviation = lag(anchor, other)
             close = nats < max(thresholds.alike_nats, thresholds.alike_sds * deviation)
-            if close and structured_v(path, other) <= 1.2 * allowed:
-                alike.append((nats, next(iter(added))))
+            if close and structured_v(path, other) <= 1.2 * max(allowed_v, structured_v(path, anchor)):
+                alike.append((nats, added))
             else:
                 margin = min(margin, nats / max(deviation, thresholds.alike_nats))
         alike.sort()
         if alike:
             groups.append((name, *(other for _, other in alike[: GROUP_SIZE - 1])))
     return tuple(groups), float(min(margin, 50.0))
+
+
+def _rivals(
+    path: Path, name: str, tried: Mapping[frozenset[str], Explanation]
+) -> Iterator[tuple[Explanation, Explanation, str]]:
+    """Hypotheses with another effect in the place of one that was chosen, each with the one that it is held against
+    and the other effect: beside all that was chosen, or, where that was not tried, beside what there was when the
+    effect was admitted."""
+    named: set[str] = set()
+    admitted = (
+        s.admitted for s in path.steps if s.admitted is not None and s.admitted.hypothesis[-1] == name
+    )
+    for anchor in (path.chosen, *admitted):
+        rest = frozenset(anchor.hypothesis) - {name}
+        for hypothesis, other in tried.items():
+            added = hypothesis - rest
+            if rest < hypothesis and len(added) == 1 and name not in hypothesis and not added & named:
+                named |= added
+                yield anchor, other, next(iter(added))

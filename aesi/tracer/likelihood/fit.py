@@ -19,9 +19,8 @@ from aesi.tracer.likelihood.gaussian import (
     best_over_sizes,
     block_sums,
     score_at,
-    whitened,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
+from aesi.tracer.likelihood.model_error import PRIORS, whitened
 
 OWN_STEP = 0.1
 EFFECT_STEP = 4e-3
@@ -155,10 +154,10 @@ class HypothesisFitter:
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linear form, over sizes of the model error."""
     prior, table, out = PRIORS[problem.trust], point.table(), []
-    for delta_v in SIZES_V:
+    for delta_v in prior.sizes_v:
         white, log_det = whitened(problem, blocks, table, delta_v)
         sums = block_sums(blocks, white, log_det)
-        out.append(score_at(problem, blocks, sums, point.x, delta_v, prior.log_density(delta_v)))
+        out.append(score_at(blocks, sums, point.x, delta_v, prior.log_density(delta_v)))
     return best_over_sizes(out)
 
 

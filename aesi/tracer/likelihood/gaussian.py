@@ -18,13 +18,9 @@ from functools import cached_property
 
 import numpy as np
 
-from aesi.numerics.noise.discrepancy import whiten
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.likelihood.model_error import amplitude_v
-
-LOG_2PI = float(np.log(2.0 * np.pi))
+from aesi.tracer.likelihood.model_error import LOG_2PI
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +45,6 @@ class BlockSums:
             self.log_det,
             self.rows,
         )
-
-
-def whitened(problem: InverseProblem, blocks: Blocks, table: Array, delta_v: float) -> tuple[Array, Array]:
-    """Columns (n, m) in V, whitened at a size of the model error, and log|C| by rows (n,)."""
-    amplitude = amplitude_v(problem.steepness, delta_v, problem.trust)
-    return whiten(table, problem.time_s, blocks.starts[:-1], amplitude, problem.white_v)
 
 
 def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
@@ -170,9 +160,7 @@ class PredictiveScore:
     covariance: Array
 
 
-def score_at(
-    problem: InverseProblem, blocks: Blocks, sums: BlockSums, x: Array, delta_v: float, log_prior: float
-) -> PredictiveScore:
+def score_at(blocks: Blocks, sums: BlockSums, x: Array, delta_v: float, log_prior: float) -> PredictiveScore:
     """The score of a hypothesis at one size of the model error."""
     names = list(blocks.folds)
     folds = tuple(fold for name in names for fold in blocks.folds[name])

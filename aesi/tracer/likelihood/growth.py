@@ -26,9 +26,8 @@ from aesi.tracer.likelihood.gaussian import (
     best_over_sizes,
     block_sums,
     score_at,
-    whitened,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, SIZES_V
+from aesi.tracer.likelihood.model_error import PRIORS, whitened
 
 FIRST_STEPS = 2
 FURTHER_STEPS = 5
@@ -47,7 +46,8 @@ class Parent:
     def white(self) -> dict[float, tuple[Array, Array]]:
         """Size -> whitened sensitivities (n, m) and log|C| (n,)."""
         return {
-            delta: whitened(self.problem, self.blocks, self.fit.point.jacobian_v, delta) for delta in SIZES_V
+            delta: whitened(self.problem, self.blocks, self.fit.point.jacobian_v, delta)
+            for delta in PRIORS[self.problem.trust].sizes_v
         }
 
     @cached_property
@@ -187,7 +187,7 @@ def promise(parent: Parent, slopes_v: Array, delta_v: float) -> float:
     table = np.column_stack([new[:, :1], known, new[:, 1:]])
     x = np.concatenate([fit.point.x, np.zeros(slopes_v.shape[1])])
     sums = block_sums(parent.blocks, table, log_det)
-    return score_at(parent.problem, parent.blocks, sums, x, delta_v, 0.0).total
+    return score_at(parent.blocks, sums, x, delta_v, 0.0).total
 
 
 def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
@@ -196,12 +196,12 @@ def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
     x = np.concatenate([fit.point.x[growth.rest], u[inside]])
     prior, out = PRIORS[growth.problem.trust], []
     own_columns = np.column_stack([e, jacobian[:, inside]])
-    for delta in SIZES_V:
+    for delta in prior.sizes_v:
         known, _ = parent.white[delta]
         new, log_det = whitened(growth.problem, parent.blocks, own_columns, delta)
         table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
         sums = block_sums(parent.blocks, table, log_det)
-        out.append(score_at(growth.problem, parent.blocks, sums, x, delta, prior.log_density(delta)))
+        out.append(score_at(parent.blocks, sums, x, delta, prior.log_density(delta)))
     hypothesis = (*fit.hypothesis, growth.effect)
     free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
     point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]]))

@@ -10,9 +10,13 @@ from aesi.numerics.typing import Array
 from aesi.records import Run
 
 MEMORIES_S = (10.0, 60.0, 300.0, 1800.0)
+"""Low-passes of the current that stand for slow states."""
 FOLDS = 5
+"""Every fifth block is left out in turn."""
 BLOCKS_PER_FOLD = 5
+"""Blocks are long against the correlation of neighbours."""
 RIDGES = (1e-4, 1e-2, 1.0, 1e2, 1e4)
+"""The one that predicts left-out blocks best is taken."""
 SATURATION = 0.5
 """Share of the current's RMS at which the saturating feature bends."""
 

@@ -11,7 +11,7 @@ SENSOR = "a second sensor of the same quantity: an instrument's fault does not s
 OTHERWISE = "data at other rates, temperatures and states of charge"
 
 
-def experiment(names: Sequence[str], effects: Mapping[str, Effect]) -> str:
+def telling_experiment(names: Sequence[str], effects: Mapping[str, Effect]) -> str:
     """A sentence for a group of look-alikes.
 
     names : ids of the group.  effects : id -> effect, all that was tried.

@@ -29,10 +29,14 @@ POINTS_TO: Mapping[str, tuple[str, ...]] = {
 INPUTS = (*INPUT_NAMES, "I_300s")
 ORDER, DEGREE = 3, 2
 RESAMPLES = 20
+"""Few, and blocks of BLOCK_S in PIECES left-out pieces: the yardstick asks for the order of what is left, not for a
+model to keep."""
 BLOCK_S = 100.0
 PIECES = 10
 RIDGES = (1.0, 100.0)
+"""Weights tried, in the units of the scaled library."""
 THRESHOLD = 1e-3
+"""Coefficients below are dropped."""
 SHOWN = 4
 """Terms that are named for each of POINTS_TO."""
 

@@ -72,11 +72,11 @@ def test_telemetry_is_off_unless_the_user_says_otherwise(monkeypatch):
     names = ("DO_NOT_TRACK", "MLFLOW_DISABLE_TELEMETRY", "PYBAMM_DISABLE_TELEMETRY")
     for name in (*names, "PREFECT_SERVER_ANALYTICS_ENABLED"):
         monkeypatch.delenv(name, raising=False)
-    environment.prepare()
+    environment.prepare_process()
     assert all(os.environ[name] in ("1", "true") for name in names)
     assert os.environ["PREFECT_SERVER_ANALYTICS_ENABLED"] == "false"
     monkeypatch.setenv("MLFLOW_DISABLE_TELEMETRY", "false")
-    environment.prepare()
+    environment.prepare_process()
     assert os.environ["MLFLOW_DISABLE_TELEMETRY"] == "false"
 
 

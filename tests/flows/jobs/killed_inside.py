@@ -32,7 +32,7 @@ if __name__ == "__main__":
     from flows import cli
     from flows.base import environment
 
-    environment.prepare()
+    environment.prepare_process()
     arm(sys.argv[1], sys.argv[2], int(sys.argv[3]))
     sys.argv[1:] = sys.argv[4:]
     cli.main()

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.bench.physics.espm import drive
+from aesi.bench.physics.espm import random_load
 from aesi.physics import Cell
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -96,7 +96,7 @@ def peer():
     """The 30 Ah cell under a random drive load up to 3C."""
     content = read("nmc_30ah")
     cell = Cell.from_bpx(content)
-    time, current = drive(10 * SECONDS, cell.nominal_capacity_ah, np.random.default_rng(3))
+    time, current = random_load(10 * SECONDS, cell.nominal_capacity_ah, np.random.default_rng(3))
     return Peer(content, cell, time, current)
 
 

@@ -8,7 +8,7 @@ from aesi.bench.scoring import is_right
 from aesi.data import read_measurement
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.discovery.discover import to_json
+from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 
 CHEAP = (
@@ -27,7 +27,7 @@ def traced(shared_data, name, effects=CATALOGUE):
     label = json.loads((shared_data / "virtual" / "labels.json").read_text())[name]
     cell = Cell.from_bpx(shared_data / "measured" / "about_energy_nmc" / "cell.bpx.json")
     data = read_measurement(shared_data / "virtual" / f"{name}.csv")
-    return label, to_json(discover(cell, [data], soc0=label["soc0"], effects=effects))
+    return label, discovery_content(discover(cell, [data], soc0=label["soc0"], effects=effects))
 
 
 @pytest.mark.parametrize("name", ["v01", "v03"])

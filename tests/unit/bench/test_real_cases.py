@@ -2,16 +2,19 @@
 
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aesi.bench.real import chosen, judged, plan, summary, write_report
+from aesi.bench.real.answers import initial_state_row, scored
+from aesi.bench.real.beside import of_model, of_spectrum
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.bench.real.judge import scored
+from aesi.bench.real.judge import _cell, _known, _read
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.records import Measurement
+from aesi.records import Measurement, Spectrum
 
 CELLS = "experiments/cells"
 
@@ -22,7 +25,8 @@ def test_the_plan_has_what_a_benchmark_on_measured_cells_needs():
     names = {case.name for case in cases}
     assert len(names) == len(cases)
     groups = Counter(case.group for case in cases)
-    assert groups["control"] >= 20
+    assert groups["control"] == 20
+    assert groups["witness"] == 2
     assert groups["fault"] == 45
     assert groups["withheld"] >= 12
     assert abs(sum(case.development for case in cases) - len(cases) / 2) <= 3
@@ -72,6 +76,7 @@ def content(*effects, groups=(), parameters=None, verdict="found"):
         "recalibrated": errors,
         "after": errors,
         "candidates": [{"effect": name, "parameters": parameters or {}} for name in effects],
+        "own_parameters": {"recalibrated": [], "after": []},
     }
 
 
@@ -121,6 +126,8 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
         "development": False,
         "answer": ["current_sensor_offset"],
         "source": "put in",
+        "put_in": "current_offset 0.1",
+        "record": "x/drive",
         "processor_s": 1.0,
         "residual": {
             "time_s": [0.0, 1.0],
@@ -140,31 +147,86 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
     assert last["reported"]["size_error_median"] == pytest.approx(0.1)
     assert last["confusion"] == {"current_sensor_offset": {"current_sensor_offset": 1}}
     page = write_report(tmp_path / "real.html", [row], last).read_text()
-    assert "current_offset-0.1-x" in page
-    assert "<polyline" in page
-    assert "http" not in page
+    body = page[: page.index("<script>")]
+    assert "current_offset-0.1-x" in body
+    assert 'data-figure="worst_0"' in body
+    assert 'data-figure="confusion"' in body
+    assert 'data-figure="sizes"' in body
+    assert "100 [2, 100] of 1" in body
+
+
+def test_half_of_a_wrong_initial_state_taken_back():
+    moved = {"effect": "soc0", "parameter": "x", "value": 0.975}
+    row = initial_state_row(0.95, 1.0, {"own_parameters": {"after": [moved]}})
+    assert row["size_true"] == pytest.approx(0.05)
+    assert row["size_error"] == pytest.approx(0.5)
+    assert initial_state_row(0.95, 1.0, {"own_parameters": {"after": []}})["size_error"] == pytest.approx(1.0)
+
+
+def control(name, *effects):
+    head = {"case": name, "group": "control", "development": False, "put_in": "", "processor_s": 1.0}
+    return head | {"answer": [], "matched": None} | scored((), {}, content(*effects))
+
+
+def test_a_control_that_shows_the_name_of_its_matched_case_is_counted():
+    fault = control("cold") | {"group": "withheld", "answer": ["ambient_temperature"], "matched": "given"}
+    last = summary([fault, control("given", "ambient_temperature"), control("other", "ocp_shape")])
+    assert last["control_silent_pct"] == 0.0
+    assert last["control_matched_false_pct"] == 100.0
+    assert last["control_matched_false_cases"] == 1
+    assert last["control_false_names"] == {"given": ["ambient_temperature"], "other": ["ocp_shape"]}
+    assert last["withheld_within_2k_pct"] == 0.0
+
+
+def test_the_resistances_of_a_circuit_are_read_off_its_spectrum():
+    hz = np.geomspace(1e-2, 1e4, 200)
+    omega = 2 * np.pi * hz
+    lead = 1j * omega * 2e-7  # crosses zero where the semicircle is small
+    z = 0.02 + lead + 0.008 / (1 + 1j * omega * 0.008 * 0.5)
+    found = of_spectrum(Spectrum("circuit", hz, z, soc=0.5))
+    assert found.ohmic_ohm == pytest.approx(0.02, rel=0.02)
+    assert found.transfer_ohm == pytest.approx(0.008, rel=0.05)
+
+
+def test_a_contact_is_in_the_ohmic_part_of_the_model_and_slow_kinetics_in_the_other():
+    cell = Cell.from_bpx(f"{CELLS}/lg_m50_chen2020.bpx.json")
+    plain = of_model(cell, (), 0.5, 25.0)
+    contact = of_model(cell, (CATALOGUE["series_resistance"].activate(resistance_ohm=5e-3),), 0.5, 25.0)
+    slow = CATALOGUE["charge_transfer_kinetics"].activate(negative_factor=0.5, positive_factor=0.5)
+    slower = of_model(cell, (slow,), 0.5, 25.0)
+    assert contact.ohmic_ohm - plain.ohmic_ohm == pytest.approx(5e-3)
+    assert contact.transfer_ohm == pytest.approx(plain.transfer_ohm)
+    assert slower.ohmic_ohm == pytest.approx(plain.ohmic_ohm, rel=1e-3)
+    assert slower.transfer_ohm > 1.2 * plain.transfer_ohm
+
+
+def known(name):
+    case = next(case for case in plan() if case.name == name)
+    data = _read(case.take)
+    return case, data, _known(case, data, Cell.from_bpx(_cell(case.cell, Path(CELLS))))
 
 
 @pytest.mark.parametrize("name", ["control-about_energy_nmc-1C", "ageing-25degC_1c_end"])
 def test_records_are_read_and_hold_the_answer(shared_data, name):
-    from aesi.bench.real.judge import _load
-
-    case = next(case for case in plan() if case.name == name)
-    data, truth = _load(case)
+    case, data, truth = known(name)
     assert len(data) > 300
     if case.measured == "capacity":
         # 2.80 Ah in March and 2.43 Ah in July, the last rows at the end of discharge included.
-        assert truth["lithium_inventory_loss.loss"] == pytest.approx(1 - 2.43 / 2.80, abs=0.02)
+        assert truth.lost == pytest.approx(1 - 2.43 / 2.80, abs=0.02)
     else:
-        assert truth == {}
+        assert truth.parameters == {}
 
 
 def test_a_withheld_temperature_is_in_the_answer_and_not_in_the_data(shared_data):
-    from aesi.bench.real.judge import _load
-
-    case = next(case for case in plan() if case.name == "withheld-lg_18650hg2-10degC_us06")
-    data, truth = _load(case)
+    case, data, truth = known("withheld-lg_18650hg2-10degC_us06")
     assert data.temperature_degc is None
-    assert truth["ambient_temperature.shift_k"] == pytest.approx(10.9 - 25, abs=0.3)
+    assert len(truth.temperature_degc) == len(data)
+    assert truth.parameters["ambient_temperature.shift_k"] == pytest.approx(10.9 - 25, abs=0.3)
     given = replace(case, take=replace(case.take, temperature=True))
-    assert _load(given)[0].temperature_degc is not None
+    assert _read(given.take).temperature_degc is not None
+
+
+def test_the_spectra_of_a_witness_are_those_of_its_month(shared_data):
+    _, _, truth = known("witness-10degC_hppc")
+    assert len(truth.spectra) == 13
+    assert {round(s.temperature_degc) for s in truth.spectra} == {10}

@@ -3,7 +3,7 @@ import pytest
 
 from aesi.bench.intervals.spci import oracle_series
 from aesi.conformal import METHODS
-from aesi.conformal.validation import thinned, validation_scores
+from aesi.conformal.validation import spaced_pieces, validation_scores
 
 
 def test_scores_a_candidate_by_what_it_covers(rng: np.random.Generator) -> None:
@@ -16,7 +16,7 @@ def test_scores_a_candidate_by_what_it_covers(rng: np.random.Generator) -> None:
 
 def test_thinning_keeps_residual_and_current_together() -> None:
     records = [np.arange(0.0, 700.0), np.arange(700.0, 1000.0)]
-    kept, currents = thinned(records, [10 * r for r in records], 200)
+    kept, currents = spaced_pieces(records, [10 * r for r in records], 200)
     assert currents is not None
     assert 180 <= sum(len(r) for r in kept) <= 200
     for record, current in zip(kept, currents, strict=True):
@@ -26,4 +26,4 @@ def test_thinning_keeps_residual_and_current_together() -> None:
 
 def test_short_records_are_kept_whole() -> None:
     records = [np.arange(5.0)]
-    assert thinned(records, None, 100)[0][0] is records[0]
+    assert spaced_pieces(records, None, 100)[0][0] is records[0]

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import Intervals
-from aesi.conformal.scores import interval_score, low_minute_share, score, worst_bin_coverage
+from aesi.conformal.scores import interval_score, low_minute_share, scores_of, worst_bin_coverage
 
 
 def band(low: list[float], high: list[float]) -> Intervals:
@@ -12,7 +12,7 @@ def band(low: list[float], high: list[float]) -> Intervals:
 def test_hand_worked_case() -> None:
     # Widths 2; one residual 1 below its band at alpha = 0.1 costs 20: (2 + 2 + 22 + 2) / 4 = 7.
     residuals = np.array([0.0, 0.5, -2.0, 1.0])
-    scores = score(band([-1] * 4, [1] * 4), residuals, 0.1)
+    scores = scores_of(band([-1] * 4, [1] * 4), residuals, 0.1)
     assert scores.coverage == 0.75
     assert scores.mean_width_v == 2.0
     assert scores.interval_score_v == pytest.approx(7.0)
@@ -21,13 +21,13 @@ def test_hand_worked_case() -> None:
 
 
 def test_a_missing_residual_counts_neither_way() -> None:
-    scores = score(band([-1] * 3, [1] * 3), np.array([0.0, np.nan, 5.0]), 0.1)
+    scores = scores_of(band([-1] * 3, [1] * 3), np.array([0.0, np.nan, 5.0]), 0.1)
     assert scores.n == 2
     assert scores.coverage == 0.5
 
 
 def test_no_residual_at_all_has_no_score() -> None:
-    scores = score(band([-1], [1]), np.array([np.nan]), 0.1, dt_s=1.0)
+    scores = scores_of(band([-1], [1]), np.array([np.nan]), 0.1, dt_s=1.0)
     assert np.isnan([scores.coverage, scores.mean_width_v, scores.interval_score_v, scores.low_minutes]).all()
 
 

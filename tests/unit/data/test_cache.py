@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.data.laboratory.cache import cache_folder, key_of, remember
+from aesi.data.laboratory.cache import cache_folder, cached, key_of
 from aesi.errors import DataError
 
 
@@ -20,23 +20,23 @@ def test_what_was_made_is_not_made_again():
         calls.append(1)
         return {"x": np.arange(3.0)}
 
-    first, second = remember("kind", "key", make), remember("kind", "key", make)
+    first, second = cached("kind", "key", make), cached("kind", "key", make)
     np.testing.assert_array_equal(first["x"], second["x"])
     assert len(calls) == 1
 
 
 @pytest.mark.parametrize("harm", ["cut", "empty", "other", "flipped"])
 def test_a_damaged_entry_is_made_again_and_that_is_said(folder, harm):
-    remember("kind", "key", lambda: {"x": np.zeros(1000)})
+    cached("kind", "key", lambda: {"x": np.zeros(1000)})
     path = folder / "kind" / "key.npz"
     content = bytearray(path.read_bytes())
     if harm == "flipped":
         content[len(content) // 2] ^= 0xFF
     path.write_bytes({"cut": content[:100], "empty": b"", "other": b"hello", "flipped": content}[harm])
     with pytest.warns(UserWarning, match="computed again"):
-        again = remember("kind", "key", lambda: {"x": np.ones(1000)})
+        again = cached("kind", "key", lambda: {"x": np.ones(1000)})
     np.testing.assert_array_equal(again["x"], 1.0)
-    np.testing.assert_array_equal(remember("kind", "key", dict)["x"], 1.0)
+    np.testing.assert_array_equal(cached("kind", "key", dict)["x"], 1.0)
 
 
 def test_a_failed_making_leaves_nothing_behind(folder):
@@ -44,7 +44,7 @@ def test_a_failed_making_leaves_nothing_behind(folder):
         raise RuntimeError("no")
 
     with pytest.raises(RuntimeError):
-        remember("kind", "key", fail)
+        cached("kind", "key", fail)
     assert not list(folder.rglob("*"))
 
 
@@ -53,7 +53,7 @@ def test_a_folder_that_cannot_be_written_is_one_sentence(tmp_path, monkeypatch):
     blocked.write_text("in the way")
     monkeypatch.setenv("AESI_CACHE", str(blocked / "below"))
     with pytest.raises(DataError, match="AESI_CACHE"):
-        remember("kind", "key", lambda: {"x": np.zeros(1)})
+        cached("kind", "key", lambda: {"x": np.zeros(1)})
 
 
 def test_keys_depend_on_every_part():

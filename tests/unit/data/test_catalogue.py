@@ -101,7 +101,7 @@ def test_a_copy_on_disk_goes_first(tmp_path, monkeypatch, below):
     (folder / "us06.csv.gz").write_bytes(b"x")
     monkeypatch.setenv("AESI_DATA", str(tmp_path / "mine"))
     assert catalogue.locate("lg_18650hg2", "us06") == folder / "us06.csv.gz"
-    assert any(str(folder) in line for line in catalogue.listing())
+    assert any(str(folder) in line for line in catalogue.catalogue_lines())
 
 
 def test_only_a_folder_that_is_named_is_looked_into(tmp_path, monkeypatch):

@@ -8,7 +8,7 @@ import pytest
 
 from aesi.data.laboratory.changes import CHANGES, find_change
 from aesi.data.laboratory.instrument import Instrument
-from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, edges, run
+from aesi.data.laboratory.simulator import Applied, Setup, TrueRun, edges, simulate_truth
 from aesi.data.profiles.profile import Bench, Profile
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
@@ -25,7 +25,7 @@ def short(soc0=0.6) -> Profile:
 
 
 def voltage(nmc, *applied, model="SPMe", soc0=0.6):
-    return run(Setup(nmc, model, applied), short(soc0)).voltage_v
+    return simulate_truth(Setup(nmc, model, applied), short(soc0)).voltage_v
 
 
 def test_the_solver_stops_on_both_sides_of_every_step():
@@ -37,7 +37,7 @@ def test_the_solver_stops_on_both_sides_of_every_step():
 def test_a_short_pulse_after_a_long_rest_is_not_stepped_over(nmc):
     # PyBaMM's issue 5145: without break points the solver steps over such a pulse.
     pieces = [BENCH.rest(3000), BENCH.pulse(2.0, 5), BENCH.rest(1000)]
-    trace = run(Setup(nmc, "SPMe"), BENCH.profile("late", pieces, 0.6))
+    trace = simulate_truth(Setup(nmc, "SPMe"), BENCH.profile("late", pieces, 0.6))
     assert trace.voltage_v[2000] - trace.voltage_v[3002] > 0.05
     assert trace.soc[-1] == pytest.approx(0.6 - 2.0 * 5 / 3600, abs=1e-9)
 
@@ -64,7 +64,7 @@ def test_slow_particles_are_resolved_at_their_surface(m50):
     bench = Bench(5.0, 1.0)
     pieces = [piece for rate in (2.0, -1.0, 1.5) for piece in (bench.pulse(rate, 30), bench.rest(60))]
     profile = bench.profile("pulses", [bench.rest(20), *pieces], 0.7)
-    other = run(Setup(m50, "SPMe"), profile).voltage_v
+    other = simulate_truth(Setup(m50, "SPMe"), profile).voltage_v
     ours = simulate(Cell.from_bpx(m50), profile.time_s, profile.current_a, 0.7).voltage_v
     assert np.sqrt(np.mean((other - ours) ** 2)) < 1e-4
 
@@ -77,8 +77,8 @@ def test_a_film_grows_with_throughput(nmc):
 
 def test_full_and_reduced_model_agree_at_a_low_rate(nmc):
     slow = BENCH.profile("slow", [BENCH.rest(20), BENCH.pulse(0.2, 100)], 0.6)
-    full = run(Setup(nmc, "DFN"), slow).voltage_v
-    reduced = run(Setup(nmc, "SPMe"), slow).voltage_v
+    full = simulate_truth(Setup(nmc, "DFN"), slow).voltage_v
+    reduced = simulate_truth(Setup(nmc, "SPMe"), slow).voltage_v
     assert np.sqrt(np.mean((full - reduced) ** 2)) < 0.5e-3
 
 
@@ -125,7 +125,7 @@ def test_signs_are_physical(nmc):
 
 
 def test_a_cell_without_cooling_warms_up(nmc):
-    trace = run(Setup(nmc, "SPMe", (Applied("self_heating", {"cooling_w_m2_k": 0.0}),)), short())
+    trace = simulate_truth(Setup(nmc, "SPMe", (Applied("self_heating", {"cooling_w_m2_k": 0.0}),)), short())
     assert trace.temperature_degc[0] == pytest.approx(25.0, abs=1e-3)
     assert 0.05 < trace.temperature_degc[-1] - 25.0 < 2.0
 
@@ -133,7 +133,7 @@ def test_a_cell_without_cooling_warms_up(nmc):
 def test_an_emptied_cell_is_an_error_not_a_short_record(nmc):
     profile = BENCH.profile("empty", [BENCH.rest(10), BENCH.pulse(1.0, 1200)], 0.1)
     with pytest.raises(SimulationError, match="empty"):
-        run(Setup(nmc, "SPMe"), profile)
+        simulate_truth(Setup(nmc, "SPMe"), profile)
 
 
 def test_a_run_is_taken_from_the_cache(nmc, monkeypatch):
@@ -150,11 +150,11 @@ def test_unknown_changes_and_values_are_refused(nmc, tmp_path):
     with pytest.raises(DataError, match="different values"):
         voltage(nmc, Applied("double_layer"), Applied("asymmetric_kinetics"))
     with pytest.raises(DataError, match="cannot be opened"):
-        run(Setup(tmp_path / "none.json", "SPMe"), short())
+        simulate_truth(Setup(tmp_path / "none.json", "SPMe"), short())
     bad = tmp_path / "bad.json"
     bad.write_text("{}")
     with pytest.raises(DataError, match="no usable BPX"):
-        run(Setup(bad, "SPMe"), short())
+        simulate_truth(Setup(bad, "SPMe"), short())
 
 
 def test_the_instrument_writes_noise_and_steps(rng):

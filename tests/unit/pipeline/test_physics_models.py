@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from small_experiment import NOISE_V, experiment, write_record
 
-from aesi.pipeline.experiment.evaluate import evaluate
+from aesi.pipeline.experiment.evaluate import evaluate_models
 from aesi.pipeline.experiment.fit import Fitted, build_problem
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
 from aesi.pipeline.experiment.validation import validation_mser
-from aesi.sparse import Candidate, Genome
-from aesi.sparse import evaluate as evaluate_genome
+from aesi.sparse import Candidate, Genome, evaluate
 from aesi.sparse.yardsticks import Bare
 
 
@@ -53,7 +52,7 @@ def test_halves_of_training_repeats_are_left_out_under_physics_of_their_own(load
 
 
 def test_every_table_tells_both_reductions(loaded, config):
-    rows = evaluate([Fitted(Bare(name), 0, 0.0) for name in PHYSICS_NAMES], loaded.split).rows
+    rows = evaluate_models([Fitted(Bare(name), 0, 0.0) for name in PHYSICS_NAMES], loaded.split).rows
     figures = {row["name"]: row["free_run"] for row in rows}
     assert figures[DECLARED]["test_mser_pct"] == pytest.approx(0.0, abs=1e-9)
     assert figures[RECALIBRATED]["test_mser_pct"] > 99.0
@@ -63,7 +62,7 @@ def test_every_table_tells_both_reductions(loaded, config):
 
 def test_validation_comes_from_drives_that_chose_nothing(loaded, config):
     problem = build_problem(loaded, config)
-    candidate = evaluate_genome(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))
+    candidate = evaluate(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))
     assert isinstance(candidate, Candidate)
     figures = validation_mser(loaded, problem, [candidate])
     assert figures[DECLARED] == pytest.approx(0.0, abs=1e-9)

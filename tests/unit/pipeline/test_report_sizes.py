@@ -2,7 +2,7 @@
 
 import pytest
 
-from aesi.pipeline.report.sizes import finding_line, quantity, sized
+from aesi.pipeline.report.sizes import finding_line, quantity, with_size
 
 
 def value(middle, low, high, unit):
@@ -32,11 +32,11 @@ def test_a_quantity_has_its_interval_and_the_digits_that_it_deserves(given, text
 
 def test_physics_is_had_and_what_is_off_has_a_size():
     ohms = {"resistance_ohm": value(8e-3, 7.9e-3, 8.1e-3, "ohm")}
-    assert sized("series_resistance", discovery("series_resistance", "physics", ohms)) == (
+    assert with_size("series_resistance", discovery("series_resistance", "physics", ohms)) == (
         "8.00 mohm [7.90, 8.10] more series resistance"
     )
     kelvin = {"shift_k": value(-14.1, -15.2, -12.9, "K")}
-    assert sized("ambient_temperature", discovery("ambient_temperature", "parameter", kelvin)) == (
+    assert with_size("ambient_temperature", discovery("ambient_temperature", "parameter", kelvin)) == (
         "ambient temperature (-14.1 K [-15.2, -12.9])"
     )
 
@@ -46,7 +46,7 @@ def test_only_what_differs_from_nothing_is_told():
         "negative_factor": value(0.6, 0.58, 0.62, "dimensionless"),
         "positive_factor": value(1.01, 0.9, 1.1, "dimensionless"),
     }
-    text = sized("solid_diffusivity", discovery("solid_diffusivity", "parameter", factors))
+    text = with_size("solid_diffusivity", discovery("solid_diffusivity", "parameter", factors))
     assert text == "solid diffusivity (negative 0.600 [0.580, 0.620] times)"
 
 

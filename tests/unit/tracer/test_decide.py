@@ -12,8 +12,10 @@ from aesi.tracer.decide.archive import Archive, context_of, identity
 from aesi.tracer.decide.carry_over import left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
 from aesi.tracer.decide.search import searched
-from aesi.tracer.decide.verdict import Thresholds, judged, structured_v
+from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v
+from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 
 NEVER = Archive(None, "")
 
@@ -48,9 +50,27 @@ def test_what_is_left_beyond_the_tolerance_is_unknown_and_names_nothing(path):
 
 
 def test_data_that_order_nothing_give_look_alikes(path):
-    (group,) = judged(path, Thresholds(alike_sds=1e6, solver_v=0.1, alike_gain_nats=-1e6)).groups
+    lenient = replace(path, steps=tuple(replace(step, admission_nats=-1e6) for step in path.steps))
+    (group,) = judged(lenient, Thresholds(alike_sds=1e6, solver_v=0.1)).groups
     assert group[0] == "ocv_hysteresis"
     assert len(group) == 3
+
+
+def test_what_is_named_beside_unknown_is_what_the_search_on_a_measured_cell_left(path):
+    verdict = partly(path, judged(replace(path, chosen=path.base), Thresholds()), Thresholds())
+    assert (verdict.word, verdict.effects) == ("unknown", ("ocv_hysteresis",))
+    assert verdict.structured_v == structured_v(path, path.chosen)
+
+
+def test_an_effect_is_admitted_by_the_largest_gain_on_surrogates(path):
+    step = path.steps[0]
+    slopes = {g.hypothesis[-1]: g.slopes_v for g in step.grown}
+    parent = Parent(path.problem, path.blocks, path.base)
+    few = largest_gains(parent, dict(list(slopes.items())[:2]), 200, np.random.default_rng(1))
+    every = largest_gains(parent, slopes, 200, np.random.default_rng(1))
+    assert np.all(every >= few)
+    assert np.mean(every > admission_nats(parent, slopes)) <= 0.04  # 1 % of draws that set nothing
+    assert step.admission_nats == admission_nats(parent, slopes) < step.best_gain
 
 
 def test_what_was_fitted_carries_to_a_part_left_out(path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, draw, whiten
+from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, whiten
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums
 
@@ -63,6 +63,6 @@ def test_the_shift_without_a_block_is_that_of_a_refit():
 
 def test_draws_have_the_variance_that_is_whitened():
     rng = np.random.default_rng(0)
-    draws = np.column_stack([draw(TIME, STARTS[:-1], AMPLITUDE, WHITE, rng) for _ in range(400)])
+    draws = np.linalg.cholesky(covariance()) @ rng.normal(size=(N, 400))
     white, _ = whiten(draws, TIME, STARTS[:-1], AMPLITUDE, WHITE)
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.03)

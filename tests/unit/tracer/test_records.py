@@ -7,7 +7,7 @@ import pytest
 
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
-from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test, thinned
+from aesi.tracer.case.records import averaged_over, noise_floor_v, prepare, prepare_test
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):
@@ -18,7 +18,7 @@ def measured(cell, time_s, current_a, soc0=0.8, **more):
 def test_thinning_keeps_charge_and_the_first_row(cell, rng):
     time = np.arange(0, 600, 0.1)
     current = 5 + np.cumsum(rng.normal(0, 0.1, len(time)))
-    thin = thinned(measured(cell, time, current), 1.0)
+    thin = averaged_over(measured(cell, time, current), 1.0)
     assert thin.time_s[0] == 0.0
     assert np.median(np.diff(thin.time_s)) == pytest.approx(1.0)
     whole = np.trapezoid(current, time)

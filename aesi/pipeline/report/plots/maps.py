@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
 from aesi.pipeline.report.arrays.binning import ErrorMap, error_map, profile
@@ -24,7 +25,7 @@ def map_figure(
     current_a: Array, soc: Array, error_v: Array, title: str, absolute: bool, limit_mv: float | None = None
 ) -> Figure:
     """Mean error, or mean absolute error, in bins over (current, SOC), in mV."""
-    error_mv = (np.abs(error_v) if absolute else error_v) * style.MILLIVOLT
+    error_mv = (np.abs(error_v) if absolute else error_v) * MV_PER_V
     binned = error_map(current_a, soc, error_mv)
     limit = limit_mv or map_limit(binned)
     word = "mean |error|" if absolute else "mean error"
@@ -57,7 +58,7 @@ def map_limit(binned: ErrorMap) -> float:
 
 def shared_limit(current_a: Array, soc: Array, errors_v: Sequence[Array], absolute: bool) -> float:
     """One colour range for maps that are to be compared: the widest of theirs, mV."""
-    as_drawn = [(np.abs(e) if absolute else e) * style.MILLIVOLT for e in errors_v]
+    as_drawn = [(np.abs(e) if absolute else e) * MV_PER_V for e in errors_v]
     return max(map_limit(error_map(current_a, soc, e)) for e in as_drawn)
 
 
@@ -69,7 +70,7 @@ def dependence_figure(
     caption = f"Median (line) and quartiles (band) of the residual in bins of {name}."
     fig = style.figure(f"Residual against {name}", caption, 340, hovermode="x unified")
     for state, error_v in errors_v.items():
-        binned = profile(x, error_v * style.MILLIVOLT)
+        binned = profile(x, error_v * MV_PER_V)
         colour = style.STATE_COLOURS[state]
         edge = {"x": binned.x, "mode": "lines", "line": {"width": 0, "color": colour}, "hoverinfo": "skip"}
         fig.add_scatter(y=binned.low, showlegend=False, legendgroup=state, **edge)
@@ -97,7 +98,7 @@ def violin_figure(residuals_v: Mapping[str, Array], colours: Mapping[str, str]) 
     )
     fig = style.figure("Squared residuals by model", caption, 380, showlegend=False)
     for name, residual in residuals_v.items():
-        square = np.maximum((residual * style.MILLIVOLT) ** 2, SMALLEST_SQUARE_MV2)
+        square = np.maximum((residual * MV_PER_V) ** 2, SMALLEST_SQUARE_MV2)
         exponents = np.log10(np.quantile(square[np.isfinite(square)], np.linspace(0, 1, QUANTILES)))
         fig.add_violin(
             y=exponents,

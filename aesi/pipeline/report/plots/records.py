@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.pipeline.report import style
 from aesi.pipeline.report.plots.timeline import (
@@ -98,7 +99,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, 1, i == 0, 1.0)
         line(fig, item.x, trace.current_a, "current", style.GREY, 2, i == 0, 1.0)
         for state, label in labels.items():
-            error = (trace.measured_v - getattr(trace, f"{state}_v")) * style.MILLIVOLT
+            error = (trace.measured_v - getattr(trace, f"{state}_v")) * MV_PER_V
             line(fig, item.x, error, label, style.STATE_COLOURS[state], 3, i == 0)
     mark_records(fig, placed)
     fig.update_yaxes(title_text="voltage, V", row=1)
@@ -157,13 +158,13 @@ def _add_interval(fig: Figure, item: Placed, model: str, first: bool) -> None:
 
 
 def _error(trace: RecordTrace, model_v: Array) -> Array:
-    return (trace.measured_v - model_v) * style.MILLIVOLT
+    return (trace.measured_v - model_v) * MV_PER_V
 
 
 def _estimate(trace: RecordTrace, hybrid_v: Array | None) -> Array:
     """The error that a hybrid voltage stands for, mV."""
     assert hybrid_v is not None
-    return (hybrid_v - trace.physics_v) * style.MILLIVOLT
+    return (hybrid_v - trace.physics_v) * MV_PER_V
 
 
 def _has_intervals(trace: RecordTrace, model: str) -> bool:
