@@ -34,13 +34,10 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
     if state.values is None:
         return ()
     problem = state.problem
-    skipped = (
-        "" if problem.reduction is None else problem.reduction.effect.id
-    )  # of the model, not of the cell
     found = [
         _own_parameter(free, state.values[free.owner][free.name], _name(state, free))
         for free in problem.free(state.hypothesis)
-        if free.own and free.owner != skipped and free.name in state.values.get(free.owner, {})
+        if free.own and free.name in state.values.get(free.owner, {})
     ]
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
 
