@@ -25,6 +25,14 @@ def time_unit(span_s: float) -> tuple[str, float]:
     return ("h", SECONDS_PER_HOUR) if span_s > LONGEST_IN_SECONDS else ("s", 1.0)
 
 
+def extent(time_s: Array) -> str:
+    """Rows and duration, for a short text."""
+    if not len(time_s):
+        return "no rows"
+    unit, divisor = time_unit(float(time_s[-1] - time_s[0]))
+    return f"{len(time_s):,} rows over {(time_s[-1] - time_s[0]) / divisor:,.4g} {unit}"
+
+
 def over_time(
     time_s: Array, panels: Mapping[str, Mapping[str, Array]], band: tuple[str, Array, Array] | None = None
 ) -> Figure:

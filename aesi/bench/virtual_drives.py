@@ -21,7 +21,7 @@ from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.experiment.load import cut_repeats
+from aesi.pipeline.experiment.drives import cut_repeats
 from aesi.pipeline.experiment.sections import RepeatsConfig
 from aesi.pipeline.product.error_series import error_series
 from aesi.records import ErrorSeries, Measurement, Split

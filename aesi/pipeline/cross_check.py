@@ -12,14 +12,19 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from time import perf_counter
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array, IntArray
+from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from plotly.graph_objects import Figure
 
 PybammModel = Literal["SPMe", "DFN"]
 OURS: Mapping[PybammModel, ModelName] = {"SPMe": "espm", "DFN": "dfn"}
@@ -53,13 +58,28 @@ class CrossCheck:
     pybamm_v: Array
     solution: Any
 
+    def __repr__(self) -> str:
+        return f"CrossCheck({extent(self.time_s)}, {self.rmse_mv:.3g} mV RMS, {self.max_mv:.3g} mV at most)"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Both voltages as a table, one row a sample."""
+        import pandas as pd
+
+        return pd.DataFrame({"time_s": self.time_s, "ours_v": self.ours_v, "pybamm_v": self.pybamm_v})
+
+    def plot(self) -> Figure:
+        """Both voltages and their difference over time: a plotly figure."""
+        difference = {"ours minus PyBaMM": MV_PER_V * (self.ours_v - self.pybamm_v)}
+        voltages = {"ours": self.ours_v, "PyBaMM": self.pybamm_v}
+        return over_time(self.time_s, {"voltage, V": voltages, "difference, mV": difference})
+
     @property
     def rmse_mv(self) -> float:
-        return 1e3 * float(np.sqrt(np.mean((self.ours_v - self.pybamm_v) ** 2)))
+        return MV_PER_V * float(np.sqrt(np.mean((self.ours_v - self.pybamm_v) ** 2)))
 
     @property
     def max_mv(self) -> float:
-        return 1e3 * float(np.abs(self.ours_v - self.pybamm_v).max())
+        return MV_PER_V * float(np.abs(self.ours_v - self.pybamm_v).max())
 
 
 def cross_check(

@@ -19,7 +19,7 @@ def main(experiment: str) -> None:
         os.environ["AESI_CACHE"] = folder
         from aesi.data.laboratory import cache
         from aesi.pipeline.experiment.config import read_experiment
-        from aesi.pipeline.experiment.load import cell_path, virtual_experiment
+        from aesi.pipeline.experiment.sources import cell_path, virtual_experiment
 
         config = read_experiment(experiment)
         if config.fallback is not None:

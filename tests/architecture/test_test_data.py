@@ -13,12 +13,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 WORDS = {"test", "tests"}
 MAY = {
-    "aesi/records.py": "defines the split",
+    "aesi/records/split.py": "defines the split",
     "aesi/data/virtual.py": "makes the paper's records",
     "aesi/data/catalogue.py": "says which tests a data set holds",
     "aesi/data/blind": "makes the cases of the benchmark",
     "aesi/pipeline/experiment/sections.py": "names of records in the experiment's file",
-    "aesi/pipeline/experiment/load.py": "cuts the split",
+    "aesi/pipeline/experiment/drives.py": "cuts the split",
+    "aesi/pipeline/experiment/sources.py": "reads the records of every role",
     "aesi/pipeline/experiment/evaluate.py": "judges the models, already chosen",
     "aesi/pipeline/api.py": "takes them from the caller",
     "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",

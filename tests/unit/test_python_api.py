@@ -9,6 +9,7 @@ import pytest
 import aesi
 from aesi.errors import InputError
 from aesi.physics.effects import CATALOGUE
+from aesi.records import Spectrum
 
 CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 TIME = np.arange(1800.0)
@@ -67,6 +68,14 @@ def test_a_measurement_has_its_temperature_where_it_was_measured(record):
     assert list(bare.to_frame().columns) == ["time_s", "current_a", "voltage_v"]
     assert len(bare.plot().data) == 2
     assert repr(bare.take(slice(0, 0))) == "Measurement('measurement', no rows)"
+
+
+def test_a_spectrum_is_short_in_words_and_whole_in_a_table():
+    spectrum = Spectrum(
+        "S1", np.array([1000.0, 1.0, 0.1]), np.array([0.01, 0.02 - 0.01j, 0.03 - 0.005j]), soc=0.5
+    )
+    assert repr(spectrum) == "Spectrum('S1', 3 points, 0.1 to 1e+03 Hz)"
+    assert spectrum.to_frame().z_imag_ohm.tolist() == [0.0, -0.01, -0.005]
 
 
 def test_a_model_and_its_prediction_are_short_in_words(cell, record):

@@ -11,8 +11,8 @@ from aesi.physics import ModelName
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.load import cell_path, locator, virtual_experiment
 from aesi.pipeline.experiment.sections import DiscoverConfig
+from aesi.pipeline.experiment.sources import cell_path, locator, virtual_experiment
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import Hold, Measurement
 

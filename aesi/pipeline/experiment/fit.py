@@ -13,7 +13,8 @@ from typing import Any
 from aesi.conformal import Calibrated, FreeRunBands, RefittedIntervals
 from aesi.pipeline.experiment.candidate import genome_space, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.load import Loaded, cuts
+from aesi.pipeline.experiment.drives import cuts
+from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
 from aesi.sparse import Candidate, Options, Problem

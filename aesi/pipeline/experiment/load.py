@@ -7,16 +7,10 @@ the states that its history gave it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import numpy as np
-
-from aesi.data.read import read
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError
@@ -24,16 +18,13 @@ from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
+from aesi.pipeline.experiment.drives import by_role, cuts, parts, training_drives
 from aesi.pipeline.experiment.physics_models import DECLARED, PhysicsModels, no_rows, physics_models, without
 from aesi.pipeline.experiment.recalibrate import FitRecord
-from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
+from aesi.pipeline.experiment.sources import cell_path, sources_of
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import ROLES, ErrorSeries, HeldOutDrive, Hold, Measurement, Role, Split
+from aesi.records import ErrorSeries, HeldOutDrive, Hold, Split
 from aesi.sparse import with_inputs
-
-if TYPE_CHECKING:
-    from aesi.data.virtual import VirtualExperiment
-
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
@@ -107,36 +98,12 @@ def _called(config: ExperimentConfig) -> str:
     return f"a virtual cell ({virtual.model} of {Path(config.cell.bpx).name} with {mix})"
 
 
-def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
-    """Pieces of a record that repeats a schedule; each training repeat gives its last share to validation."""
-    train, valid = [], []
-    for number in repeats.train:
-        piece = _repeat(series, repeats.period_s, number)
-        cut = round(len(piece) * (1 - repeats.valid_share))
-        train.append(piece.take(slice(0, cut)))
-        if cut < len(piece):
-            valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
-    test = [_repeat(series, repeats.period_s, number) for number in repeats.test]
-    return Split(tuple(train), tuple(valid), tuple(test))
-
-
-def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
-    start = series.time_s[0] + (number - 1) * period_s
-    low, high = np.searchsorted(series.time_s, [start, start + period_s])
-    if high - low < 2:
-        raise DataError(
-            f"{series.name} lasts {series.time_s[-1] - series.time_s[0]:.0f} s and has no repeat {number} of "
-            f"{period_s:g} s; take it out of `repeats`."
-        )
-    return series.take(slice(int(low), int(high)), f"repeat {number}")
-
-
 def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
     given = declared_model(path)
     cell, effects = given.cell, (*given.effects, *_effects(config))
     model = config.cell.model or given.model
-    sources = _virtual(config, path) if config.data.kind == "virtual" else _sources(config)
+    sources = sources_of(config, path)
     soc0: dict[str, float] = {}
     notes: list[str] = []
     records: dict[str, FitRecord] = {}
@@ -149,7 +116,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         records[name] = no_rows(even, start.soc)
-    drives = _training_drives(config.data, records, sources.roles)
+    drives = training_drives(config.data, records, sources.roles)
     for name, rows in drives:
         records[name].rows[rows] = True
     hold = config.data.hold
@@ -163,12 +130,12 @@ def _load(config: ExperimentConfig) -> Loaded:
         notes.append(
             f"{name} runs empty in the model; its stoichiometries were held at the edge from there on."
         )
-    split = _split(config.data, series, sources.roles)
+    split = by_role(config.data, series, sources.roles)
     refitted = config.cell.start == "recalibrated" and len(drives) > 1
     left_out = tuple(
         HeldOutDrive(_without(config, physics, records, drive, rows, piece.name) if refitted else piece, rows)
         for drive, piece in zip(drives, split.train, strict=True)
-        for rows in _parts(len(piece), cuts(config.data))
+        for rows in parts(len(piece), cuts(config.data))
     )
     chosen = physics.chosen
     return Loaded(
@@ -215,37 +182,6 @@ def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:
     )
 
 
-def _training_drives(
-    data: DataConfig, records: Mapping[str, FitRecord], roles: Mapping[Role, Sequence[str]]
-) -> list[tuple[str, slice]]:
-    """Record and rows of each training drive, in the order of `Split.train`."""
-    if data.repeats is None:
-        return [(name, slice(0, len(records[name].rows))) for name in roles["train"]]
-    (name, record), repeats = next(iter(records.items())), data.repeats
-    time = record.measurement.time_s
-    drives = []
-    for number in repeats.train:
-        begin = time[0] + (number - 1) * repeats.period_s
-        low, high = np.searchsorted(time, [begin, begin + repeats.period_s])
-        drives.append((name, slice(int(low), int(low + round((high - low) * (1 - repeats.valid_share))))))
-    return drives
-
-
-def cuts(data: DataConfig) -> int:
-    """Into how many parts a training drive is cut to be left out in turn.
-
-    Repeats of one record lie side by side in the state of charge. A test repeat lies between two of training, half a
-    repeat from either at most, and so does half a repeat from its other half; without a whole one, three repeats are
-    missing in a row, which asks for more than the test.
-    """
-    return 2 if data.repeats is not None else 1
-
-
-def _parts(n: int, count: int) -> list[slice]:
-    edges = np.linspace(0, n, count + 1).round().astype(int)
-    return [slice(int(a), int(b)) for a, b in pairwise(edges)]
-
-
 def _without(
     config: ExperimentConfig,
     fitted: PhysicsModels,
@@ -266,75 +202,9 @@ def _without(
     return series[name].take(rows, called)
 
 
-@dataclass(frozen=True, eq=False)
-class _Sources:
-    """Every record once, with its state of charge at the start where that is known; and names by role."""
-
-    records: dict[str, tuple[Measurement, float | None]]
-    roles: dict[Role, tuple[str, ...]]
-
-
-def _sources(config: ExperimentConfig) -> _Sources:
-    data = config.data
-    where = locator(config)
-    roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
-    names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
-    records: dict[str, tuple[Measurement, float | None]] = {
-        name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
-    }
-    return _Sources(records, roles)
-
-
-def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
-    """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
-    from aesi.data.virtual import Laboratory, paper_experiment
-
-    wanted = config.data.virtual
-    effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
-    laboratory = Laboratory(cell, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
-    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c, wanted.other_load)
-
-
-def _virtual(config: ExperimentConfig, cell: Path) -> _Sources:
-    experiment = virtual_experiment(config, cell)
-    measurements: dict[Role, tuple[Measurement, ...]] = {role: getattr(experiment, role) for role in ROLES}
-    return _Sources(
-        records={m.name: (m, experiment.soc0[m.name]) for role in ROLES for m in measurements[role]},
-        roles={role: tuple(m.name for m in measurements[role]) for role in ROLES},
-    )
-
-
-def _split(data: DataConfig, series: dict[str, ErrorSeries], roles: dict[Role, tuple[str, ...]]) -> Split:
-    if data.repeats:
-        return cut_repeats(next(iter(series.values())), data.repeats)
-    train, valid, test = (tuple(series[name] for name in roles[role]) for role in ROLES)
-    return Split(train, valid, test)
-
-
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:
     files = [config.path(name) for name in config.cell.effect_files]
     try:
         return activated(config.cell.effects.items(), files)
     except InputError as error:
         raise ConfigError(f"{config.name}: cell: {error}") from None
-
-
-def cell_path(config: ExperimentConfig) -> Path:
-    """The BPX file of the experiment's cell. Raises ConfigError or DataError where there is none."""
-    if config.cell.bpx != "catalogue":
-        return config.path(config.cell.bpx)
-    from aesi.data.catalogue import locate
-
-    if config.data.set is None:
-        raise ConfigError("cell.bpx: catalogue needs data.set; give the path of a BPX file.")
-    return locate(config.data.set, "cell.bpx.json")
-
-
-def locator(config: ExperimentConfig) -> Callable[[str], Path]:
-    """Finds the file of a record by its name in the experiment."""
-    if config.data.kind == "files":
-        return config.path
-    from aesi.data.catalogue import locate
-
-    assert config.data.set is not None  # the schema of kind: catalogue
-    return partial(locate, config.data.set)

@@ -175,8 +175,7 @@ def faded(model: SparseModel, problem: Problem, amplitude: float) -> SparseModel
     """The model as it gives way to the physics, where the problem wants that and its terms allow it."""
     if model.has_feedback or not problem.options.fade:
         return model
-    edge = np.ones(len(model.input_names))
-    return replace(model, fade=Fade(amplitude, -edge, edge))
+    return replace(model, fade=Fade(amplitude, problem.region))
 
 
 def sparse_model(

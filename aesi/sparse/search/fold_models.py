@@ -21,6 +21,7 @@ from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import Candidate, sparse_model
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
+from aesi.sparse.trained_region import TrainedRegion
 
 N_PIECES = 12
 """Long enough to drift, short enough that the models without them are nearly the one that is judged."""
@@ -62,8 +63,8 @@ def fold_models(
             leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
         )
         if judged.fade is not None:
-            low, high = problem.inputs[seen].min(axis=0), problem.inputs[seen].max(axis=0)
-            model = replace(model, fade=Fade(judged.fade.amplitude, low, high))
+            region = TrainedRegion.of(problem.inputs[seen], problem.soc[seen], problem.region.tested)
+            model = replace(model, fade=Fade(judged.fade.amplitude, region))
         record, rows = fold_samples(problem, a, b)
         yield model, left_out[i].series if drives and left_out else record, rows
 

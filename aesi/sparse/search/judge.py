@@ -13,7 +13,8 @@ from aesi.records import ErrorSeries
 from aesi.sparse import free_run
 from aesi.sparse.fade import amplitude
 from aesi.sparse.model import SparseModel
-from aesi.sparse.search.problem import Problem, balanced_weights, spans_of
+from aesi.sparse.search.problem import Problem
+from aesi.sparse.search.rows import balanced_weights, spans_of
 
 _MOST_MEMORY = 0.9999
 """Of what is left of an error after a step; at 1 the first error would never be forgotten."""

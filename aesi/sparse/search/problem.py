@@ -15,10 +15,8 @@ cannot tell a good simulator from one that repeats the last measured error.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -34,12 +32,19 @@ from aesi.numerics.blocks import (
 )
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
-from aesi.records import ErrorSeries, Split
-from aesi.sparse.fade import range_weight
+from aesi.records import Split
+from aesi.sparse.search.prepare import not_finite, prepared, variables
+from aesi.sparse.search.rows import (
+    balanced_weights,
+    default_block,
+    fade_of_left_out,
+    left_out_pieces,
+    spans_of,
+)
 from aesi.sparse.terms.basis import FUNCTIONS, values
-from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library, evaluate_terms
 from aesi.sparse.terms.scaling import Outside, Scaling
+from aesi.sparse.trained_region import TrainedRegion, farthest_left_out
 
 Regime = Literal["free_run", "one_step"]
 
@@ -87,7 +92,7 @@ class Problem:
 
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
     error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
-    error, target : (n,) scaled e[k] and e[k + 1].
+    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  region : what a fit to all rows is fitted to.
     counts : (resamples, n) how often each resample holds a row.
     fade : (n,) what is left of a correction at each row by a model that has not seen its fold (fade.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
@@ -108,6 +113,8 @@ class Problem:
     error: Array
     inputs: Array
     target: Array
+    soc: Array
+    region: TrainedRegion
     counts: CountArray
     row_weights: Array
     restart: BoolArray
@@ -126,13 +133,13 @@ class Problem:
         error or all inputs constant, NaN, or fewer rows than library terms.
         """
         options = options or Options()
-        train, valid, notes = _prepared(split, options, library)
+        train, valid, notes = prepared(split, options.inputs, library)
         inputs = train[0].input_names
         library = library or Library.build(
             inputs, options.p_c, options.d, options.factors, options.special, options.mixed
         )
-        scaling = Scaling.of([_variables(record) for record in train], options.outside)
-        scaled = [scaling.apply(_variables(record)[:-1]) for record in train]
+        scaling = Scaling.of([variables(record) for record in train], options.outside)
+        scaled = [scaling.apply(variables(record)[:-1]) for record in train]
         rows = np.vstack(scaled)
         target = np.concatenate([scaling.error_to_scaled(record.error_v[1:]) for record in train])
         n = len(target)
@@ -149,13 +156,15 @@ class Problem:
         )
         block = options.block or default_block(n)
         cut = left_out_pieces(spans, options.fold, options.cuts)
+        soc = np.concatenate([record.soc[:-1] for record in train])
+        region = TrainedRegion.of(rows[:, 1:], soc, farthest_left_out(soc, cut))
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         augmented = np.empty((n, len(library) + 1), order="F")
         for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
             augmented[:, j] = products[product] * error_functions[q]
         augmented[:, -1] = target
         if not np.isfinite(augmented).all():
-            raise DataError(_not_finite(library, augmented))
+            raise DataError(not_finite(library, augmented))
         zero = float(scaling.error_to_scaled(np.array(0.0)))
         row_weights = balanced_weights(spans, target - zero) if options.balance else np.ones(n)
         augmented *= np.sqrt(row_weights)[:, None]
@@ -174,11 +183,13 @@ class Problem:
             error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
             inputs=rows[:, 1:],
             target=target,
+            soc=soc,
+            region=region,
             counts=weights,
             row_weights=row_weights,
             restart=starts_mask(pieces(spans, options.horizon or block), n),
             folds=cut,
-            fade=_fade(rows[:, 1:], cut),
+            fade=fade_of_left_out(rows[:, 1:], soc, cut, region.tested),
             factors=every[: len(weights)],
             fold_factors=every[len(weights) :],
             full_factor=r,
@@ -231,120 +242,3 @@ class Problem:
         return np.asarray(
             self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
         )
-
-
-def default_block(n: int) -> int:
-    """Rows of a block where none is asked for: the paper's 500, or a tenth of fewer than 5,000 rows."""
-    return min(500, max(10, n // 10))
-
-
-def left_out_pieces(spans: Sequence[Span], fold: int | None, cuts: int) -> tuple[Span, ...]:
-    """Pieces of about `fold` rows; where none is asked for, records cut into `cuts`, or eighths of a single one."""
-    if fold is None and len(spans) > 1:
-        return tuple(piece for a, b in spans for piece in cut_evenly(a, b, cuts))
-    return tuple(pieces(spans, fold or max(10, spans[-1][1] // 8)))
-
-
-def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
-    """The rows a to b - 1 in consecutive pieces."""
-    edges = np.linspace(a, b, cuts + 1).round().astype(int)
-    return [(int(p), int(q)) for p, q in pairwise(edges)]
-
-
-def _fade(inputs: Array, folds: Sequence[Span]) -> Array:
-    """(n,) by how far each row's scaled inputs lie outside the range of the other folds."""
-    parts = []
-    for a, b in folds:
-        others = np.delete(inputs, np.s_[a:b], axis=0)
-        parts.append(range_weight(inputs[a:b], others.min(axis=0), others.max(axis=0)))
-    return np.concatenate(parts)
-
-
-LEAST_SHARE = 0.1
-"""A record whose bare error is smaller than this share of the mean counts as if it were this large: a record on
-which the physics is all but exact should not rule the fit."""
-
-
-def balanced_weights(spans: Sequence[Span], bare: Array) -> Array:
-    """(n,) mean 1: a weight a row, by which every record's bare error (n,) adds the same to a sum of squares."""
-    squares = np.array([np.sum(bare[a:b] ** 2) for a, b in spans])
-    sizes = np.array([b - a for a, b in spans])
-    each = 1.0 / np.maximum(squares, LEAST_SHARE * squares.mean())
-    weights: Array = np.repeat(each, sizes)
-    return weights / weights.mean()
-
-
-def _prepared(
-    split: Split, options: Options, library: Library | None
-) -> tuple[tuple[ErrorSeries, ...], tuple[ErrorSeries, ...], tuple[str, ...]]:
-    if not split.train:
-        raise DataError("there are no training records.")
-    notes: tuple[str, ...] = ()
-    names = options.inputs or split.train[0].input_names
-    if library is not None:
-        names = library.variables[1:]
-    train = [with_inputs(record, names) for record in split.train]
-    for record in train:
-        _check(record, train[0].dt_s)
-    if np.ptp(np.concatenate([record.error_v for record in train])) == 0:
-        raise DataError("the voltage error is constant over the training records: there is nothing to learn.")
-    if library is None:
-        names, notes = _useful_inputs(train)
-    return (
-        tuple(with_inputs(record, names) for record in train),
-        tuple(with_inputs(record, names) for record in split.valid),
-        notes,
-    )
-
-
-def _check(record: ErrorSeries, dt_s: float) -> None:
-    if len(record) < 3:
-        raise DataError(f"{record.name}: {len(record)} samples are too few; a record needs at least 3.")
-    if abs(record.dt_s / dt_s - 1.0) > 0.01:
-        raise DataError(
-            f"{record.name} is sampled every {record.dt_s:g} s, the first record every {dt_s:g} s."
-        )
-    for name, column in zip(("error_v", *record.input_names), _variables(record).T, strict=True):
-        if not np.isfinite(column).all():
-            k = int(np.flatnonzero(~np.isfinite(column))[0])
-            raise DataError(f"{record.name}: {name} is not a number at sample {k}; cut or repair the record.")
-
-
-def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Names of inputs that vary and do not repeat an earlier one up to scaling; notes on the others."""
-    columns = np.vstack([record.inputs for record in train])
-    kept: dict[str, Array] = {}
-    notes = []
-    for name, column in zip(train[0].input_names, columns.T, strict=True):
-        spread = np.ptp(column)
-        if spread <= 1e-12 * np.abs(column).max():
-            notes.append(f"{name} is constant over the training records; its terms were left out.")
-            continue
-        unit = (column - column.min()) / spread
-        twin = next(
-            (other for other, known in kept.items() if np.allclose(unit, known, rtol=0, atol=1e-12)), None
-        )
-        if twin is not None:
-            notes.append(f"{name} repeats {twin} up to scale; its terms were left out.")
-            continue
-        kept[name] = unit
-    if not kept:
-        raise DataError("every input is constant over the training records: there is nothing to learn from.")
-    return tuple(kept), tuple(notes)
-
-
-def _variables(record: ErrorSeries) -> Array:
-    return np.column_stack([record.error_v, record.inputs])
-
-
-def spans_of(lengths: Sequence[int]) -> tuple[Span, ...]:
-    """Row ranges of records of these lengths, put one after the other."""
-    edges = np.concatenate([[0], np.cumsum(lengths)])
-    return tuple((int(a), int(b)) for a, b in pairwise(edges))
-
-
-def _not_finite(library: Library, theta: Array) -> str:
-    j = int(np.flatnonzero(~np.isfinite(theta).all(axis=0))[0])
-    k = int(np.flatnonzero(~np.isfinite(theta[:, j]))[0])
-    name = (*library.names, "the target")[j]
-    return f"{name} is not a number at training row {k}; keep scaled inputs within [-1, 1] (outside='clip')."

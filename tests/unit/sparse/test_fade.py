@@ -12,7 +12,7 @@ from aesi.records import Split
 from aesi.sparse import Candidate, Genome, Options, Problem, SparseModel, evaluate
 from aesi.sparse.baselines.dmd_c import dmd_with_control
 from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
-from aesi.sparse.fade import DOUBT, range_weight, shrunken
+from aesi.sparse.fade import DOUBT, shrunken
 from aesi.sparse.search.nested import nested_shares
 
 OPTIONS = Options(p_c=2, d=2, special=False, mixed=False, resamples=20, block=60, fade=True)
@@ -27,12 +27,6 @@ def fitted(records) -> tuple[Problem, Candidate]:
     candidate = evaluate(problem, Genome.whole(problem.library, 1e-1, 1e-3, 0.5, p_c=2, d=2, feedback=False))
     assert isinstance(candidate, Candidate)
     return problem, candidate
-
-
-def test_the_weight_is_one_inside_and_a_half_at_the_stated_distance():
-    scaled = np.array([[0.0, 0.0], [1.0, -1.0], [1.1, 0.0], [3.0, 0.0]])
-    weight = range_weight(scaled, np.array([-1.0, -1.0]), np.array([1.0, 1.0]))
-    np.testing.assert_allclose(weight, [1.0, 1.0, 0.5, 1.0 / 401.0])
 
 
 def sums(slopes, size=1.0):

@@ -1,0 +1,79 @@
+"""Drives: the records, or repeats of one record, that train, validate and test; and the parts left out in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.pipeline.experiment.recalibrate import FitRecord
+from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
+from aesi.records import ROLES, ErrorSeries, Role, Split
+
+
+def by_role(
+    data: DataConfig, series: Mapping[str, ErrorSeries], roles: Mapping[Role, Sequence[str]]
+) -> Split:
+    """Whole records, or the repeats of the only one, by role."""
+    if data.repeats:
+        return cut_repeats(next(iter(series.values())), data.repeats)
+    train, valid, test = (tuple(series[name] for name in roles[role]) for role in ROLES)
+    return Split(train, valid, test)
+
+
+def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
+    """Pieces of a record that repeats a schedule; each training repeat gives its last share to validation."""
+    train, valid = [], []
+    for number in repeats.train:
+        piece = _repeat(series, repeats.period_s, number)
+        cut = round(len(piece) * (1 - repeats.valid_share))
+        train.append(piece.take(slice(0, cut)))
+        if cut < len(piece):
+            valid.append(piece.take(slice(cut, len(piece)), f"{piece.name}, end"))
+    test = [_repeat(series, repeats.period_s, number) for number in repeats.test]
+    return Split(tuple(train), tuple(valid), tuple(test))
+
+
+def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
+    start = series.time_s[0] + (number - 1) * period_s
+    low, high = np.searchsorted(series.time_s, [start, start + period_s])
+    if high - low < 2:
+        raise DataError(
+            f"{series.name} lasts {series.time_s[-1] - series.time_s[0]:.0f} s and has no repeat {number} of "
+            f"{period_s:g} s; take it out of `repeats`."
+        )
+    return series.take(slice(int(low), int(high)), f"repeat {number}")
+
+
+def training_drives(
+    data: DataConfig, records: Mapping[str, FitRecord], roles: Mapping[Role, Sequence[str]]
+) -> list[tuple[str, slice]]:
+    """Record and rows of each training drive, in the order of `Split.train`."""
+    if data.repeats is None:
+        return [(name, slice(0, len(records[name].rows))) for name in roles["train"]]
+    (name, record), repeats = next(iter(records.items())), data.repeats
+    time = record.measurement.time_s
+    drives = []
+    for number in repeats.train:
+        begin = time[0] + (number - 1) * repeats.period_s
+        low, high = np.searchsorted(time, [begin, begin + repeats.period_s])
+        drives.append((name, slice(int(low), int(low + round((high - low) * (1 - repeats.valid_share))))))
+    return drives
+
+
+def cuts(data: DataConfig) -> int:
+    """Into how many parts a training drive is cut to be left out in turn.
+
+    Repeats of one record lie side by side in the state of charge. A test repeat lies between two of training, half a
+    repeat from either at most, and so does half a repeat from its other half; without a whole one, three repeats are
+    missing in a row, which asks for more than the test.
+    """
+    return 2 if data.repeats is not None else 1
+
+
+def parts(n: int, count: int) -> list[slice]:
+    """n rows in consecutive parts of like length."""
+    edges = np.linspace(0, n, count + 1).round().astype(int)
+    return [slice(int(a), int(b)) for a, b in pairwise(edges)]

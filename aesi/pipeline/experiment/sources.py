@@ -1,0 +1,80 @@
+"""Where the records of an experiment come from: files, the catalogue, or the virtual laboratory; and its cell file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aesi.data.read import read
+from aesi.data.virtual import DEFAULT_MIX
+from aesi.errors import ConfigError
+from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.records import ROLES, Measurement, Role
+
+if TYPE_CHECKING:
+    from aesi.data.virtual import VirtualExperiment
+
+
+@dataclass(frozen=True, eq=False)
+class Sources:
+    """Every record once, with its state of charge at the start where that is known; and names by role."""
+
+    records: dict[str, tuple[Measurement, float | None]]
+    roles: dict[Role, tuple[str, ...]]
+
+
+def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
+    """What the experiment names; cell : the BPX file from which virtual records are made."""
+    if config.data.kind == "virtual":
+        return _virtual(config, cell)
+    data = config.data
+    where = locator(config)
+    roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
+    names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
+    records: dict[str, tuple[Measurement, float | None]] = {
+        name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
+    }
+    return Sources(records, roles)
+
+
+def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
+    """The records of kind: virtual, made by the laboratory from the cell file, or found in its cache."""
+    from aesi.data.virtual import Laboratory, paper_experiment
+
+    wanted = config.data.virtual
+    effects = DEFAULT_MIX if wanted.effects is None else wanted.effects
+    laboratory = Laboratory(cell, wanted.model, effects, wanted.magnitude, seed=wanted.seed)
+    return paper_experiment(laboratory, config.data.dt_s, wanted.pulse_c, wanted.other_load)
+
+
+def _virtual(config: ExperimentConfig, cell: Path) -> Sources:
+    experiment = virtual_experiment(config, cell)
+    measurements: dict[Role, tuple[Measurement, ...]] = {role: getattr(experiment, role) for role in ROLES}
+    return Sources(
+        records={m.name: (m, experiment.soc0[m.name]) for role in ROLES for m in measurements[role]},
+        roles={role: tuple(m.name for m in measurements[role]) for role in ROLES},
+    )
+
+
+def cell_path(config: ExperimentConfig) -> Path:
+    """The BPX file of the experiment's cell. Raises ConfigError or DataError where there is none."""
+    if config.cell.bpx != "catalogue":
+        return config.path(config.cell.bpx)
+    from aesi.data.catalogue import locate
+
+    if config.data.set is None:
+        raise ConfigError("cell.bpx: catalogue needs data.set; give the path of a BPX file.")
+    return locate(config.data.set, "cell.bpx.json")
+
+
+def locator(config: ExperimentConfig) -> Callable[[str], Path]:
+    """Finds the file of a record by its name in the experiment."""
+    if config.data.kind == "files":
+        return config.path
+    from aesi.data.catalogue import locate
+
+    assert config.data.set is not None  # the schema of kind: catalogue
+    return partial(locate, config.data.set)

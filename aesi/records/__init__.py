@@ -1,0 +1,29 @@
+"""Frozen records that pass between the rooms: data, simulations, error series, failures.
+
+SI units and seconds; current is positive on discharge; voltage error e = V_measured - V_model, in volts.
+"""
+
+from aesi.records.error_series import INPUT_NAMES, ErrorModel, ErrorSeries, FreeRun
+from aesi.records.failed import Failed
+from aesi.records.measurement import Hold, Measurement, Spectrum, assumed_hold, digest, hold_sentence
+from aesi.records.run import Run
+from aesi.records.split import ROLES, HeldOutDrive, Role, Split
+
+__all__ = [
+    "INPUT_NAMES",
+    "ROLES",
+    "ErrorModel",
+    "ErrorSeries",
+    "Failed",
+    "FreeRun",
+    "HeldOutDrive",
+    "Hold",
+    "Measurement",
+    "Role",
+    "Run",
+    "Spectrum",
+    "Split",
+    "assumed_hold",
+    "digest",
+    "hold_sentence",
+]

@@ -1,0 +1,108 @@
+"""The voltage error over a record, what may drive it, and what every model of it offers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import extent
+from aesi.records.measurement import digest
+
+INPUT_NAMES = ("I", "c_sp", "c_sn", "c_e0", "c_eL")
+"""The inputs U of the sparse model, in the paper's order."""
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorSeries:
+    """The voltage error over one continuous, evenly sampled record, and what may drive it.
+
+    error_v : (n,) V, V_measured - V_model.  inputs : (n, n_inputs) SI, columns `input_names`.
+    soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
+    physics : name -> (n,) V, what other physics models say of the same record, for comparison.
+    The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
+    """
+
+    name: str
+    dt_s: float
+    time_s: Array
+    error_v: Array
+    inputs: Array
+    soc: Array
+    model_v: Array
+    input_names: tuple[str, ...] = INPUT_NAMES
+    physics: Mapping[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.error_v)
+
+    def __repr__(self) -> str:
+        return f"ErrorSeries({self.name!r}, {extent(self.time_s)}, inputs {', '.join(self.input_names)})"
+
+    @property
+    def current_a(self) -> Array:
+        """(n,) A, discharge positive."""
+        return self.inputs[:, self.input_names.index("I")]
+
+    @property
+    def digest(self) -> str:
+        """Content hash of error and inputs."""
+        return digest(self.error_v, self.inputs)
+
+    def take(self, rows: slice, name: str | None = None) -> ErrorSeries:
+        """A contiguous piece of the record."""
+        return replace(
+            self,
+            name=name or self.name,
+            time_s=self.time_s[rows],
+            error_v=self.error_v[rows],
+            inputs=self.inputs[rows],
+            soc=self.soc[rows],
+            model_v=self.model_v[rows],
+            physics={name: voltage[rows] for name, voltage in self.physics.items()},
+        )
+
+    def left_by(self, name: str) -> Array:
+        """(n,) V: measured minus what the named physics model says; of the model itself where nothing else is known."""
+        other = self.physics.get(name)
+        return self.error_v if other is None else self.error_v + self.model_v - other
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRun:
+    """A prediction without measured voltage after its start.
+
+    error_v : (n,) V, the predicted error; held at its last value inside the range after a divergence.
+    diverged_at : the first sample at which the prediction left ten times the trained range, or None.
+    outside : (n,) True where an input lies outside the range the model was trained on.
+    excess : (n,) how far the sample lies from what the model was fitted to, 0 where not at all: of its leverage, in
+    units of that of the fitted rows (`aesi.sparse.leverage`); None where the model cannot tell.
+    """
+
+    error_v: Array
+    diverged_at: int | None
+    outside: BoolArray
+    excess: Array | None = None
+
+
+class ErrorModel(Protocol):
+    """What every model of the voltage error offers: sparse ensembles, baselines, the bare ESPM (zero)."""
+
+    @property
+    def name(self) -> str:
+        """What tables call it."""
+        ...
+
+    def one_step(self, series: ErrorSeries) -> Array:
+        """(n,) V: the prediction of error_v[k] given the measured error_v[k - 1]; the first is error_v[0]."""
+        ...
+
+    def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
+        """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
+        ...
+
+    def k_step(self, series: ErrorSeries, steps: int) -> Array:
+        """(n,) V: the prediction of error_v[k] given error_v[k - steps] and the inputs since; first
+        `steps` values as in a free run from the first sample."""
+        ...

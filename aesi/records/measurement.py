@@ -1,0 +1,152 @@
+"""What was measured: a test of current and voltage, an impedance spectrum, and how a current runs between rows."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array, ComplexArray
+from aesi.over_time import extent, over_time
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from plotly.graph_objects import Figure
+
+Hold = Literal["linear", "backward"]
+"""How the current runs between samples: straight lines, or constant since the row before (as loggers do)."""
+
+
+SLOW_SAMPLING_S = 5.0
+"""Rows further apart than this are a logger's, which writes at the end of an interval; closer ones hardly differ."""
+
+
+def assumed_hold(time_s: Array) -> Hold:
+    """How the current runs between rows where nobody says: constant since the row before where rows are far apart."""
+    return "backward" if float(np.diff(time_s).max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
+
+
+def hold_sentence(name: str, hold: Hold, declared: bool) -> str:
+    """What was taken, for a reader."""
+    words = {
+        "linear": "in straight lines between rows",
+        "backward": "constant since the row before, as loggers write",
+    }
+    other = {"linear": "backward", "backward": "linear"}[hold]
+    return f"{name}: the current is taken {words[hold]}" + (
+        " as declared." if declared else f"; --hold {other} takes it otherwise."
+    )
+
+
+def digest(*arrays: Array | None) -> str:
+    """SHA-256 of the bytes of the arrays, 16 hexadecimal digits; None counts as an empty array."""
+    sha = hashlib.sha256()
+    for array in arrays:
+        sha.update(b"|" if array is None else np.ascontiguousarray(array, dtype=float).tobytes())
+    return sha.hexdigest()[:16]
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One continuous test of one cell.
+
+    time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V.
+    temperature_degc : (n,) degC, or None where it was not measured.
+    notes : what a reader dropped, mapped or resampled, one sentence each.
+    hold : how the current runs between rows, where it was declared; else `assumed_hold` tells.
+    """
+
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+    temperature_degc: Array | None = None
+    name: str = "measurement"
+    source: str = ""
+    notes: tuple[str, ...] = ()
+    hold: Hold | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.time_s)
+        for label in ("current_a", "voltage_v", "temperature_degc"):
+            column = getattr(self, label)
+            if column is not None and len(column) != n:
+                raise DataError(f"{self.name}: {label} has {len(column)} rows, time_s has {n}.")
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def __repr__(self) -> str:
+        warm = "" if self.temperature_degc is None else ", with temperature"
+        return f"Measurement({self.name!r}, {extent(self.time_s)}{warm})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The columns as a table, one row a sample; the temperature where it was measured."""
+        import pandas as pd
+
+        columns = {
+            name: getattr(self, name) for name in ("time_s", "current_a", "voltage_v", "temperature_degc")
+        }
+        return pd.DataFrame({name: values for name, values in columns.items() if values is not None})
+
+    def plot(self) -> Figure:
+        """Voltage, current and temperature over time: a plotly figure."""
+        panels = {"voltage, V": {"measured": self.voltage_v}, "current, A": {"current": self.current_a}}
+        if self.temperature_degc is not None:
+            panels["temperature, degC"] = {"temperature": self.temperature_degc}
+        return over_time(self.time_s, panels)
+
+    @property
+    def digest(self) -> str:
+        """Content hash of the four columns."""
+        return digest(self.time_s, self.current_a, self.voltage_v, self.temperature_degc)
+
+    def held(self, hold: Hold | None) -> Measurement:
+        """The record with how its current was declared to run between rows."""
+        return replace(self, hold=hold)
+
+    def take(self, rows: slice | Array) -> Measurement:
+        """The given rows, as a measurement of the same name."""
+        temperature = None if self.temperature_degc is None else self.temperature_degc[rows]
+        return replace(
+            self,
+            time_s=self.time_s[rows],
+            current_a=self.current_a[rows],
+            voltage_v=self.voltage_v[rows],
+            temperature_degc=temperature,
+        )
+
+    def between(self, start_s: float, stop_s: float) -> Measurement:
+        """The rows with start_s <= time_s < stop_s."""
+        low, high = np.searchsorted(self.time_s, [start_s, stop_s])
+        return self.take(slice(int(low), int(high)))
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One impedance spectrum of a cell at rest.
+
+    frequency_hz : (n,) Hz.  z_ohm : (n,) ohm, the imaginary part negative where capacitive.
+    soc or discharged_ah (since full) : the state.  temperature_degc, voltage_v : None where not measured.
+    """
+
+    name: str
+    frequency_hz: Array
+    z_ohm: ComplexArray
+    soc: float | None = None
+    discharged_ah: float | None = None
+    voltage_v: float | None = None
+    temperature_degc: float | None = None
+
+    def __repr__(self) -> str:
+        low, high = float(self.frequency_hz.min()), float(self.frequency_hz.max())
+        return f"Spectrum({self.name!r}, {len(self.frequency_hz)} points, {low:.3g} to {high:.3g} Hz)"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Frequency and impedance as a table, one row a point."""
+        import pandas as pd
+
+        real, imag = self.z_ohm.real, self.z_ohm.imag
+        return pd.DataFrame({"frequency_hz": self.frequency_hz, "z_real_ohm": real, "z_imag_ohm": imag})

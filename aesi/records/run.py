@@ -1,0 +1,59 @@
+"""What a simulation gives back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from aesi.numerics.typing import Array
+from aesi.over_time import extent, over_time
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from plotly.graph_objects import Figure
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One simulation: voltage and the internal states, a value a sample.
+
+    series : name -> (n,) array. Always there: c_sp, c_sn (surface, mol/m3), c_e0, c_eL (electrolyte at the
+    negative and the positive current collector, mol/m3), soc, temperature_k; effects add their own.
+    profiles : across the electrodes, where they were asked for: x_m (places,) from the negative collector, and by
+    sample and place (n, places): surface_stoichiometry, reaction_a_m2 of particle surface (delithiation positive),
+    electrolyte_mol_m3, and potential_v of the solid against the electrolyte.
+    """
+
+    time_s: Array
+    current_a: Array
+    voltage_v: Array
+    series: dict[str, Array] = field(default_factory=dict)
+    profiles: dict[str, Array] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def __repr__(self) -> str:
+        low, high = float(self.voltage_v.min()), float(self.voltage_v.max())
+        return f"Run({extent(self.time_s)}, {low:.3f} to {high:.3f} V, states {', '.join(self.series)})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """Time, current, voltage and states as a table, one row a sample."""
+        import pandas as pd
+
+        columns = {"time_s": self.time_s, "current_a": self.current_a, "voltage_v": self.voltage_v}
+        return pd.DataFrame(columns | self.series)
+
+    def plot(self) -> Figure:
+        """Voltage, current and state of charge over time: a plotly figure."""
+        panels = {"voltage, V": {"simulated": self.voltage_v}, "current, A": {"current": self.current_a}}
+        if "soc" in self.series:
+            panels["state of charge"] = {"state of charge": self.series["soc"]}
+        return over_time(self.time_s, panels)
+
+    @property
+    def states(self) -> pd.DataFrame:
+        """The series as a table, one row a sample."""
+        import pandas as pd
+
+        return pd.DataFrame(self.series)

@@ -1,0 +1,89 @@
+"""Records as a search takes them: with the inputs that say something, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+from aesi.records import ErrorSeries, Split
+from aesi.sparse.terms.inputs import with_inputs
+from aesi.sparse.terms.library import Library
+
+
+def prepared(
+    split: Split, inputs: tuple[str, ...] | None, library: Library | None
+) -> tuple[tuple[ErrorSeries, ...], tuple[ErrorSeries, ...], tuple[str, ...]]:
+    """Training and validation records with their inputs, and a sentence for each input that was left out.
+
+    inputs : names, by default those of the records; a library's own go first. Raises DataError for nothing to learn.
+    """
+    if not split.train:
+        raise DataError("there are no training records.")
+    notes: tuple[str, ...] = ()
+    names = inputs or split.train[0].input_names
+    if library is not None:
+        names = library.variables[1:]
+    train = [with_inputs(record, names) for record in split.train]
+    for record in train:
+        _check(record, train[0].dt_s)
+    if np.ptp(np.concatenate([record.error_v for record in train])) == 0:
+        raise DataError("the voltage error is constant over the training records: there is nothing to learn.")
+    if library is None:
+        names, notes = _useful_inputs(train)
+    return (
+        tuple(with_inputs(record, names) for record in train),
+        tuple(with_inputs(record, names) for record in split.valid),
+        notes,
+    )
+
+
+def _check(record: ErrorSeries, dt_s: float) -> None:
+    if len(record) < 3:
+        raise DataError(f"{record.name}: {len(record)} samples are too few; a record needs at least 3.")
+    if abs(record.dt_s / dt_s - 1.0) > 0.01:
+        raise DataError(
+            f"{record.name} is sampled every {record.dt_s:g} s, the first record every {dt_s:g} s."
+        )
+    for name, column in zip(("error_v", *record.input_names), variables(record).T, strict=True):
+        if not np.isfinite(column).all():
+            k = int(np.flatnonzero(~np.isfinite(column))[0])
+            raise DataError(f"{record.name}: {name} is not a number at sample {k}; cut or repair the record.")
+
+
+def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of inputs that vary and do not repeat an earlier one up to scaling; notes on the others."""
+    columns = np.vstack([record.inputs for record in train])
+    kept: dict[str, Array] = {}
+    notes = []
+    for name, column in zip(train[0].input_names, columns.T, strict=True):
+        spread = np.ptp(column)
+        if spread <= 1e-12 * np.abs(column).max():
+            notes.append(f"{name} is constant over the training records; its terms were left out.")
+            continue
+        unit = (column - column.min()) / spread
+        twin = next(
+            (other for other, known in kept.items() if np.allclose(unit, known, rtol=0, atol=1e-12)), None
+        )
+        if twin is not None:
+            notes.append(f"{name} repeats {twin} up to scale; its terms were left out.")
+            continue
+        kept[name] = unit
+    if not kept:
+        raise DataError("every input is constant over the training records: there is nothing to learn from.")
+    return tuple(kept), tuple(notes)
+
+
+def variables(record: ErrorSeries) -> Array:
+    """(n, 1 + n_inputs) the error first."""
+    return np.column_stack([record.error_v, record.inputs])
+
+
+def not_finite(library: Library, theta: Array) -> str:
+    """Which term, or the target, of (n, m + 1) is not a number, and where."""
+    j = int(np.flatnonzero(~np.isfinite(theta).all(axis=0))[0])
+    k = int(np.flatnonzero(~np.isfinite(theta[:, j]))[0])
+    name = (*library.names, "the target")[j]
+    return f"{name} is not a number at training row {k}; keep scaled inputs within [-1, 1] (outside='clip')."
