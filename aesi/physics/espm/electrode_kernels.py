@@ -28,6 +28,8 @@ SMALLEST_EXPONENT, LARGEST_EXPONENT = -60.0, 60.0
 NEWTON_STEPS = 60
 NEWTON_TOLERANCE_V = 1e-11
 SMALLEST_SLOPE = 1e-9
+SMALLEST_SHARE = 1e-12
+"""Of a double layer's mean current over a step, at its end."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -73,15 +75,34 @@ def end_weight(z):  # type: ignore[no-untyped-def]
     return 1.0 / (1.0 - math.exp(-min(z, LARGEST_EXPONENT))) - 1.0 / z
 
 
+@njit(inline="always", fastmath=FASTMATH)
+def relaxed(z):  # type: ignore[no-untyped-def]
+    """Current at the end of a step of z time constants over its mean, of an exponential that a jump began."""
+    return z / math.expm1(min(z, LARGEST_EXPONENT)) if z > 1e-6 else 1.0 - 0.5 * z
+
+
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
 def solve_electrode(  # type: ignore[no-untyped-def]
-    lo, hi, side, total, dt, thermal, temperature_rise, chi, exchange_factor, particles, surfaces, memory
+    lo,
+    hi,
+    side,
+    total,
+    dt,
+    held,
+    thermal,
+    temperature_rise,
+    chi,
+    exchange_factor,
+    particles,
+    surfaces,
+    memory,
 ):
     """Currents y[lo:hi] of the units of one electrode; returns Phi.
 
-    total : A/m2 of cell, positive for delithiation.  thermal : R T / F, V.  chi : 2 (1 - t+) R T / F, V.
-    exchange_factor : of temperature.  particles, surfaces, memory : see `layout`; memory.delta and memory.layer are
-    old in, new out.
+    total : A/m2 of cell, positive for delithiation.  held : whether it jumped to this where the step began; a double
+    layer's current is then no continuation of the last one, and would ring.  thermal : R T / F, V.
+    chi : 2 (1 - t+) R T / F, V.  exchange_factor : of temperature.  particles, surfaces, memory : see `layout`;
+    memory.delta and memory.layer are old in, new out.
     """
     region_of, share, exchange = particles.place[:, 1], particles.share, particles.exchange
     ocp, entropic, rate = surfaces.ocp[side], surfaces.entropic[side], surfaces.rate[side]
@@ -95,7 +116,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
     matrix = work[2 : 3 + n, : n + 2]
     new_delta, gain, fitted, new_current = work[3 + n], work[4 + n], work[5 + n], work[6 + n]
     new_current[:] = 0.0
-    phi = 0.0
+    phi, least, most = 0.0, -math.inf, math.inf
     for step in range(NEWTON_STEPS):
         for r in range(regions):
             region_total[first + r] = 0.0
@@ -125,9 +146,11 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                 extra, d_extra = 0.0, 0.0
                 if capacity > 0.0 and dt > 0.0:
                     if step == 0:
-                        fitted[r] = end_weight(dt / (capacity * slope[i]))
-                    charging = capacity * (potential[i] - delta[first + r]) / dt
-                    charging = (charging - (1.0 - fitted[r]) * dl_current[first + r]) / fitted[r]
+                        z = dt / (capacity * slope[i])
+                        fitted[r] = 1.0 / max(relaxed(z), SMALLEST_SHARE) if held else end_weight(z)
+                    charging = capacity * (potential[i] - delta[first + r]) / (dt * fitted[r])
+                    if not held:
+                        charging -= (1.0 - fitted[r]) / fitted[r] * dl_current[first + r]
                     new_current[r] = charging
                     extra += charging
                     d_extra += capacity / (dt * fitted[r])
@@ -144,11 +167,19 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                 region_total[first + r] += extra
                 gain[i] += d_extra * slope[i]
         if n == 1:
-            phi = potential[0] + ohm[0, 0] * region_total[first] + chi * log_salt[first]
+            phi = potential[0] + ohm[0, 0] * total + chi * log_salt[first]
             off = region_total[first] - total
+            region_total[first] = total
             if abs(off) * slope[0] < NEWTON_TOLERANCE_V * gain[0]:
                 break
-            y[lo] -= off / gain[0]
+            # What is given grows with y, but as a logarithm far out, where Newton's step leaps to the other side.
+            if off > 0.0:
+                most = y[lo]
+            else:
+                least = y[lo]
+            ahead = y[lo] - off / gain[0]
+            bracketed = least < ahead < most or math.isinf(least) or math.isinf(most)
+            y[lo] = ahead if bracketed else 0.5 * (least + most)
             continue
         if step == 0:
             phi = potential[0]
