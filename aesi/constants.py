@@ -4,4 +4,7 @@ FARADAY_C_MOL = 96485.33212331001
 GAS_CONSTANT_J_MOL_K = 8.31446261815324
 SECONDS_PER_HOUR = 3600.0
 ZERO_CELSIUS_K = 273.15
+"""Exact, as the units themselves."""
 MV_PER_V = 1000.0
+MILLI = 1000.0
+"""Thousandths in one: mohm of an ohm."""

@@ -1,6 +1,7 @@
 """Prediction intervals of the voltage error: one step ahead, online; and free run, by horizon."""
 
-from aesi.conformal.free_run import WHOLE_DRIVE, FreeRunBands
+from aesi.conformal.free_run import FreeRunBands
+from aesi.conformal.horizon_band import WHOLE_DRIVE
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.online.calibrated import Calibrated, Stream
 from aesi.conformal.online.method import Method

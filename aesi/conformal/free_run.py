@@ -29,97 +29,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
 
+from aesi.conformal.horizon_band import HorizonBand, calibrated_band
 from aesi.conformal.intervals import Intervals
-from aesi.conformal.local_scale import LocalScale, covariates
-from aesi.errors import FitError, InputError
+from aesi.conformal.local_scale import covariates
+from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.records import ErrorSeries, FreeRun
 
 SCHEMA = "aesi.free_run_bands/3"
-WHOLE_DRIVE = math.inf
-"""The horizon of a prediction from the start of a record to its end."""
-N_PIECES = 8
-"""Records longer than this share of all are cut, so that a scale can be scored on what it has not seen."""
-MIN_PIECES = 3
-"""Fewer pieces cannot say how much one differs from the next: where the rows inside the trained range make fewer, all
-rows are used and the band says so; where even these do, there is none."""
-MIN_ROWS = 30
-"""Rows from which a piece counts."""
-FORGOTTEN = 100
-"""Horizons after which errors count as independent; a judgement, `aesi bench bands` shows what it gives."""
-N_LEVELS = 101
-"""Quantiles that stand for the scores of a piece: coverage is kept to about one per cent."""
-HALVINGS = 14
-"""Of the interval that holds the half-width: to a ten-thousandth of it."""
-
-
-@dataclass(frozen=True, eq=False)
-class HorizonBand:
-    """One horizon, by (1) and (2).
-
-    scales : one a piece, fitted to the others.  scores : (n_pieces, n_levels) |error| / scale of each piece,
-    its quantiles at even levels from 0 to 1.  counts : (n_pieces,) rows of each piece.  widening : k.
-    by_piece : share of each piece whose score lies within the 1 - alpha quantile of all scores.
-    extrapolated : whether rows outside the trained range had to be counted, for want of others.
-    """
-
-    horizon_s: float
-    alpha: float
-    scales: tuple[LocalScale, ...]
-    scores: Array
-    counts: Array
-    widening: float
-    by_piece: tuple[float, ...]
-    extrapolated: bool = False
-
-    def half_width(self, columns: Array) -> Array:
-        """(n,) V; columns : (n, p) of `local_scale.covariates`."""
-        scales = np.array([scale(columns) for scale in self.scales])
-        levels = np.linspace(0, 1, self.scores.shape[1])
-        own = np.array([np.interp(1 - self.alpha, levels, scores) for scores in self.scores])
-        # The quantile of the mixture lies between those of its parts.
-        low, high = (own[:, None] * scales).min(axis=0), (own[:, None] * scales).max(axis=0)
-        for _ in range(HALVINGS):
-            middle = 0.5 * (low + high)
-            reached = sum(
-                count * np.interp(middle / scale, scores, levels)
-                for count, scale, scores in zip(self.counts, scales, self.scores, strict=True)
-            )
-            enough = reached >= (1 - self.alpha) * self.counts.sum()
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        return self.widening * high
-
-    def to_state(self) -> SavedState:
-        """Plain values and numpy arrays only; the whole drive's horizon is None."""
-        return {
-            "horizon_s": self.horizon_s if math.isfinite(self.horizon_s) else None,
-            "scales": [scale.to_state() for scale in self.scales],
-            "scores": self.scores,
-            "counts": self.counts,
-            "widening": self.widening,
-            "by_piece": list(self.by_piece),
-            "extrapolated": self.extrapolated,
-        }
-
-    @classmethod
-    def from_state(cls, state: SavedState, alpha: float) -> Self:
-        """Inverse of `to_state`."""
-        return cls(
-            WHOLE_DRIVE if state["horizon_s"] is None else float(state["horizon_s"]),
-            alpha,
-            tuple(LocalScale.from_state(scale) for scale in state["scales"]),
-            np.asarray(state["scores"], dtype=float),
-            np.asarray(state["counts"], dtype=float),
-            float(state["widening"]),
-            tuple(float(share) for share in state["by_piece"]),
-            bool(state["extrapolated"]),
-        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,7 +81,7 @@ class FreeRunBands:
         columns = [covariates(i, s, dt_s, x) for i, s, x in zip(current_a, soc, beyond, strict=True)]
         usable = inside or [np.ones(len(c), dtype=bool) for c in columns]
         bands = [
-            _calibrate(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s)
+            calibrated_band(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s)
             for horizon in sorted(errors_by_horizon)
         ]
         return cls(alpha, tuple(bands))
@@ -242,75 +162,3 @@ def _between(halves: Array, horizons: Sequence[float], elapsed_s: Array) -> Arra
     above = np.minimum(below + 1, len(knots) - 1)
     share, row = place - below, np.arange(len(elapsed_s))
     return np.asarray((1 - share) * halves[below, row] + share * halves[above, row])
-
-
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """sizes : (n,) V, |error|.  columns : (n, p)."""
-
-    sizes: Array
-    columns: Array
-
-
-def _calibrate(
-    horizon: float,
-    errors: Sequence[Array],
-    columns: Sequence[Array],
-    inside: Sequence[BoolArray],
-    alpha: float,
-    dt_s: float,
-) -> HorizonBand:
-    if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
-        raise InputError(
-            f"errors at {horizon:g} s and covariates differ in length; give one row a sample of each."
-        )
-    pieces = _pieces(errors, columns, inside)
-    extrapolated = len(pieces) < MIN_PIECES
-    if extrapolated:
-        pieces = _pieces(errors, columns, [np.ones(len(e), dtype=bool) for e in errors])
-    if len(pieces) < MIN_PIECES:
-        raise FitError(
-            f"{len(pieces)} pieces of {MIN_ROWS} or more predictions {horizon:g} s ahead cannot calibrate a band: "
-            f"at least {MIN_PIECES} are needed; give longer records."
-        )
-    if not any(piece.sizes.any() for piece in pieces):
-        raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
-    scales = [_scale([other for other in pieces if other is not piece], alpha) for piece in pieces]
-    scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
-    counts = np.array([float(score.size) for score in scores])
-    everywhere = np.quantile(np.concatenate(scores), 1 - alpha, method="higher")
-    return HorizonBand(
-        horizon,
-        alpha,
-        tuple(scales),
-        np.array([np.quantile(score, np.linspace(0, 1, N_LEVELS)) for score in scores]),
-        counts,
-        _widening(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum(), alpha),
-        tuple(float(np.mean(score <= everywhere)) for score in scores),
-        extrapolated,
-    )
-
-
-def _widening(independent: float, alpha: float) -> float:
-    """k of (2)."""
-    return float(student.ppf(1 - alpha / 2, independent - 1) / norm.ppf(1 - alpha / 2))
-
-
-def _scale(pieces: Sequence[_Piece], alpha: float) -> LocalScale:
-    return LocalScale.fit(
-        np.concatenate([piece.columns for piece in pieces]),
-        np.concatenate([piece.sizes for piece in pieces]),
-        alpha,
-    )
-
-
-def _pieces(errors: Sequence[Array], columns: Sequence[Array], inside: Sequence[BoolArray]) -> list[_Piece]:
-    """The usable rows of each record, long records cut; what is too short to count is left out."""
-    usable = [np.flatnonzero(np.isfinite(e) & i) for e, i in zip(errors, inside, strict=True)]
-    longest = max(MIN_ROWS, -(-sum(rows.size for rows in usable) // N_PIECES))
-    return [
-        _Piece(np.abs(e[part]), c[part])
-        for e, c, rows in zip(errors, columns, usable, strict=True)
-        for part in np.array_split(rows, max(1, round(rows.size / longest)))
-        if part.size >= MIN_ROWS
-    ]

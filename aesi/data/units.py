@@ -57,7 +57,7 @@ CLOCK_TIME = re.compile(
 def spelt(quantity: str, text: str) -> str | None:
     """The unit that a header or a user means by `text`; None where it is none of the quantity's."""
     plain = text.strip().lower()
-    for unit, ways in SPELLINGS[quantity].items():
+    for unit, ways in SPELLINGS.get(quantity, {}).items():
         if plain in ways:
             return unit
     return None

@@ -21,7 +21,7 @@ from aesi.numerics.blocks import CountArray
 from aesi.numerics.typing import Array
 
 CELL = 25
-"""Rows a cell, and cells and columns at a time: they set the speed alone, by what fits into the cache."""
+"""Rows a cell; like _CELLS_AT_ONCE and _COLUMNS_AT_ONCE it sets the speed alone, by what fits into the cache."""
 _CELLS_AT_ONCE = 160
 _COLUMNS_AT_ONCE = 64
 

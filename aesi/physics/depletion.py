@@ -15,6 +15,8 @@ from aesi.physics.model import EspmModel
 
 LAYERS = {1: "negative electrode", 2: "positive electrode"}
 SALT, NO_SOLUTION = 3, 4
+DRY_SHARE = 0.02
+"""Of the rest concentration at a collector: no reaction can be found because there is no salt for one."""
 
 
 def sentence(
@@ -27,6 +29,9 @@ def sentence(
     where = f"at {time_s[at]:.6g} s (row {at})"
     degc = kelvin - ZERO_CELSIUS_K
     tail = 'or use on_depletion="clip".'
+    driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
+    if what == NO_SOLUTION and driest < DRY_SHARE:
+        what = SALT
     if what == SALT:
         here, there = (carried_a(model, t) for t in (kelvin, cell.reference_temperature_k))
         cause = (

@@ -165,10 +165,6 @@ class _Linear:
         enters = (1.0 - e.transference) / FARADAY_C_MOL * stack.gain[:, 1:]
         gauss = stack.gauss[: 6 * regions].reshape(2 * regions, 3, -1)
         seen = (np.array([5.0, 8.0, 5.0]) / 18.0 @ gauss) @ stack.to_nodes[:, 1:] / e.c0_mol_m3
-        for side in range(2):
-            own = slice(side * regions, (side + 1) * regions)
-            middle = seen[own].mean(axis=0)
-            seen[own] = middle + self.model.region_contrast * (seen[own] - middle)
         thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
         chi = 2.0 * (1.0 - e.transference) * thermal
         modes = 1.0 / (s[:, None] + rates[None, 1:])
@@ -183,9 +179,7 @@ class _Linear:
         out = np.zeros((2 * regions, 2 * regions))
         for side in range(2):
             own = slice(side * regions, (side + 1) * regions)
-            block = solid[side] + salt[side].sum(axis=1) / (self._kappa() * warmer)
-            middle = block.mean(axis=0)
-            out[own, own] = middle + self.model.region_contrast * (block - middle)
+            out[own, own] = solid[side] + salt[side].sum(axis=1) / (self._kappa() * warmer)
         return out
 
     def _kappa(self) -> float:

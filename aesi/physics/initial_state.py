@@ -119,12 +119,12 @@ def initial_state(
         if abs(read.soc - soc0) <= allowed + 2.0 * read.sd:
             return replace(_given(record, soc0, None), doubt=abs(read.soc - soc0))
         if shared:
-            return read_instead(record, read, soc0)
+            return _read_instead(read, soc0)
         return replace(_given(record, soc0, read), doubt=abs(read.soc - soc0))
     return start.read()
 
 
-def read_instead(record: Measurement, read: InitialState, soc0: float) -> InitialState:
+def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
     words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
     return InitialState(read.soc, read.sd, read.basis, words, True, read.rest_voltage_v)

@@ -66,7 +66,6 @@ class EspmModel:
     """The extended single-particle model of a cell, and its extensions.
 
     regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
-    region_contrast : factor of what differs between the regions of an electrode in ohmic drop and in salt.
     heat : None for a temperature that is given or constant.
     solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
     electrode_points : of a porous electrode, where reaction and salt are resolved.
@@ -77,7 +76,6 @@ class EspmModel:
     negative: Interface = PLAIN
     positive: Interface = PLAIN
     regions: int = 1
-    region_contrast: float = 1.0
     heat: HeatBalance | None = None
     solid_order: int = DEFAULT_SOLID_ORDER
     electrolyte_order: int = DEFAULT_ELECTROLYTE_ORDER

@@ -87,7 +87,7 @@ def simulate(
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
     rows, extra, fault_at, fault = _solved(solve, changed, record, soc0, hold)
-    series = _series(changed.cell, rows, time) | extra
+    series = _series(changed.cell, rows) | extra
     if fault_at >= 0:
         if on_depletion == "raise":
             kelvin = float(extra["temperature_k"][fault_at])
@@ -238,7 +238,7 @@ def _soc_from_rest(model: EspmModel, effects: Sequence[ActiveEffect], rest_volta
     return initial_soc(model.cell, float(true[0]))
 
 
-def _series(cell: Cell, rows: Array, time: Array) -> dict[str, Array]:
+def _series(cell: Cell, rows: Array) -> dict[str, Array]:
     n, p = cell.negative, cell.positive
     return {
         "c_sp": rows[2] * p.c_max_mol_m3,

@@ -27,8 +27,8 @@ DROP_V = 0.06
 DROP_V_PER_C = 0.25
 COLD_DEGC, COLD_SPAN_K, COLD_FACTOR = 15.0, 25.0, 4.0
 AFTER_S, AFTER_SHARE = 1800.0, 0.3
-"""Drops that no cell exceeds: the measured records stay within 0.05 V + 0.2 V a C-rate above 15 degC, and within four
-times that at -10 degC."""
+"""Drops that no cell exceeds, DROP_V and DROP_V_PER_C when warm: the measured records stay within
+0.05 V + 0.2 V a C-rate above 15 degC, and within four times that at -10 degC."""
 TOO_LARGE, TOO_SMALL = 2.0, 1.4
 """By how much the declared capacity may exceed, or fall short of, what the record allows: ageing and batches of one
 cell move it by less."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from aesi.calibration import Calibration, calibrate
+from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
@@ -119,6 +120,7 @@ def calibration_content(
         },
         "capacity_ah": found.cell.capacity_ah,
         "declared_capacity_ah": found.declared.capacity_ah,
+        "health": _health_rows(found),
         "undetermined": [
             {"weights": dict(o.weights), "narrowed": o.narrowed, "sentence": o.sentence}
             for o in found.undetermined
@@ -137,6 +139,14 @@ def calibration_content(
         "notes": list(together((*read, *found.notes, *sampled_notes))),
         "seconds": round(found.seconds, 2),
     }  # fmt: skip
+
+
+def _health_rows(found: Calibration) -> dict[str, dict[str, float]]:
+    intervals = health_intervals(found)
+    return {
+        name: {"value": value, "low": intervals[name][0], "high": intervals[name][1]}
+        for name, value in asdict(health_of(found.cell)).items()
+    }
 
 
 def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:
@@ -162,7 +172,12 @@ def to_text(content: dict[str, Any]) -> str:
         "Errors are RMSE on the data that were fitted; the capacity is that of the record over the file's.",
         "",
     ]
-    lines += ["| parameter | value | 95 % interval | unit | prior from |", "|---|---|---|---|---|"]
+    lines += ["| state of health | value | 95 % interval |", "|---|---|---|"]
+    lines += [
+        f"| {HEALTH_WORDS[name]} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} |"
+        for name, p in content["health"].items()
+    ]
+    lines += ["", "| parameter | value | 95 % interval | unit | prior from |", "|---|---|---|---|---|"]
     lines += [
         f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} | {p['prior_from']} |"
         for name, p in content["parameters"].items()

@@ -87,7 +87,7 @@ def draw(series: list[Series], unit: str) -> str:
     """The picture as SVG."""
     end = max(x[-1] for one in series for x, _ in one.records)
     limit = max(float(np.percentile(np.abs(y), 99.8)) for one in series for _, y in one.records)
-    step = _nice(limit / 2)
+    step = nice(limit / 2)
     limit = step * np.ceil(limit / step)
     body = [_axes(end, limit, step, unit)]
     body += [_line(one, end, limit) for one in series]
@@ -100,7 +100,7 @@ def draw(series: list[Series], unit: str) -> str:
     )
 
 
-def _nice(value: float) -> float:
+def nice(value: float) -> float:
     """The next 1, 2 or 5 times a power of ten below or at `value`."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(max(m * power for m in (1, 2, 5) if m * power <= value))
@@ -138,7 +138,7 @@ def _axes(end: float, limit: float, step: float, unit: str) -> str:
         parts.append(
             f'<text x="{LEFT - 8}" y="{y + 4:.1f}" text-anchor="end" fill="#57606a">{value:g}</text>'
         )
-    for value in np.arange(0, end, _nice(end / 3)):
+    for value in np.arange(0, end, nice(end / 3)):
         (x,), _ = _place(np.array([value]), np.zeros(1), end, limit)
         y = HEIGHT - BOTTOM + 18
         parts.append(f'<text x="{x:.1f}" y="{y}" text-anchor="middle" fill="#57606a">{value:g}</text>')

@@ -102,8 +102,8 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
     from aesi.pipeline.experiment.candidate import genome_space, weights
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
+    from aesi.pipeline.experiment.judging.validation import validation_mser
     from aesi.pipeline.experiment.load import load
-    from aesi.pipeline.experiment.validation import validation_mser
     from aesi.sparse import Candidate
     from flows.search.nsga2 import Constraints, search
 

@@ -18,8 +18,20 @@ if TYPE_CHECKING:
 CellOption = Annotated[
     Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
 ]
+
+
+def _share(value: float | None) -> float | None:
+    """Raises InputError for a state of charge that is no share."""
+    if value is not None and not 0.0 <= value <= 1.0:
+        raise InputError(
+            f"--soc0 {value:g}: a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % is 0.9."
+        )
+    return value
+
+
 Soc0 = Annotated[
-    float | None, typer.Option("--soc0", min=0.0, max=1.0, help="State of charge at the first row.")
+    float | None,
+    typer.Option("--soc0", callback=_share, help="State of charge at the first row, from 0 to 1."),
 ]
 Effects = Annotated[
     list[str] | None, typer.Option("--effect", help="An effect to add: id or id:parameter=value,...")

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from aesi.pipeline.batch.job import Settings, run_job
 from aesi.pipeline.batch.plan import Job, read_plan
 from aesi.pipeline.batch.summary import write_summary
+from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
 from flows.base.console import Console, duration
+
+if TYPE_CHECKING:
+    from flows.tracking.tracker import Tracker
 
 Runner = Literal["local", "dask"]
 
@@ -36,14 +42,63 @@ def batch(
     out.mkdir(parents=True, exist_ok=True)
     console.say(f"{len(jobs)} cells from {source}, {workers} at a time; results in {out}")
     rows: dict[str, dict[str, Any]] = {}
-    for row in _rows(jobs, out, settings or Settings(), workers, runner, address):
-        rows[row["name"]] = row
-        told = row["finding"] if row["status"] == "done" else f"failed: {row['reason']}"
-        console.say(f"{len(rows)}/{len(jobs)} {row['name']}: {told}")
-        page = write_summary(out, _ordered(jobs, rows), f"{source.name}: what the models of these cells lack")
+    with _tracked(jobs, settings or Settings(), source, console) as tracker:
+        for row in _rows(jobs, out, settings or Settings(), workers, runner, address):
+            rows[row["name"]] = row
+            told = row["finding"] if row["status"] == "done" else f"failed: {row['reason']}"
+            console.say(f"{len(rows)}/{len(jobs)} {row['name']}: {told}")
+            title = f"{source.name}: what the models of these cells lack"
+            page = write_summary(out, _ordered(jobs, rows), title)
+            _track(tracker, row)
+        _track_summary(tracker, rows, out)
     failed = sum(row["status"] == "failed" for row in rows.values())
     console.say(f"Finished in {duration(time.monotonic() - started)}; {failed} failed. Summary: {page}")
     return _ordered(jobs, rows)
+
+
+@contextmanager
+def _tracked(
+    jobs: Sequence[Job], settings: Settings, source: Path, console: Console
+) -> Iterator[Tracker | None]:
+    """A run of the batch, closed whichever way it ends; None where the store is away."""
+    from flows.tracking.store import Store, StoreAway
+    from flows.tracking.tracker import Subject, Tracker
+
+    key = sha256("".join(job.name for job in jobs).encode()).hexdigest()[:16]
+    quiet = TrackingConfig(system_metrics=False, log_model=False)
+    try:
+        tracker = Tracker(Store(), Subject("batch", settings.seed, key, quiet), console.say)
+    except StoreAway as error:
+        console.say(f"not tracked: {error}")
+        yield None
+        return
+    tracker.parameters({"source": source.name, "cells": len(jobs), "holdout": settings.holdout})
+    try:
+        yield tracker
+    except BaseException as error:
+        tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
+        raise
+    tracker.end("FINISHED")
+
+
+def _track(tracker: Tracker | None, row: dict[str, Any]) -> None:
+    """One cell or check-up: its errors and state of health as metrics, the finding as a parameter."""
+    if tracker is None:
+        return
+    metrics = {k: float(v) for k, v in row.items() if isinstance(v, int | float) and k != "seconds"}
+    told = {k: str(v) for k, v in row.items() if isinstance(v, str) and v}
+    failed = row.get("reason") if row["status"] == "failed" else None
+    label, seconds = f"cell:{row['name']}", row.get("seconds", 0.0)
+    tracker.nested(label, row["name"], "cell", told, metrics, failed=failed, seconds=seconds)
+
+
+def _track_summary(tracker: Tracker | None, rows: dict[str, dict[str, Any]], out: Path) -> None:
+    if tracker is None:
+        return
+    done = [row for row in rows.values() if row["status"] == "done"]
+    tracker.metrics({"done": float(len(done)), "failed": float(len(rows) - len(done))})
+    for name in ("summary.csv", "index.html"):
+        tracker.files(out.resolve() / name)
 
 
 def _ordered(jobs: Sequence[Job], rows: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:
@@ -76,7 +131,7 @@ def _on_dask(
 
     try:
         futures = [client.submit(run_job, job, out.resolve(), settings, pure=False) for job in jobs]
-        for future in as_completed(futures):
+        for future in as_completed(futures, loop=client.loop):
             yield future.result()
     finally:
         client.close(timeout=5)

@@ -137,7 +137,10 @@ def _track_result(
         return
     from aesi.pipeline.report.moved import moved_summary
     from aesi.pipeline.report.sizes import finding_line
+    from aesi.pipeline.report.words import reason_finding
+    from flows.tracking.view import DISCOVERY_COLUMNS, HOW_TO_READ_DISCOVERIES, NOTE, experiment_tags
 
+    tracker.about(experiment_tags(HOW_TO_READ_DISCOVERIES, DISCOVERY_COLUMNS))
     tracker.parameters(
         {
             "cell": found.cell.name,
@@ -154,6 +157,7 @@ def _track_result(
             "verdict": content["verdict"],
             "effects": ", ".join(content["effects"]),
             "finding": finding_line(content),
+            NOTE: f"{finding_line(content)}\n\n{reason_finding(content)}",
             **{
                 f"moved_{state}": moved_summary(rows)
                 for state, rows in content["own_parameters"].items()

@@ -49,12 +49,12 @@ def _stages(
     started: float,
 ) -> Path:
     from aesi.pipeline.experiment.comparison import comparison
-    from aesi.pipeline.experiment.evaluate import evaluate_models
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
+    from aesi.pipeline.experiment.judging.evaluate import evaluate_models
+    from aesi.pipeline.experiment.judging.validation import validation_mser
     from aesi.pipeline.experiment.load import load
     from aesi.pipeline.experiment.outputs import Result, write_outputs
-    from aesi.pipeline.experiment.validation import validation_mser
     from aesi.pipeline.notes import together
     from flows.base.stage_cache import Cache
     from flows.search.study import run_study
@@ -107,7 +107,7 @@ def _stages(
     )
     summary = run("report", lambda: write_outputs(folder, result))
     tracker.json("comparison.json", comparison(result))
-    track_result(tracker, folder, summary, found.number, fitted)
+    track_result(tracker, folder, summary, found.number, fitted, config.note)
     key = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")
     run.publish(f"{key}-report", _page(folder, summary, tracker), f"What came of {config.name}")
     run.publish(

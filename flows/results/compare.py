@@ -10,7 +10,7 @@ from typing import Any
 
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
-from flows.tracking.store import KIND, Store
+from flows.tracking.store import Store
 
 SHORTEST_ID = 4
 """Letters of a run's id that may stand for it."""
@@ -42,8 +42,8 @@ def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
     found: dict[str, tuple[str, Any]] = {}
     for name in wanted:
         if name in by_name:
-            condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
-            matching = list(store.runs(by_name[name], condition))[::-1]
+            jobs = store.jobs(by_name[name])
+            matching = [run for run in reversed(jobs) if run.info.status == "FINISHED"]
         else:
             known = known if known is not None else _all(store, list(experiments))
             matching = _beginning(known, name)
@@ -57,7 +57,7 @@ def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
 
 
 def _all(store: Store, experiments: Sequence[str]) -> list[Any]:
-    return [run for number in experiments for run in store.runs(number, f"tags.`{KIND}` = 'run'")]
+    return [run for number in experiments for run in store.jobs(number)]
 
 
 def _beginning(known: Sequence[Any], name: str) -> list[Any]:

@@ -140,6 +140,9 @@ def _footer(name: str, runs: Sequence[Any], format: str) -> str:
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {ids}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
+    note = runs[0].data.tags.get("mlflow.note.content", "")
+    if note:
+        text = f"{text} {note.rstrip('.')}."
     for run in runs:
         if "aesi.fallback" in run.data.tags:
             text = f"{text} {run.data.tags['aesi.fallback']}"

@@ -9,6 +9,7 @@ import sys
 from aesi.errors import InputError
 from flows.base import environment
 from flows.tracking.store import Store, default_uri
+from flows.tracking.view import VIEW, view_of
 
 TRAINING = "#/experiments?workflowType=machine_learning"
 """MLflow opens on what it has for language models, where runs are hard to find."""
@@ -24,13 +25,26 @@ def serve(port: int, host: str, uri: str | None) -> None:
         return
     if not _free(host, port):
         raise InputError(f"port {port} on {host} is taken; give another with --port.")
-    Store(uri)  # makes or migrates the tables, so that an empty workspace shows an empty UI
+    store = Store(uri)  # makes or migrates the tables, so that an empty workspace shows an empty UI
     command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri]
     command += ["--host", host, "--port", str(port), "--workers", "1"]
-    print(f"MLflow shows the runs at http://{host}:{port}/{TRAINING} (Ctrl-C ends it)", flush=True)
+    address = f"http://{host}:{port}/"
+    print(f"MLflow shows the runs at {address}{TRAINING} (Ctrl-C ends it)")
+    for name, view in _views(store):
+        print(f"  {name}: {address}{view}")
+    sys.stdout.flush()
     os.execve(
         sys.executable, command, os.environ | QUIETLY
     )  # so that whatever ends this process ends the server
+
+
+def _views(store: Store) -> list[tuple[str, str]]:
+    """Name of each experiment that has a table of its own, and the address below the server's that opens it."""
+    return [
+        (each.name, view_of(each.experiment_id))
+        for each in store.client.search_experiments()
+        if f"mlflow.sharedViewState.{VIEW}" in each.tags
+    ]
 
 
 def serve_studies(port: int, host: str, url: str | None) -> None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from flows.tracking.outbox import Item
 from flows.tracking.store import NUMBER, PARENT
+from flows.tracking.whole_run import insert_run, new_artifact_uri
 
 if TYPE_CHECKING:
     from mlflow.entities import RunInfo
@@ -18,19 +19,30 @@ if TYPE_CHECKING:
 
 def _send_run(store: Store, item: Item, again: bool) -> None:
     """A finished nested run: parameters, metrics, files."""
-    from mlflow.entities import Metric, Param, RunTag
-
     info = _sent_before(store, item) if again else None
     tags = {PARENT: item["parent"], NUMBER: item["label"], **item["tags"]}
+    if info is None and store.local:
+        artifacts = new_artifact_uri(store.artifact_place(item["experiment_id"]))
+        _write_files(store, artifacts, item["files"])
+        insert_run(store.database, item, artifacts, tags)
+    else:
+        _send_run_by_client(store, item, tags, info)
+
+
+def _send_run_by_client(store: Store, item: Item, tags: Mapping[str, str], info: RunInfo | None) -> None:
+    """To a server, or the rest of what has arrived in part; info : of the run that is there already."""
+    from mlflow.entities import Metric, Param, RunTag
+
+    there = info is not None
     if info is None:
         info = store.client.create_run(
-            item["experiment_id"], start_time=item["start_ms"], run_name=item["name"], tags=tags
+            item["experiment_id"], start_time=item["start_ms"], run_name=item["name"], tags=dict(tags)
         ).info
     store.client.log_batch(
         info.run_id,
         metrics=[Metric(k, v, item["end_ms"], 0) for k, v in item["metrics"].items()],
         params=[Param(k, v) for k, v in item["params"].items()],
-        tags=[RunTag(k, v) for k, v in tags.items()] if again else [],
+        tags=[RunTag(k, v) for k, v in tags.items()] if there else [],
     )
     _write_files(store, info.artifact_uri, item["files"])
     store.client.set_terminated(info.run_id, item["status"], item["end_ms"])
@@ -39,13 +51,22 @@ def _send_run(store: Store, item: Item, again: bool) -> None:
 def _write_files(store: Store, artifact_uri: str, files: Mapping[str, str]) -> None:
     """Text artifacts, to where the run is known to keep them: the client would ask the store once a file."""
     from mlflow.store.artifact.artifact_repository_registry import get_artifact_repository
+    from mlflow.utils.file_utils import local_file_uri_to_path
 
     if not files:
         return
+    if artifact_uri.startswith("file:"):
+        _write_texts(Path(local_file_uri_to_path(artifact_uri)), files)
+        return
     with TemporaryDirectory(prefix="aesi-") as folder:
-        for name, text in files.items():
-            (Path(folder) / name).write_text(text, encoding="utf-8")
+        _write_texts(Path(folder), files)
         get_artifact_repository(artifact_uri, store.uri).log_artifacts(folder)
+
+
+def _write_texts(folder: Path, files: Mapping[str, str]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _send_batch(store: Store, item: Item, again: bool) -> None:
@@ -89,7 +110,7 @@ def _send_json(store: Store, item: Item, again: bool) -> None:
 
 
 def _send_model(store: Store, item: Item, again: bool) -> None:
-    from flows.tracking.logged_model import log_hybrid
+    from flows.tracking.serving.logged_model import log_hybrid
 
     log_hybrid(store.uri, item["run_id"], Path(item["path"]), item["registered_as"])
 
@@ -98,13 +119,31 @@ def _send_end(store: Store, item: Item, again: bool) -> None:
     store.client.set_terminated(item["run_id"], item["status"], item["at_ms"])
 
 
+def _send_mark(store: Store, item: Item, again: bool) -> None:
+    """Tags of a nested run that was sent before."""
+    run = store.child(item["experiment_id"], item["parent"], item["label"])
+    if run is not None:
+        for key, value in item["tags"].items():
+            store.client.set_tag(run.info.run_id, key, value)
+
+
+def _send_experiment(store: Store, item: Item, again: bool) -> None:
+    """Tags of the experiment that are not there yet: what a person has written stays."""
+    there = store.client.get_experiment(item["experiment_id"]).tags
+    for key, value in item["tags"].items():
+        if key not in there:
+            store.client.set_experiment_tag(item["experiment_id"], key, value)
+
+
 def _sent_before(store: Store, item: Item) -> RunInfo | None:
-    found = store.children(item["experiment_id"], item["parent"]).get(item["label"])
+    found = store.child(item["experiment_id"], item["parent"], item["label"])
     return None if found is None else found.info
 
 
 SENDERS: dict[str, Callable[[Store, Item, bool], None]] = {
     "run": _send_run,
+    "mark": _send_mark,
+    "experiment": _send_experiment,
     "batch": _send_batch,
     "datasets": _send_datasets,
     "files": _send_files,

@@ -20,7 +20,9 @@ from flows.base import codec
 from flows.base.files import write_atomically
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
+from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
+CHOSEN = "aesi.chosen"
 INPUTS, RECORDS, DECLARED = "inputs", "records.bin", "declared"
 """What a candidate is made from: the error series by role, and the declared cell with its effects."""
 HEADLINES = ("free_run", "one_step", "intervals")
@@ -36,7 +38,8 @@ WITH_UNIT = {
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
     """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
     content = loaded.config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
-    tags = {"mlflow.note.content": config.note, "aesi.setting": loaded.setting}
+    tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}", RUN_COLUMNS))
+    tags = {NOTE: config.note, "aesi.setting": loaded.setting}
     if loaded.fallback:
         tags["aesi.fallback"] = loaded.fallback
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
@@ -106,16 +109,29 @@ class CandidateTracker:
 
 
 def track_result(
-    tracker: Tracker, folder: Path, summary: Mapping[str, Any], number: int, fitted: Sequence[Fitted]
+    tracker: Tracker,
+    folder: Path,
+    summary: Mapping[str, Any],
+    number: int,
+    fitted: Sequence[Fitted],
+    note: str = "",
 ) -> None:
-    """The models, the tables, the report and the chosen model; `number` is the candidate's they come from."""
+    """The models, the tables, the report and the chosen model; `number` is the candidate's they come from.
+
+    note : what the experiment is about, which the run's description begins with.
+    """
     chosen = summary["chosen"]
     for row in summary["models"]:
         numbers = _numbers(row)
         tracker.nested(f"model:{row['name']}", row["name"], "model", {"model": row["name"]}, numbers)
         if row["name"] == chosen:
             tracker.metrics(numbers)
-    tracker.parameters({"chosen_candidate": number, "chosen_model": chosen})
+    headline = next(row for row in summary["models"] if row["name"] == chosen)
+    tags = {
+        NOTE: f"{note}\n\n{result_line(headline)} Candidate {number} of the search; the report is an artifact."
+    }
+    tracker.parameters({"chosen_candidate": number, "chosen_model": chosen}, tags)
+    tracker.mark(f"candidate:{number}", {CHOSEN: "true"})
     for name in ("summary.json", "report.html", "tables.md", "tables.tex"):
         tracker.files(folder / name)
     for one in fitted:
@@ -124,6 +140,16 @@ def track_result(
     if (folder / "figures").is_dir():
         tracker.files(folder / "figures", "figures")
     tracker.model(folder / "model")
+
+
+def result_line(row: Mapping[str, Any]) -> str:
+    """What came of a run, in one sentence, from the chosen model's row of the summary."""
+    free, step = row["free_run"], row.get("intervals") or {}
+    line = f"{row['name']}: {free['test_mser_pct']:.1f} % less squared error on test in free run"
+    line += f" ({free['test_rmse_mv']:.2f} mV)"
+    if step:
+        line += f"; {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:.0f} %"
+    return f"{line}."
 
 
 def coefficients(candidate: Candidate) -> dict[str, dict[str, float]]:
@@ -156,6 +182,7 @@ def _metrics(scored: ScoredCandidate) -> dict[str, Any]:
     return candidate_metrics(scored.candidate) | {
         "intervals/valid_coverage_pct": scored.coverage_pct,
         "intervals/valid_width_v": scored.width_v,
+        "intervals/valid_width_mv": None if scored.width_v is None else MV_PER_V * scored.width_v,
         "intervals/valid_coverage_pct_aesi_ii": scored.stable_coverage_pct,
         "intervals/valid_width_v_aesi_ii": scored.stable_width_v,
     }
@@ -176,4 +203,8 @@ def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
             result |= _numbers(value, f"{below}{WITH_UNIT.get(name, name)}/")
         elif isinstance(value, int | float) and not isinstance(value, bool):
             result[f"{prefix}{name}"] = float(value)
+            if name.endswith(
+                "_width_v"
+            ):  # what is read is in millivolts; the summary's own name stays beside it
+                result[f"{prefix}{name.removesuffix('v')}mv"] = MV_PER_V * value
     return result

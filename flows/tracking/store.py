@@ -23,6 +23,7 @@ from filelock import FileLock
 from aesi.errors import AesiError, InputError
 from flows.base import environment
 from flows.tracking.relocation import artifact_folder, follow
+from flows.tracking.whole_run import read_runs
 
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
@@ -44,7 +45,7 @@ def default_uri() -> str:
 
 
 class Store:
-    """One tracking store. `notes` : what was found when it was opened, one sentence each.
+    """One tracking store. `notes` : what was found when it was opened, one sentence each.  local : a SQLite file.
 
     Raises StoreAway where it does not answer, with what to do.
     """
@@ -53,13 +54,14 @@ class Store:
         # A database that fails reaches the caller as an exception, and need not be told twice, with a traceback.
         logging.getLogger("mlflow.store.db.utils").setLevel(logging.CRITICAL)
         self.uri = uri or default_uri()
-        self._local = self.uri.startswith("sqlite:///")
+        self.local = self.uri.startswith("sqlite:///")
+        self._places: dict[str, str] = {}
         self.notes: tuple[str, ...] = ()
         if self.uri.startswith(("http://", "https://")):
             _reach(self.uri)
-        with _alone(self._local):
-            if self._local:
-                self.notes = _opened(self._database, self.uri)
+        with _alone(self.local):
+            if self.local:
+                self.notes = _opened(self._path, self.uri)
             try:
                 from mlflow import MlflowClient
 
@@ -70,17 +72,28 @@ class Store:
 
     def experiment(self, name: str) -> str:
         """Id of the experiment of that name, made if it is not there."""
-        with _alone(self._local):
+        with _alone(self.local):
             found = self.client.get_experiment_by_name(name)
             if found is not None:
                 if found.lifecycle_stage == "deleted":
                     self.client.restore_experiment(found.experiment_id)
                 return str(found.experiment_id)
-            place = artifact_folder(self._database, name).as_uri() if self._local else None
+            place = artifact_folder(self._path, name).as_uri() if self.local else None
             return str(self.client.create_experiment(name, place))
 
     @property
-    def _database(self) -> Path:
+    def database(self) -> Any:
+        """MLflow's own store below the client, of a local database."""
+        return self.client._tracking_client.store
+
+    def artifact_place(self, experiment_id: str) -> str:
+        """The address below which the runs of an experiment keep their files; asked for once."""
+        if experiment_id not in self._places:
+            self._places[experiment_id] = str(self.client.get_experiment(experiment_id).artifact_location)
+        return self._places[experiment_id]
+
+    @property
+    def _path(self) -> Path:
         return Path(self.uri.removeprefix("sqlite:///")).expanduser().resolve()
 
     def run(self, run_id: str) -> Any:
@@ -138,6 +151,12 @@ class Store:
             if not token:
                 return
 
+    def jobs(self, experiment_id: str) -> list[Any]:
+        """The runs of an experiment that are whole jobs and nested in none, newest first."""
+        if self.local:
+            return read_runs(self.database, experiment_id, (KIND, "run"))
+        return list(self.runs(experiment_id, f"tags.`{KIND}` = 'run'"))
+
     def children(self, experiment_id: str, parent: str) -> dict[str, Any]:
         """Nested runs of a parent by the label they were given (`candidate:7`, `model:AESI I`)."""
         condition = f"tags.`{PARENT}` = '{parent}'"
@@ -146,6 +165,11 @@ class Store:
             for run in self.runs(experiment_id, condition)
             if NUMBER in run.data.tags
         }
+
+    def child(self, experiment_id: str, parent: str, label: str) -> Any:
+        """The nested run of a label, or None."""
+        condition = f"tags.`{PARENT}` = '{parent}' and tags.`{NUMBER}` = '{label}'"
+        return next(self.runs(experiment_id, condition), None)
 
     def away(self, error: Exception) -> bool:
         """True for a failure that passes: no connection, a locked database, a full disk, a server in trouble."""

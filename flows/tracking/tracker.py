@@ -144,6 +144,22 @@ class Tracker:
             }
         )
 
+    def mark(self, label: str, tags: Mapping[str, str]) -> None:
+        """Tags of a nested run that is tracked already."""
+        self._outbox.put(
+            {
+                "kind": "mark",
+                "experiment_id": self._experiment_id,
+                "parent": self.run_id,
+                "label": label,
+                "tags": dict(tags),
+            }
+        )
+
+    def about(self, tags: Mapping[str, str]) -> None:
+        """Tags of the experiment, where it has none of that name yet."""
+        self._outbox.put({"kind": "experiment", "experiment_id": self._experiment_id, "tags": dict(tags)})
+
     def files(self, path: Path, to: str | None = None) -> None:
         """A file or a folder as artifacts of the parent run."""
         self._outbox.put({"kind": "files", "run_id": self.run_id, "path": str(path), "to": to})

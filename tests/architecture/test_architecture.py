@@ -1,8 +1,10 @@
 """The shape of the house: imports point down, the package stands without its platform, help is instant."""
 
+import re
 import resource
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -36,6 +38,28 @@ def test_imports_point_down():
     command = [str(Path(sys.executable).with_name("lint-imports"))]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
+
+
+def test_no_folder_holds_more_than_a_dozen_files_but_the_effects():
+    crowded = {}
+    for package in ("aesi", "flows"):
+        for folder in (ROOT / package, *(ROOT / package).rglob("*/")):
+            modules = [path for path in folder.glob("*.py") if path.name != "__init__.py"]
+            if len(modules) > 12:
+                crowded[folder.relative_to(ROOT).as_posix()] = len(modules)
+    assert list(crowded) == ["aesi/physics/effects"], crowded
+
+
+def test_the_picture_of_the_architecture_shows_every_layer_in_its_order():
+    contract = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"][
+        "contracts"
+    ][0]
+    layers = [room for layer in contract["layers"] for room in layer.split(" | ")]
+    picture = (ROOT / "docs" / "images" / "architecture.svg").read_text("utf-8")
+    drawn = re.findall(
+        r"\b(?:aesi\.\w+|flows)\b", " ".join(re.findall(r'font-weight="600">([^<]+)<', picture))
+    )
+    assert drawn == layers
 
 
 @pytest.mark.parametrize(

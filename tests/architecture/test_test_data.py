@@ -20,7 +20,7 @@ MAY = {
     "aesi/pipeline/experiment/sections.py": "names of records in the experiment's file",
     "aesi/pipeline/experiment/drives.py": "cuts the split",
     "aesi/pipeline/experiment/sources.py": "reads the records of every role",
-    "aesi/pipeline/experiment/evaluate.py": "judges the models, already chosen",
+    "aesi/pipeline/experiment/judging/evaluate.py": "judges the models, already chosen",
     "aesi/pipeline/api.py": "takes them from the caller",
     "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
     "aesi/pipeline/batch": "hands the files of each cell on",

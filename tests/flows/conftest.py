@@ -117,11 +117,14 @@ def aesi(workspace):
 
 @pytest.fixture
 def arguments():
-    """Arguments of an `aesi run` that takes seconds; more `--set` values may be added."""
+    """Arguments of an `aesi run` that takes seconds; more `--set` values may be added.
 
-    def make(*more):
+    prefect : said either way, because the tests' environment turns Prefect off where nothing is said.
+    """
+
+    def make(*more, prefect=False):
         pairs = (part for text in (*SMALL, *ASIDE, *more) for part in ("--set", text))
-        return ["run", str(SMOKE), "--no-prefect", *pairs]
+        return ["run", str(SMOKE), "--prefect" if prefect else "--no-prefect", *pairs]
 
     return make
 

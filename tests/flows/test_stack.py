@@ -45,7 +45,7 @@ def postgres_programs():
 
 
 @contextmanager
-def process(command, ready, timeout_s=120, **options):
+def process(command, ready, timeout_s=300, **options):
     """A process, once it is ready; ended with the block."""
     with tempfile.NamedTemporaryFile("w+") as said:  # a pipe that nobody empties would stop it
         started = subprocess.Popen(command, stdout=said, stderr=subprocess.STDOUT, **options)
@@ -243,9 +243,9 @@ def assert_read_back(stack, aesi, finished):
 def test_a_run_and_two_workers_on_one_study_and_one_of_them_killed(
     stack, aesi, arguments, finished, workspace
 ):
-    shared = arguments(f"runner.storage={stack['storage']}", f"tracking.uri={stack['mlflow']}")
-    experiment = [shared[0], shared[1], *shared[3:]]  # with Prefect
-    work = ["worker", *experiment[1:]]
+    shared = (f"runner.storage={stack['storage']}", f"tracking.uri={stack['mlflow']}")
+    experiment = arguments(*shared, prefect=True)
+    work = ["worker", *(word for word in experiment[1:] if word != "--prefect")]
     victim, worker = (aesi(*work, AESI_HOME=str(workspace / name)) for name in ("victim", "worker"))
     time.sleep(8)
     victim.kill()

@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 import aesi
@@ -107,7 +106,6 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert repr(found).startswith("Finding(found series_resistance, ")
     assert found.rmse_mv("after") < 1.2 < found.rmse_mv("before")
     frame = found.to_frame()
-    assert isinstance(frame, pd.DataFrame)
     assert frame.score.is_monotonic_decreasing
     (named,) = frame[frame.effect == "series_resistance"].itertuples()
     assert (named.parameter, named.unit) == ("resistance_ohm", "ohm")

@@ -72,6 +72,7 @@ NMC_PARTS = (1, 2, 3, 4, 5)
 """The published drive repeats itself after NMC_PERIOD_S, and that of the M50T after M50T_PERIOD_S."""
 NMC_PERIOD_S = 1800.0
 M50T_HALVES = ((1, 3, 5, 7), (2, 4, 6))
+"""Odd and even repeats."""
 M50T_PERIOD_S = 2600.0
 
 

@@ -25,6 +25,7 @@ from aesi.pipeline.cross_check import DEFAULT_MESH, PybammRun, pybamm_run
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 SOC0 = 0.95
+"""Where a load starts, so that charges stay below full."""
 KELVIN = {"25 degC": 298.15, "0 degC": 273.15}
 LARGEST_RATE = {"nmc_30ah": 3.0, "lg_m50_chen2020": 2.0}
 """C-rate of the hardest load of each cell."""
@@ -57,16 +58,22 @@ class Load:
 
 
 def run(
-    samples: int = 88_200, repeats: int = 3, cell: str = "", seed: int = 0, seconds: int = 200
+    samples: int = 88_200,
+    repeats: int = 3,
+    cell: str = "",
+    seed: int = 0,
+    seconds: int = 200,
+    curves: bool = True,
 ) -> Iterator[CaseRow]:
     """Lines of every load and numbers, then the timing, then the summary.
 
     samples : of the timed drive at 10 Hz, 0 leaves it out.  cell : one of the shipped cells, or a BPX file; both
     shipped ones without it.  seconds : of the drives and pulses that are compared.
+    curves : false for the timing alone.
     """
     worst: dict[str, float] = {}
     names = [cell] if cell else list(LARGEST_RATE)
-    for name in names:
+    for name in names if curves else ():
         for load in benchmark_loads(name, seed, seconds):
             for line in curve(load, repeats):
                 if line.get("in_use"):

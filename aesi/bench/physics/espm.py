@@ -20,6 +20,7 @@ STEP_S = 0.1
 BREAK_POINT_S = 1.0
 """The current is a straight line between break points, so that the peer can be told where they are."""
 SOC0 = 0.95
+"""Where the load starts, so that charges stay below full."""
 MEAN_C_RATE, SPREAD_C_RATE, LARGEST_C_RATE, CORRELATION_S = 0.25, 1.0, 3.0, 20.0
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.constants import ZERO_CELSIUS_K
+from aesi.constants import MILLI, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, impedance, simulate
@@ -25,13 +25,14 @@ from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery
 
 AT_HZ = 1.0
+"""Where resistances of kinetics are read from a spectrum; HIGH_HZ leaves the ohmic one alone."""
 HIGH_HZ = 1e5
 HALF = 0.5
 """State of charge at which spectra are held against each other."""
 FAST = 1e6
 """Factor of the rate constants that leaves no resistance of kinetics."""
-MILLI = 1e3
 PERCENT = 100.0
+"""Of one."""
 
 
 @dataclass(frozen=True)

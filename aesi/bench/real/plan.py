@@ -71,6 +71,7 @@ FAULTS: dict[FaultKind, tuple[tuple[float, ...], tuple[str, ...], str]] = {
 for the finder to correct, without a name."""
 RESISTANCES_OHM = {HG2: (0.005, 0.015), PANASONIC: (0.005, 0.015), NMC: (0.0005, 0.002)}
 MORE_IN_FILE = 0.05
+"""Of both electrodes, in a cell file that is made wrong."""
 LOSSES = ("lithium_inventory_loss", "active_material_loss_negative", "active_material_loss_positive")
 
 

@@ -12,10 +12,14 @@ from aesi.bench import CaseRow
 from aesi.bench.scoring import rate
 
 NEAR_K = 2.0
+"""A temperature, a share of capacity in percentage points, or a share of the right value, that counts as near;
+conventions."""
 NEAR_PP = 2.0
 NEAR_SHARE = 0.15
 HALVED = 0.5
+"""Of the recalibrated error."""
 WORSE = 1.05
+"""Of the declared error."""
 NO_ANSWER = ("error", "out of time")
 SOC0 = "wrong_soc0"
 

@@ -16,7 +16,7 @@ import numpy as np
 from aesi.data.blind.case import RecordKind
 from aesi.data.blind.cells import CELLS
 from aesi.data.blind.spread import BEYOND, SPREADS
-from aesi.data.laboratory.changes import Values
+from aesi.data.laboratory.change import Values
 from aesi.data.laboratory.simulator import Applied
 from aesi.numerics.typing import Array
 

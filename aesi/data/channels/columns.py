@@ -190,7 +190,7 @@ class _Finder:
 
     def _named(self, name: str, quantity: str) -> int:
         header = self._table.header
-        found = self._only([i for i, there in enumerate(header) if there == name.strip()], name)
+        found = self._only([i for i, there in enumerate(header) if there == name.strip()])
         if found is None:
             near = get_close_matches(name, header, n=1, cutoff=0.4)
             hint = f"; the nearest is {near[0]!r}" if near else ""
@@ -200,9 +200,7 @@ class _Finder:
         return found
 
     def _own(self, quantity: str) -> int | None:
-        return self._only(
-            [i for i, name in enumerate(self._table.header) if name.lower() == quantity], quantity
-        )
+        return self._only([i for i, name in enumerate(self._table.header) if name.lower() == quantity])
 
     def of_maker(self, quantity: str) -> bool:
         """Whether a known export has the quantity; it is taken then."""
@@ -221,7 +219,7 @@ class _Finder:
     def _of_bdf(self, quantity: str) -> bool:
         for label in BDF.get(quantity, ()):
             places = [i for i, name in enumerate(self._table.header) if _plain(name) == _plain(label)]
-            found = self._only(places, label)
+            found = self._only(places)
             if found is not None:
                 self.position[quantity] = found
                 self._set_unit(quantity, units.SI.get(quantity, ""))
@@ -231,7 +229,27 @@ class _Finder:
                     )
                 self.bdf_current |= quantity == "current_a"
                 return True
-        return False
+        return self._of_bdf_in_other_units(quantity)
+
+    def _of_bdf_in_other_units(self, quantity: str) -> bool:
+        """BDF's own names with another of a quantity's units: 'Test Time / h', 'Current / mA'."""
+        stems = {_plain(label.rpartition("/")[0]) for label in BDF.get(quantity, ()) if "/" in label}
+        places = [
+            i
+            for i, name in enumerate(self._table.header)
+            if _plain(name.rpartition("/")[0]) in stems and headers.unit_of(quantity, name)
+        ]
+        found = self._only(places)
+        if found is None:
+            return False
+        name = self._table.header[found]
+        self.position[quantity] = found
+        self._set_unit(quantity, headers.unit_of(quantity, name) or "")
+        self.notes.append(
+            f"{quantity} was taken from the BDF column {name!r} (converted from {self.unit[quantity]})."
+        )
+        self.bdf_current |= quantity == "current_a"
+        return True
 
     def _set_unit(self, quantity: str, known: str) -> None:
         """The user's unit, that of the line of units, the maker's, or SI; a name that says another is refused."""
@@ -264,7 +282,7 @@ class _Finder:
                 f"in {units.SI[quantity]}; convert the column."
             )
 
-    def _only(self, places: list[int], name: str) -> int | None:
+    def _only(self, places: list[int]) -> int | None:
         if len(places) > 1:
             raise DataError(
                 f"{self._file} has {len(places)} columns named {self._table.header[places[0]]!r} (numbers "

@@ -7,50 +7,17 @@ Nothing here is shared with the room that looks for effects; that is what makes 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
+from aesi.data.laboratory.change import Change, Values
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
-Values = Mapping[str, float]
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
-
-
-def _nothing(parameters: Any, values: Values) -> None:
-    """Leaves the parameters as they are."""
-
-
-def _same_current(time_s: Array, current_a: Array, values: Values) -> Array:
-    return current_a
-
-
-def _same_voltage(time_s: Array, current_a: Array, voltage_v: Array, values: Values) -> Array:
-    return voltage_v
-
-
-@dataclass(frozen=True)
-class Change:
-    """One change. defaults : its values, at which it is typically seen; units are in their names."""
-
-    id: str
-    defaults: Values
-    options: Mapping[str, Any] = field(default_factory=dict)
-    alter: Callable[[Any, Values], None] = _nothing
-    cell_current: Callable[[Array, Array, Values], Array] = _same_current
-    terminal_voltage: Callable[[Array, Array, Array, Values], Array] = _same_voltage
-
-    def complete(self, values: Values) -> dict[str, float]:
-        """The defaults overlaid with the given values; an unknown name is a DataError."""
-        unknown = sorted(set(values) - set(self.defaults))
-        if unknown:
-            known = ", ".join(self.defaults)
-            raise DataError(f"The change {self.id} has no value {unknown[0]!r}; it has {known}.")
-        return {**self.defaults, **values}
 
 
 def find_change(name: str) -> Change:

@@ -19,7 +19,8 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.cache import cached, key_of
-from aesi.data.laboratory.changes import CONTACT_RESISTANCE, Change, find_change
+from aesi.data.laboratory.change import Change
+from aesi.data.laboratory.changes import CONTACT_RESISTANCE, find_change
 from aesi.data.profiles.profile import Profile
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array

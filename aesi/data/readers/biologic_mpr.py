@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.readers.frame import FrameTable, of_mapping
 from aesi.errors import DataError
+from aesi.numerics.typing import AnyArray
 
 
 def open_mpr(path: Path) -> FrameTable:
@@ -26,4 +30,22 @@ def open_mpr(path: Path) -> FrameTable:
             f"{path.name} cannot be read by galvani: {reason[:200]}; export it as text (.mpt)."
         ) from None
     columns = {name: data[name] for name in data.dtype.names}
-    return of_mapping(path, columns, ("Read by galvani.",))
+    notes = ["Read by galvani."]
+    return of_mapping(path, _with_current(columns, notes), tuple(notes))
+
+
+CURRENTS, TIME, CHARGES = ("I/mA", "<I>/mA", "I/A", "<I>/A"), "time/s", ("dq/mA.h", "dQ/mA.h")
+
+
+def _with_current(columns: dict[str, AnyArray], notes: list[str]) -> dict[str, AnyArray]:
+    """EC-Lab stores the charge between rows and no current for some techniques (GCPL), and writes its `<I>` on export:
+    the charge over the time since the row before."""
+    charge = next((name for name in CHARGES if name in columns), None)
+    if charge is None or TIME not in columns or any(name in columns for name in CURRENTS):
+        return columns
+    seconds = np.diff(np.asarray(columns[TIME], dtype=float), prepend=np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        current = np.asarray(columns[charge], dtype=float) * SECONDS_PER_HOUR / seconds
+    current[~(seconds > 0.0)] = 0.0  # the first row, and rows of one stamp
+    notes.append(f"It stores no current: that was taken from the charge between rows ({charge!r}).")
+    return columns | {"<I>/mA": current}

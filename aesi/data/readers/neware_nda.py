@@ -5,8 +5,11 @@ from __future__ import annotations
 import warnings
 from pathlib import Path
 
+import numpy as np
+
 from aesi.data.readers.frame import FrameTable, of_mapping
 from aesi.errors import DataError
+from aesi.numerics.typing import AnyArray
 
 
 def open_nda(path: Path) -> FrameTable:
@@ -27,4 +30,26 @@ def open_nda(path: Path) -> FrameTable:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise DataError(f"{path.name} cannot be read as a cycler's file: {reason[:200]}") from None
     columns = {str(name): frame[name].to_numpy() for name in frame.columns}
-    return of_mapping(path, columns, ("Read by batterydf, which converted its units and names to BDF.",))
+    notes = ["Read by batterydf, which converted its units and names to BDF."]
+    return of_mapping(path, _of_the_test(columns, notes), tuple(notes))
+
+
+TEST_TIME, STEP, CYCLE = "Test Time / s", "Step Count / 1", "Cycle Count / 1"
+TURN = 2.0 * np.pi
+
+
+def _of_the_test(columns: dict[str, AnyArray], notes: list[str]) -> dict[str, AnyArray]:
+    """batterydf 0.1.0 hands over an `.ndax` with the time of the step as that of the test, and with cycles that were
+    converted to radians; both are put right where they are seen.  Can go with a version that does neither."""
+    out = dict(columns)
+    if TEST_TIME in columns and STEP in columns:
+        time_s, step = (np.asarray(columns[name], dtype=float) for name in (TEST_TIME, STEP))
+        back = np.diff(time_s) < 0.0
+        if back.any() and (np.diff(step)[back] != 0.0).all():
+            out[TEST_TIME] = time_s + np.concatenate([[0.0], np.cumsum(np.where(back, time_s[:-1], 0.0))])
+            notes.append("Its time begins anew with each step; the steps were put one after the other.")
+    if CYCLE in columns:
+        turns = np.asarray(columns[CYCLE], dtype=float) / TURN
+        if len(turns) and turns.any() and np.allclose(turns, np.round(turns), atol=1e-6):
+            out[CYCLE] = np.round(turns)
+    return out

@@ -21,6 +21,7 @@ from aesi.physics.cell.relations import to_bpx
 
 BPX_VERSION = "1.1.0"
 ELECTROLYTE_TABLE_MOL_M3 = (1.0, 4000.0)
+"""Range of the table that a function becomes which BPX cannot write."""
 
 
 def write_bpx(cell: CellParameters) -> dict[str, Any]:

@@ -45,9 +45,15 @@ def known_effects(files: Iterable[str | PathLike[str]] = ()) -> dict[str, Effect
 def selected(
     known: Mapping[str, Effect], only: Iterable[str] = (), without: Iterable[str] = ()
 ) -> dict[str, Effect]:
-    """Of `known` those named, or all but those named.  Raises InputError with the nearest match for an unknown id."""
-    kept = {named_effect(name, known).id for name in only} or set(known)
-    left_out = {named_effect(name, known).id for name in without}
+    """Of `known` those named, or all but those named; a name may be several with commas between them.
+
+    Raises InputError with the nearest match for an unknown id.
+    """
+    kept, left_out = (
+        {named_effect(name.strip(), known).id for names in given for name in names.split(",")}
+        for given in (only, without)
+    )
+    kept = kept or set(known)
     return {name: effect for name, effect in known.items() if name in kept - left_out}
 
 

@@ -2,7 +2,7 @@
 
     D(x) = D_declared(x) exp(b1 (s - 1/2) + b2 ((2 s - 1)**2 - 1/3)),   s = (x - x_min) / (x_max - x_min)
 
-so that b1 is the natural logarithm of full over empty of lithium, b2 that of the ends over the middle, less 1/3.
+so that b1 is the natural logarithm of D full of lithium over D empty of it, b2 that of the ends over the middle.
 
 Leaves out staging, hysteresis of D and the thermodynamic factor's own fine structure. Holds within the declared
 stoichiometry limits; a tenth of their span beyond, D stays constant.

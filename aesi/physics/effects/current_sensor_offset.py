@@ -2,8 +2,8 @@
 
     I_read = I_true + offset        I > 0 on discharge
 
-Leaves out drift. Holds for a Hall sensor after a change of magnetisation or temperature. On the inside it
-looks like a leakage_current of the opposite sign; only the ohmic drop of the leads tells them apart.
+Leaves out drift. Holds for a Hall sensor after a change of magnetisation or temperature. The cell
+answers as to a leakage_current of the opposite sign; only the ohmic drop of the leads tells the two apart.
 
 Source: definition; range from zero-current errors of automotive Hall sensors.
 """

@@ -1,7 +1,6 @@
 """Cyclable lithium is gone: the electrodes' windows have shifted against each other.
 
-    q_n x_n + q_p x_p = Q_Li - loss Q,   U_p(x_p) - U_n(x_n) = V_full, V_empty       q electrode capacities,
-    Ah
+    q_n x_n + q_p x_p = Q_Li - loss Q,   U_p(x_p) - U_n(x_n) = V_full, V_empty       q capacity of an electrode, Ah
 
 Stoichiometry windows follow from the declared rest voltages of full and empty; a simulation starts from the
 rest voltage that soc0 declares.

@@ -1,7 +1,7 @@
 """One-state hysteresis of the open-circuit voltage.
 
-    V = V_cell + M(z) h,   dh/dt = -k |I| / Q (h + sign I)    -1 <= h <= 1, I > 0 on discharge, Q nominal
-    capacity M(z) = magnitude (1 + low_soc_excess (1 - 2 z))           z state of charge
+    V = V_cell + M(z) h,   dh/dt = -k |I| / Q (h + sign I)     -1 <= h <= 1, I > 0 on discharge, Q nominal capacity
+    M(z) = magnitude (1 + low_soc_excess (1 - 2 z))            z state of charge
 
 On a long discharge h goes to -1, on a long charge to +1, at rest it stays.
 

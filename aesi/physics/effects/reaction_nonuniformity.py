@@ -3,8 +3,8 @@
     Phi = U(x_r) + eta(i_r, x_r, c_r) + ohmic_r(i) + chi ln(c_r / c_mean),   sum i_r = I        r = 1..4 regions
     ohmic_r : mean drop in solid and electrolyte between region r, the collector and the separator
 
-Each region has a particle of its own and reacts with the electrolyte there. The strength s scales what differs between
-regions: 1 is the full model, 0 one reaction everywhere.
+Each region has a particle of its own and reacts with the electrolyte there. Its strength is 1: a share of it, or more
+than all of it, is no physics, so there is no parameter. `model="dfn"` resolves it, and replaces it where it matters.
 
 Leaves out what happens within a quarter of an electrode. Holds for thick electrodes, high rates, poor electrolyte, and
 flat open-circuit potentials.
@@ -14,36 +14,22 @@ Source: Doyle, Fuller & Newman, J. Electrochem. Soc. 140 (1993) 1526, doi:10.114
 
 from dataclasses import replace
 
-from aesi.parameters import Parameter
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 REGIONS = 4
 """Layers across an electrode."""
-PARAMETERS = {
-    "strength": Parameter(
-        1.0,
-        "dimensionless",
-        bounds=(0.0, 1.0),
-        neutral=0.0,
-        source="0 single particle, 1 porous electrode",
-        description="share of the difference between regions, s",
-    )
-}
 
 
-def cut_into_regions(model: EspmModel, *, strength: float) -> EspmModel:
+def cut_into_regions(model: EspmModel) -> EspmModel:
     """The model with its electrodes cut into regions."""
-    if strength == 0.0:
-        return model
-    return replace(model, regions=REGIONS, region_contrast=strength)
+    return replace(model, regions=REGIONS)
 
 
 EFFECT = Effect(
     "reaction_nonuniformity",
     "physics",
     __doc__,
-    PARAMETERS,
     on_model=cut_into_regions,
     refines="reduction",
     experiment="discharges at 2C and above beside a full porous-electrode simulation",

@@ -1,6 +1,6 @@
 """The cell warms itself: one lump, heated by its losses and by entropy, cooled by its surroundings.
 
-    C dT/dt = sum_u i_u (T dU/dT - U)_u - I V - G (T - T_amb)      i_u > 0 where a particle gives lithium, I discharge
+    C dT/dt = sum_u i_u (T dU/dT - U)_u - I V - G (T - T_amb)      i_u > 0 delithiates, I > 0 on discharge
     D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
 Where a temperature was measured it is used as it is, and the balance is not needed.

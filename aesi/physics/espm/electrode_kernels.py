@@ -224,18 +224,14 @@ def local_conductivity(table, salt, first, unit):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
-def region_drops(solid, salt, kappa, first, contrast, ohm):  # type: ignore[no-untyped-def]
-    """ohm[r, v] : drop of region r per current of region v, differences between regions times `contrast`."""
+def region_drops(solid, salt, kappa, first, ohm):  # type: ignore[no-untyped-def]
+    """ohm[r, v] : drop of region r per current of region v."""
     regions = ohm.shape[0]
     for v in range(regions):
-        mean = 0.0
         for r in range(regions):
             ohm[r, v] = solid[r, v]
             for m in range(r, regions):
                 ohm[r, v] += salt[r, m, v] / kappa[first + m]
-            mean += ohm[r, v] / regions
-        for r in range(regions):
-            ohm[r, v] = mean + contrast * (ohm[r, v] - mean)
 
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)

@@ -80,7 +80,6 @@ def _salt(model: EspmModel) -> Salt:
         c0=e.c0_mol_m3,
         kappa=conductivity_table(e.conductivity, e.c0_mol_m3),
         supply=1.0 - e.transference,
-        contrast=model.region_contrast,
     )
 
 

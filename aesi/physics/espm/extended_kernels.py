@@ -46,7 +46,7 @@ def run_general(  # type: ignore[no-untyped-def]
     ocp, entropic, plating_active = surfaces.ocp, surfaces.entropic, surfaces.plating[0] > 0.0
     energies, heat, area, separator, contact, film, reference_k = cell
     mean, kappa_table = electrolyte.mean, electrolyte.kappa
-    c0, top, contrast = electrolyte.c0, electrolyte.top, electrolyte.contrast
+    c0, top = electrolyte.c0, electrolyte.top
     n_units, n_modes = rates.shape
     m_e, n_e = electrolyte.to_nodes.shape
     regions = surfaces.solid.shape[1]
@@ -128,7 +128,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 pred[u] = means[u]
                 for j in range(n_modes):
                     pred[u] += z[u, j]
-            driest = observe_salt(c, c0, electrolyte.gauss, contrast, salt, log_salt, region_salt)
+            driest = observe_salt(c, c0, electrolyte.gauss, salt, log_salt, region_salt)
             start_k = t_k
             if given and k > 0:
                 t_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
@@ -153,7 +153,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 for u in range(lo, hi):  # start from the last deviations
                     held = y[u] - share[u] * (last_j if side == 0 else -last_j)
                     y[u] = share[u] * total + held
-                region_drops(surfaces.solid[side], surfaces.salt[side], kappa, side * regions, contrast, ohm)
+                region_drops(surfaces.solid[side], surfaces.salt[side], kappa, side * regions, ohm)
                 quicker = arrhenius(energies[2 + side], t_k, reference_k)
                 phi = solve_electrode(
                     lo,

@@ -114,7 +114,7 @@ class Salt(NamedTuple):
     rates : (modes,) 1/s.  gains : (2 regions, modes) mol/m3 per A/m2 s.  to_nodes, project : (nodes, modes) both ways.
     gauss, mean : weights of Gauss points and of the mean over the nodes.
     psi, strength, top : of the variable part of diffusion.  c0 : mol/m3.  kappa : S/m on [0, top].
-    supply : 1 - t+.  contrast : factor of what differs between regions.
+    supply : 1 - t+.
     """
 
     rates: Array
@@ -129,7 +129,6 @@ class Salt(NamedTuple):
     c0: float
     kappa: Array
     supply: float
-    contrast: float
 
 
 class Surfaces(NamedTuple):

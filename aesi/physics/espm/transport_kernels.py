@@ -115,10 +115,9 @@ def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-u
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
+def observe_salt(c, c0, gauss, salt, log_salt, region_salt):  # type: ignore[no-untyped-def]
     """Salt at the Gauss points over rest, its mean logarithm and mean (mol/m3) in each region.
 
-    contrast : factor of what differs between the regions of an electrode in the logarithm.
     Returns the mean over rest of the electrode that has less.
     """
     for i in range(gauss.shape[0]):
@@ -135,15 +134,10 @@ def observe_salt(c, c0, gauss, contrast, salt, log_salt, region_salt):  # type: 
         driest = min(driest, whole)
     for i in range(gauss.shape[0]):
         salt[i] = wet(salt[i])
-    for side in range(2):
-        middle = 0.0
-        for r in range(side * regions, (side + 1) * regions):
-            g1, g2, g3 = salt[3 * r], salt[3 * r + 1], salt[3 * r + 2]
-            log_salt[r] = (5.0 * math.log(g1 * g3) + 8.0 * math.log(g2)) / 18.0
-            region_salt[r] = c0 * (5.0 * (g1 + g3) + 8.0 * g2) / 18.0
-            middle += log_salt[r] / regions
-        for r in range(side * regions, (side + 1) * regions):
-            log_salt[r] = middle + contrast * (log_salt[r] - middle)
+    for r in range(2 * regions):
+        g1, g2, g3 = salt[3 * r], salt[3 * r + 1], salt[3 * r + 2]
+        log_salt[r] = (5.0 * math.log(g1 * g3) + 8.0 * math.log(g2)) / 18.0
+        region_salt[r] = c0 * (5.0 * (g1 + g3) + 8.0 * g2) / 18.0
     return driest
 
 

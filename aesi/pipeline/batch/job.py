@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from aesi.data.reading import Reading
 from aesi.errors import AesiError
-from aesi.physics import Cell
 from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
@@ -18,7 +17,6 @@ from aesi.pipeline.discovery.discover import run_case, write_discovery
 from aesi.pipeline.report.sizes import finding_line
 
 ROW = "row.json"
-MILLI = 1e3
 
 
 @dataclass(frozen=True)
@@ -34,21 +32,6 @@ class Settings:
     def key(self) -> str:
         """The settings as text."""
         return repr(self)
-
-
-@dataclass(frozen=True)
-class Health:
-    """State of one check-up, from the calibrated cell.
-
-    resistance_mohm : of contacts and films, beyond the electrolyte and the electrodes.  inventory_ah : cyclable
-    lithium, in both electrodes.  negative_ah, positive_ah : charge that the active material of each can hold.
-    """
-
-    resistance_mohm: float
-    inventory_ah: float
-    negative_ah: float
-    positive_ah: float
-    capacity_ah: float
 
 
 def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
@@ -82,19 +65,6 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
         }
     (folder / ROW).write_text(json.dumps({"key": key, "row": row}, indent=1) + "\n", encoding="utf-8")
     return row
-
-
-def health_of(cell: Cell) -> Health:
-    """What a calibrated cell says of resistance, inventory and active material."""
-    negative, positive = (cell.electrode_capacity_ah(e) for e in (cell.negative, cell.positive))
-    theta_n, theta_p = cell.stoichiometries(1.0)
-    return Health(
-        resistance_mohm=MILLI * cell.contact_resistance_ohm,
-        inventory_ah=negative * theta_n + positive * theta_p,
-        negative_ah=negative,
-        positive_ah=positive,
-        capacity_ah=cell.capacity_ah,
-    )
 
 
 def _known(folder: Path, key: str) -> dict[str, Any] | None:
@@ -133,6 +103,8 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         "report": f"{job.name}/report.html",
     }
     if job.specimen:
-        calibrate_files(job.cell, case.measurements, folder / "calibrated.bpx.json", Request(soc0=job.soc0))
-        row |= asdict(health_of(Cell.from_bpx(folder / "calibrated.bpx.json")))
+        calibrated = folder / "calibrated.bpx.json"
+        report = calibrate_files(job.cell, case.measurements, calibrated, Request(soc0=job.soc0))
+        for name, estimate in report["health"].items():
+            row |= {name: estimate["value"], f"{name}_low": estimate["low"], f"{name}_high": estimate["high"]}
     return row | {"seconds": round(time.monotonic() - started, 1)}

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aesi.calibration.health import HEALTH_WORDS
 from aesi.pipeline.report.page import write_page
 
 if TYPE_CHECKING:
@@ -26,22 +27,11 @@ HEADER = (
     "before_test_mv",
     "recalibrated_test_mv",
     "after_test_mv",
-    "resistance_mohm",
-    "inventory_ah",
-    "negative_ah",
-    "positive_ah",
-    "capacity_ah",
+    *(f"{name}{end}" for name in HEALTH_WORDS for end in ("", "_low", "_high")),
     "seconds",
     "report",
     "reason",
 )
-TRENDS = {
-    "resistance_mohm": ("Resistance of contacts and films", "mohm"),
-    "inventory_ah": ("Cyclable lithium", "Ah"),
-    "negative_ah": ("Active material, negative", "Ah"),
-    "positive_ah": ("Active material, positive", "Ah"),
-    "capacity_ah": ("Capacity", "Ah"),
-}
 CellRow = Mapping[str, Any]
 
 
@@ -60,7 +50,7 @@ def write_summary(out: Path, rows: Sequence[CellRow], title: str) -> Path:
         title=title,
         rows=[{key: row.get(key) for key in HEADER} for row in rows],
         specimens=specimens,
-        names={key: f"{words}, {unit}" for key, (words, unit) in TRENDS.items()},
+        names=HEALTH_WORDS,
         done=sum(row["status"] == "done" for row in rows),
     )
 
@@ -70,7 +60,10 @@ def trends(rows: Sequence[CellRow]) -> dict[str, list[dict[str, float]]]:
     found: dict[str, list[dict[str, float]]] = {}
     for row in rows:
         if row.get("specimen") and row.get("at") is not None and row.get("inventory_ah") is not None:
-            kept = {"at": row["at"], **{key: row[key] for key in TRENDS}}
+            kept = {
+                "at": row["at"],
+                **{key: row[key] for key in HEADER if key.startswith(tuple(HEALTH_WORDS))},
+            }
             found.setdefault(row["specimen"], []).append(kept)
     return {name: sorted(each, key=lambda r: r["at"]) for name, each in found.items() if len(each) > 1}
 
@@ -89,15 +82,24 @@ def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
 
     from aesi.pipeline.report.style import MODEL_COLOURS, framed
 
-    titles = [words for words, _ in TRENDS.values()]  # above each panel: beside it they would not fit
+    quantities = [words.rpartition(", ") for words in HEALTH_WORDS.values()]
+    titles = [
+        words[:1].upper() + words[1:] for words, _, _ in quantities
+    ]  # beside a panel they would not fit
     fig = make_subplots(
-        rows=len(TRENDS), cols=1, shared_xaxes=True, vertical_spacing=0.07, subplot_titles=titles
+        rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.07, subplot_titles=titles
     )
-    for line, (name, each) in enumerate(specimens.items()):
-        for panel, key in enumerate(TRENDS, start=1):
+    for panel, key in enumerate(HEALTH_WORDS, start=1):
+        for line, (name, each) in enumerate(specimens.items()):
             fig.add_scatter(
                 x=[row["at"] for row in each],
                 y=[row[key] for row in each],
+                error_y={
+                    "type": "data",
+                    "array": [row[f"{key}_high"] - row[key] for row in each],
+                    "arrayminus": [row[key] - row[f"{key}_low"] for row in each],
+                    "thickness": 1,
+                },
                 name=name,
                 legendgroup=name,
                 showlegend=panel == 1,
@@ -106,9 +108,7 @@ def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
                 row=panel,
                 col=1,
             )
-    for panel, (_, unit) in enumerate(TRENDS.values(), start=1):
-        fig.update_yaxes(title_text=unit, row=panel, col=1)
-    fig.update_xaxes(title_text="at", row=len(TRENDS), col=1)
-    return framed(
-        fig, "Ageing", "Each check-up calibrated on its own from the same cell file.", 170 * len(TRENDS)
-    )
+        fig.update_yaxes(title_text=quantities[panel - 1][2], row=panel, col=1)
+    fig.update_xaxes(title_text="at", row=len(titles), col=1)
+    caption = "Each check-up calibrated on its own from the same cell file, with 95 % intervals."
+    return framed(fig, "State of health", caption, 170 * len(titles))

@@ -12,8 +12,8 @@ from typing import Any
 
 from aesi.physics import ModelName
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.evaluate import EvaluatedModels
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.judging.evaluate import EvaluatedModels
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
 from aesi.pipeline.notes import together

@@ -88,6 +88,7 @@ KNOBS = (
 ALL = tuple(range(len(KNOBS)))
 INITIAL_STATE = (0,)
 RESISTOR = (1,)
+"""Its place, and that of the initial state, in KNOBS."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from aesi.pipeline.report.sizes import rounded
+from aesi.pipeline.report.sizes import TELLING, rounded
 from aesi.pipeline.report.views import Row
 
-TELLING = 1.0
-"""Standard deviations of its tolerance: what moved less is as it was declared, for all that these data say."""
 MOST_NAMED = 3
 """Parameters that one sentence names."""
 INITIAL_STATE = "soc0"
@@ -59,8 +57,10 @@ def parameter_words(row: Row) -> str:
     """'solid diffusivity (negative)', 'the initial state of charge of drive'."""
     if row["effect"] == INITIAL_STATE:
         return f"the initial state of charge of {row['parameter']}"
-    name = row["parameter"].removesuffix("_factor").replace("_", " ")
-    return f"{row['effect'].replace('_', ' ')} ({name})"
+    effect, name = row["effect"].replace("_", " "), row["parameter"]
+    if name.rpartition("_")[0] in row["effect"]:  # 'resistance_ohm' of 'series_resistance' says nothing more
+        return str(effect)
+    return f"{effect} ({name.removesuffix('_factor').replace('_', ' ')})"
 
 
 def moved_summary(rows: Iterable[Row]) -> str:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aesi.constants import MILLI
+
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
@@ -13,7 +15,6 @@ if TYPE_CHECKING:
 
 SHOWN = 6
 """Spectra of one temperature that a figure can hold."""
-MILLI = 1e3
 
 
 def nyquist(spectra: Sequence[SpectrumError]) -> Figure:

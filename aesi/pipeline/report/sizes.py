@@ -10,7 +10,9 @@ from aesi.parameters import Parameter
 from aesi.physics.effects import CATALOGUE
 
 SAME_SHARE = 0.98
-"""An error after that is not below this share of the recalibrated one is no better than a refit."""
+"""A finding that leaves more than this share of the error of a refit is no better than the refit."""
+TELLING = 1.0
+"""Standard deviations of its tolerance: a parameter that a refit moved by less counts as declared."""
 MOST_PARAMETERS = 3
 """Of an effect, in one sentence."""
 ADDED = "added to what"
@@ -71,10 +73,22 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
     if verdict == "unknown":
         left = "something real is left that no effect of the catalogue explains"
         return f"unknown: {left}" + (f"; so far {', '.join(effects)}" if effects else "")
-    own, after = (discovery[state]["test"].get("rmse_mv") for state in ("recalibrated", "after"))
-    if own is not None and after is not None and after > SAME_SHARE * own:
+    if refit_does_as_well(discovery):
         return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit does as well"
     return f"found: {', '.join(effects)}"
+
+
+def refit_does_as_well(discovery: Mapping[str, Any]) -> bool:
+    """Whether the declared model with its own parameters refitted leaves as little of unseen data as the finding, and
+    by other means: a refit that moved what was found, and nothing else, is the same explanation."""
+    own, after = (
+        discovery.get(state, {}).get("test", {}).get("rmse_mv") for state in ("recalibrated", "after")
+    )
+    if own is None or after is None or after <= SAME_SHARE * own:
+        return False
+    rows = discovery.get("own_parameters", {}).get("recalibrated", ())
+    moved = {row["effect"] for row in rows if abs(row["deviations"]) > TELLING}
+    return not moved or not moved <= set(discovery["effects"])
 
 
 def _tells(value: Mapping[str, Any], parameter: Parameter | None) -> bool:

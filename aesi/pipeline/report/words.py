@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
-from aesi.pipeline.report.sizes import SAME_SHARE, with_size
+from aesi.pipeline.report.sizes import refit_does_as_well, with_size
 from aesi.pipeline.report.views import DiscoveryView, Row, RunView
 
 LARGE_SHARE = 0.5
@@ -122,14 +122,6 @@ def name_confidence(discovery: Mapping[str, Any]) -> str:
     share = f"over {100 * CERTAIN:.0f} %" if value > CERTAIN else f"{100 * value:.0f} %"
     names = "this name" if len(discovery["effects"]) == 1 else "these names"
     return f" ({share} confidence in {names})"
-
-
-def refit_does_as_well(discovery: Mapping[str, Any]) -> bool:
-    """Whether the declared model with its own parameters refitted leaves as little of unseen data as the finding."""
-    own, after = (
-        discovery.get(state, {}).get("test", {}).get("rmse_mv") for state in ("recalibrated", "after")
-    )
-    return own is not None and after is not None and after > SAME_SHARE * own
 
 
 def reason_finding(discovery: Mapping[str, Any]) -> str:

@@ -28,6 +28,7 @@ MOST_ROWS = 20_000
 THRESHOLD = 1e-3
 """Coefficients below are dropped."""
 _RIDGES = (1.0, 10.0, 100.0, 1000.0)
+"""Weights of PySINDy's ridge that are tried."""
 
 
 def pysindy_ensemble(problem: Problem, seed: int = 0) -> SparseModel:

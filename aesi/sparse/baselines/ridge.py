@@ -21,7 +21,7 @@ from aesi.sparse.stridge import STRidge
 _WEIGHTS = FitnessWeights(0.5, 0.5, 0.0)
 
 
-def plain_ridge(problem: Problem, seed: int = 0) -> SparseModel:
+def plain_ridge(problem: Problem) -> SparseModel:
     """The best of the grid; nothing is random. Raises FitError where all of them diverge."""
     outcomes = [
         evaluate_single(problem, genome, STRidge(genome.lambda1, 0.0).fit_factor, "ridge", _WEIGHTS)

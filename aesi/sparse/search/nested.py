@@ -18,6 +18,7 @@ from aesi.sparse.search.evaluate import Candidate
 from aesi.sparse.search.problem import Problem
 
 ENSEMBLES = (0, 1)
+"""AESI I and II, as in `Candidate.fold_sums`."""
 
 
 def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: int) -> Array:

@@ -13,7 +13,7 @@ from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library
 
 
-def prepared(
+def prepared_series(
     split: Split, inputs: tuple[str, ...] | None, library: Library | None
 ) -> tuple[tuple[ErrorSeries, ...], tuple[ErrorSeries, ...], tuple[str, ...]]:
     """Training and validation records with their inputs, and a sentence for each input that was left out.

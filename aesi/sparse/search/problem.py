@@ -33,7 +33,7 @@ from aesi.numerics.blocks import (
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import Split
-from aesi.sparse.search.prepare import not_finite, prepared, variables
+from aesi.sparse.search.prepare import not_finite, prepared_series, variables
 from aesi.sparse.search.rows import (
     balanced_weights,
     default_block,
@@ -133,7 +133,7 @@ class Problem:
         error or all inputs constant, NaN, or fewer rows than library terms.
         """
         options = options or Options()
-        train, valid, notes = prepared(split, options.inputs, library)
+        train, valid, notes = prepared_series(split, options.inputs, library)
         inputs = train[0].input_names
         library = library or Library.build(
             inputs, options.p_c, options.d, options.factors, options.special, options.mixed

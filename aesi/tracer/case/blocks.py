@@ -52,7 +52,7 @@ def blocks_of(problem: InverseProblem) -> Blocks:
     for i, rows in enumerate(problem.slices):
         length = rows.stop - rows.start
         pieces = max(FEWEST, round(BLOCKS * length / total))
-        if problem.trust == "measured":
+        if problem.coarse:
             pieces = min(pieces, max(FEWEST_MEASURED, int(problem.independent[rows].sum())))
         edges = np.linspace(rows.start, rows.stop, pieces + 1).astype(int)[:-1]
         starts += edges.tolist()

@@ -58,6 +58,11 @@ class InverseProblem:
     trust: Trust = "tight"
     model: ModelName = "espm"
 
+    @property
+    def coarse(self) -> bool:
+        """True where the model errs as models of measured cells do, so that the likelihood is coarsened."""
+        return self.trust in ("loose", "measured")
+
     def competing(self) -> tuple[str, ...]:
         """Ids of the effects that may be named: not those that only take back an approximation of the model."""
         return tuple(name for name, effect in self.effects.items() if effect.refines is None)
@@ -95,8 +100,16 @@ class InverseProblem:
     def active(self, values: ValuesByOwner) -> tuple[ActiveEffect, ...]:
         """The effects to simulate with.  One under test is in even at its neutral point: some say the same of a cell in
         other words there (windows by voltages), and a fit must not see a step."""
-        owners = [owner for owner in values if owner != STATE_OF_CHARGE]
-        return (*self.fixed, *(self.effects[owner].activate(**values[owner]) for owner in owners))
+        return (
+            *self.fixed,
+            *(self._activated(owner, given) for owner, given in values.items() if owner != STATE_OF_CHARGE),
+        )
+
+    def _activated(self, owner: str, values: Mapping[str, float]) -> ActiveEffect:
+        """An effect at these values, its other parameters where they do nothing."""
+        effect = self.effects[owner]
+        still = {name: p.neutral for name, p in effect.parameters.items() if p.neutral is not None}
+        return effect.activate(**{**still, **values})
 
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
         """(n,) V over the fit parts of all records, or of one; None where the model fails."""

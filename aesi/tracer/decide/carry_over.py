@@ -24,6 +24,7 @@ ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)
 """Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
 STEP_S = 10.0
+"""Between rows of a full discharge or charge."""
 
 
 @dataclass(frozen=True)

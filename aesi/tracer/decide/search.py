@@ -104,11 +104,11 @@ def base_of(
 ) -> tuple[InverseProblem, Blocks, FittedHypothesis] | None:
     """The hypothesis without effects; None where it cannot be simulated."""
     blocks = blocks_of(problem)
-    fit = _fitted(problem, blocks, (), None, PRIORS[problem.trust].median_v, BASE_STEPS, archive)
+    fit = fitted_hypothesis(problem, blocks, (), None, PRIORS[problem.trust].median_v, BASE_STEPS, archive)
     return None if fit is None else (problem, blocks, fit)
 
 
-def _fitted(
+def fitted_hypothesis(
     problem: InverseProblem,
     blocks: Blocks,
     hypothesis: Sequence[str],
@@ -117,6 +117,8 @@ def _fitted(
     steps: int,
     archive: Archive,
 ) -> FittedHypothesis | None:
+    """A hypothesis fitted with the whole model, from `placed` values or the middle of every prior; as the archive
+    has it where it was fitted before.  None where the model fails."""
     fitter = HypothesisFitter(problem, blocks, hypothesis)
     name = fit_name(problem, "fit", hypothesis)
     x = archive.get(name, len(fitter.free))
@@ -157,8 +159,7 @@ def searched(
         chosen = step.admitted
         if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
             break
-        alone = enough(blocks, chosen) or problem.trust == "measured"
-        others = () if alone else (f for f in step.fitted if f is not chosen)
+        others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
     chosen = _pruned(problem, blocks, chosen, steps, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
@@ -177,7 +178,7 @@ def with_wrong_parameters(path: Path, archive: Archive) -> Path:
     for owner in sorted(beyond, key=lambda name: -beyond[name]):
         hypothesis = (*chosen.hypothesis, owner)
         start, size = chosen.placed, chosen.score.delta_v
-        fit = _fitted(path.problem, path.blocks, hypothesis, start, size, 2 * REFIT_STEPS, archive)
+        fit = fitted_hypothesis(path.problem, path.blocks, hypothesis, start, size, 2 * REFIT_STEPS, archive)
         if fit is not None and fit.score.total > chosen.score.total - ALIKE_NATS and not fit.at_bounds:
             chosen = fit
     if chosen is path.chosen:
@@ -201,7 +202,7 @@ def _pruned(
         for name in chosen.hypothesis[:-1]:  # the last one was admitted on top of the others
             rest = tuple(other for other in chosen.hypothesis if other != name)
             start, size = chosen.placed, chosen.score.delta_v
-            fit = _fitted(problem, blocks, rest, start, size, 2 * REFIT_STEPS, archive)
+            fit = fitted_hypothesis(problem, blocks, rest, start, size, 2 * REFIT_STEPS, archive)
             if fit is None:
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
@@ -227,7 +228,7 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
         return None
     problem, blocks, base = based
     start, size = path.chosen.placed, path.chosen.score.delta_v
-    fit = _fitted(problem, blocks, path.chosen.hypothesis, start, size, BASE_STEPS, archive)
+    fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, start, size, BASE_STEPS, archive)
     return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
 
 
@@ -261,7 +262,7 @@ def _step(
     least_nats = admission_nats(Parent(problem, blocks, best), slopes)
     fitted = []
     for one in (g for g in ranked[:FINALISTS] if g.score.total - best.score.total > least_nats / 2):
-        fit = _fitted(
+        fit = fitted_hypothesis(
             problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, REFIT_STEPS, archive
         )
         if fit is not None:

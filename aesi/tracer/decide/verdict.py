@@ -17,6 +17,7 @@ from aesi.tracer.likelihood.model_error import MEASURED_V
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
+"""Names that a group of look-alikes holds at most."""
 
 
 @dataclass(frozen=True)

@@ -52,11 +52,12 @@ class SizePrior:
 PRIORS: dict[Trust, SizePrior] = {
     "exact": SizePrior(2e-4, 0.7),
     "tight": SizePrior(2e-4, 0.7),
-    "loose": SizePrior(4e-3, 0.7),
+    "loose": SizePrior(MEASURED_V, 1.0, tuple(MEASURED_V * 2.0**k for k in range(-5, 3))),
     "measured": SizePrior(MEASURED_V, 1.0, tuple(MEASURED_V * 2.0**k for k in range(5))),
 }
 """exact, tight : what this model and an independent solver of the same cell leave of each other.
-loose : what calibrated measured cells leave.  measured : the same, as the least that it can be."""
+loose, measured : what files of measured cells leave; less where all of their parameters are open, no less where they
+are as declared."""
 CHARGE_PER_V = 0.4
 """Of a measured cell: error of charge over that of the voltage; the same records are off by 0.1 to 0.6 % of charge."""
 
@@ -74,7 +75,7 @@ def amplitude_v(steepness: Array, delta_v: float, trust: Trust) -> Array:
 def whitened(problem: InverseProblem, blocks: Blocks, table: Array, delta_v: float) -> tuple[Array, Array]:
     """Columns (n, m) in V, whitened at a size of the model error, and log|C| by rows (n,)."""
     amplitude = amplitude_v(problem.steepness, delta_v, problem.trust)
-    if problem.trust != "measured":
+    if not problem.coarse:
         return whiten(table, problem.time_s, blocks.starts[:-1], amplitude, problem.white_v)
     share = problem.independent
     log_det = share * (2.0 * np.log(amplitude) + LOG_2PI) - LOG_2PI  # of so many samples, not of a row

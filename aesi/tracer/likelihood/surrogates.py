@@ -55,7 +55,7 @@ def largest_gains(
 def _drawn(problem: InverseProblem, blocks: Blocks, delta_v: float, rng: np.random.Generator) -> Array:
     """(n,) V, one draw of the model error and the noise."""
     amplitude = amplitude_v(problem.steepness, delta_v, problem.trust)
-    if problem.trust != "measured":
+    if not problem.coarse:
         return draw(problem.time_s, blocks.starts[:-1], amplitude, problem.white_v, rng)
     sample = np.floor(np.cumsum(problem.independent) - problem.independent).astype(int)
     return amplitude * rng.normal(size=sample[-1] + 1)[sample]

@@ -62,8 +62,7 @@ def test_a_run_turns_to_nobody(watched, arguments, tracked):
 
 @pytest.mark.slow
 def test_a_run_under_prefect_and_dask_stays_on_loopback(watched, arguments, tracked):
-    given = [each for each in arguments() if each != "--no-prefect"]
-    seen = watched(*given, "--runner", "dask")
+    seen = watched(*arguments(prefect=True), "--runner", "dask")
     assert ("socket.bind", "127.0.0.1") in seen  # the hook sees the servers that were started
     assert_stays_here(seen)
 

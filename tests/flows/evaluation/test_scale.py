@@ -92,8 +92,7 @@ def test_two_runs_on_one_experiment_share_candidates_and_both_end(aesi, argument
 
 
 def test_the_command_starts_prefect_in_an_empty_workspace(aesi, arguments, workspace):
-    given = [each for each in arguments() if each != "--no-prefect"]
-    process = aesi(*given)
+    process = aesi(*arguments(prefect=True))
     _, said = process.communicate(timeout=240)
     assert process.returncode == 0, said
     assert "Failed to create" not in said

@@ -7,6 +7,7 @@ import pytest
 
 from flows.tracking.delivery import deliver
 from flows.tracking.store import KIND, Store
+from flows.tracking.view import NOTE, RUN_COLUMNS, VIEW, experiment_tags
 
 CONTENT = {"bagging": {"T1(I)": 0.25}}
 
@@ -63,3 +64,32 @@ def test_a_failed_candidate_has_neither_metrics_nor_files(store, item):
     deliver(store, item("candidate:1", metrics={}, files={}, status="FAILED"), again=False)
     (run,) = children(store, item).values()
     assert (run.info.status, run.data.metrics) == ("FAILED", {})
+
+
+def test_a_candidate_is_marked_after_it_was_sent(store, item):
+    for number in (1, 2):
+        deliver(store, item(f"candidate:{number}"), again=False)
+    deliver(
+        store,
+        {
+            "kind": "mark",
+            "experiment_id": store.find_experiment("cells"),
+            "parent": item.parent,
+            "label": "candidate:2",
+            "tags": {"aesi.chosen": "true"},
+        },
+        again=False,
+    )
+    marked = {label: run.data.tags.get("aesi.chosen") for label, run in children(store, item).items()}
+    assert marked == {"candidate:1": None, "candidate:2": "true"}
+
+
+def test_what_a_person_wrote_about_an_experiment_stays(store):
+    number = store.experiment("cells")
+    store.client.set_experiment_tag(number, NOTE, "mine")
+    tags = experiment_tags("ours", RUN_COLUMNS)
+    deliver(store, {"kind": "experiment", "experiment_id": number, "tags": tags}, again=False)
+    there = store.client.get_experiment(number).tags
+    assert there[NOTE] == "mine"
+    columns = json.loads(there[f"mlflow.sharedViewState.{VIEW}"])["selectedColumns"]
+    assert "metrics.`free_run/test_rmse_mv`" in columns

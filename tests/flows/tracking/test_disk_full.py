@@ -51,13 +51,13 @@ def candidates_on_disk(workspace):
 def full_and_then_not(small_disk, aesi, arguments, ready):
     """Fill the disk as soon as `ready`, see the run end, free the disk and resume; what each of them said."""
     run = aesi(*arguments)
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300
     while not ready():
         assert run.poll() is None, run.communicate()[1]
         assert time.monotonic() < deadline
         time.sleep(0.01)
     ballast = fill(small_disk)
-    _, said = run.communicate(timeout=120)
+    _, said = run.communicate(timeout=300)
     assert run.returncode == 1, said
     ballast.unlink()
     resumed = aesi(*arguments, "--resume")

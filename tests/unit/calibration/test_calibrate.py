@@ -7,6 +7,7 @@ import pytest
 
 from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
+from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import sampled
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
@@ -37,6 +38,17 @@ def test_every_parameter_has_an_interval_and_a_source(found):
     for interval in found.parameters.values():
         assert interval.low <= interval.value <= interval.high
         assert interval.source
+
+
+def test_the_state_of_health_holds_the_true_one_within_its_intervals(found, truth):
+    intervals, true, ours = health_intervals(found), health_of(truth), health_of(found.cell)
+    assert set(intervals) == set(HEALTH_WORDS)
+    for name, (low, high) in intervals.items():
+        assert low < getattr(ours, name) < high
+    low, high = intervals["resistance_mohm"]
+    assert low < true.resistance_mohm < high
+    low, high = intervals["capacity_ah"]
+    assert high - low < 0.5 * true.capacity_ah
 
 
 def test_what_the_records_leave_open_is_named_with_its_weights(found):

@@ -8,6 +8,7 @@ import warnings
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -91,6 +92,38 @@ def neware() -> tuple[str, bytes]:
     return "neware.csv", "\n".join([head, *body, ""]).encode("utf-8-sig")
 
 
+def neware_layers() -> tuple[str, bytes]:
+    """Rows of the cycle and of each step above their records; tabs pad the cells."""
+    lines = [
+        "Cycle Index,Chg. Cap.(Ah),DChg. Cap.(Ah)",
+        ",Step Index,Step Type,Step Time",
+        ",,DataPoint,Time,Total Time,Current(A),Voltage(V),Capacity(Ah),Date,T1(?)",
+        '1,"\t0.1","\t0.2"',
+    ]
+    body = rows(
+        range(1, N + 1), TIME, [clock(t) for t in TIME], -CURRENT, VOLTAGE, TIME * 0,
+        ["2026-03-06 12:37:25"] * N, TEMPERATURE,
+    )  # fmt: skip
+    for k, line in enumerate(body):
+        if k % 15 == 0:
+            lines.append(f",{k // 15 + 1},Rest,00:10:00")
+        lines.append(",," + ",".join(f'"\t{cell}"' for cell in line.split(",")))
+    return "neware_layers.csv", "\r\n".join([*lines, ""]).encode("latin-1")
+
+
+def pec() -> tuple[str, bytes]:
+    lines = ["Request Year:,2026", "Test:,25205", "Test Description:,", "#END RESULTS CHECK"]
+    lines.append(
+        "Test,Cell,Rack,Step,Cycle,Total Time (Seconds),Step Time (Seconds),Voltage (mV),Current (mA),"
+        "ReasonCode,Cell surface temperature (°C),"
+    )
+    lines += rows(
+        [187] * N, [1] * N, ["SBT0550"] * N, STEP, STEP // 4, TIME, TIME, 1e3 * VOLTAGE, -1e3 * CURRENT,
+        [30] * N, TEMPERATURE, [""] * N,
+    )  # fmt: skip
+    return "pec.csv", "\n".join([*lines, ""]).encode()
+
+
 def neware_magnitudes() -> tuple[str, bytes]:
     name, content = neware()
     return name, content.replace(b",-", b",")
@@ -164,7 +197,7 @@ def workbook() -> tuple[str, bytes]:
 
 
 EXPORTS: tuple[Callable[[], tuple[str, bytes]], ...] = (
-    arbin, maccor, biologic, neware, neware_magnitudes, digatron, basytec, novonix, bdf, workbook,
+    arbin, maccor, biologic, neware, neware_layers, neware_magnitudes, digatron, basytec, novonix, pec, bdf, workbook,
 )  # fmt: skip
 
 
@@ -173,6 +206,66 @@ def written(folder: Path, export: Callable[[], tuple[str, bytes]]) -> Path:
     path = folder / name
     path.write_bytes(content)
     return path
+
+
+def test_battery_data_in_hours_and_milliamperes_is_converted_by_its_names(tmp_path):
+    path = tmp_path / "bdf.csv"
+    lines = ["Test Time / h,Current / mA,Voltage / V", *rows(TIME / 3600.0, -1e3 * CURRENT, VOLTAGE)]
+    path.write_text("\n".join([*lines, ""]))
+    data = read_measurement(path)
+    assert data.time_s == pytest.approx(TIME, abs=1e-6)
+    assert data.current_a == pytest.approx(CURRENT)
+    assert any("converted from h" in note for note in data.notes)
+
+
+def test_a_biologic_file_without_a_current_takes_it_from_the_charge(tmp_path, monkeypatch):
+    charge = np.concatenate([[0.0], -1e3 * CURRENT[1:] * np.diff(TIME) / 3600.0])
+    kinds = [("time/s", float), ("Ewe/V", float), ("dq/mA.h", float), ("Ns", int)]
+    stored = np.array(list(zip(TIME, VOLTAGE, charge, STEP, strict=True)), dtype=kinds)
+    galvani = SimpleNamespace(BioLogic=SimpleNamespace(MPRfile=lambda path: SimpleNamespace(data=stored)))
+    monkeypatch.setitem(sys.modules, "galvani", galvani)
+    path = tmp_path / "gcpl.mpr"
+    path.write_bytes(b"BIO-LOGIC MODULAR FILE")
+    data = read_measurement(path)
+    assert data.current_a[1:] == pytest.approx(CURRENT[1:])
+    assert any("stores no current" in note for note in data.notes)
+
+
+def test_a_binary_whose_time_begins_anew_with_each_step_is_put_together(tmp_path, monkeypatch):
+    import pandas as pd
+
+    frame = pd.DataFrame(
+        {
+            "Test Time / s": np.tile(np.arange(15) * 10.0, 6),
+            "Current / A": -CURRENT,
+            "Voltage / V": VOLTAGE,
+            "Step Count / 1": STEP,
+            "Cycle Count / 1": 2 * np.pi * (STEP // 4 + 1),
+        }
+    )
+    monkeypatch.setitem(sys.modules, "bdf", SimpleNamespace(read=lambda path, validate: frame))
+    path = tmp_path / "test.ndax"
+    path.write_bytes(b"PK\x03\x04")
+    data = read(path, Reading(duplicates="first"))
+    assert data.time_s[-1] == pytest.approx(6 * 140.0)
+    assert any("begins anew" in note for note in data.notes)
+    assert len(read(path, Reading(cycle="2", duplicates="first"))) == 43  # steps 4 to 6, less one stamp each
+
+
+def test_many_sparsely_logged_rests_are_one_note(tmp_path):
+    time = np.concatenate([1000.0 * k + np.arange(100.0) for k in range(6)])
+    current = np.tile(np.repeat([0.0, 1.0, 0.0], [10, 80, 10]), 6)
+    path = tmp_path / "rests.csv"
+    path.write_text("\n".join(["time_s,current_a,voltage_v", *rows(time, current, 3.7 - 0.03 * current), ""]))
+    notes = [note for note in read_measurement(path).notes if "rested" in note]
+    assert notes == ["rests.csv: No rows for 901 to 901 s at 5 places, the first at 99 s; the cell rested."]
+
+
+def test_a_temperature_of_nought_everywhere_is_told_of(tmp_path):
+    path = tmp_path / "cold.csv"
+    lines = rows(TIME, CURRENT, VOLTAGE, TIME * 0)
+    path.write_text("\n".join(["time_s,current_a,voltage_v,temperature_degc", *lines, ""]))
+    assert any("no sensor is connected" in note for note in read_measurement(path).notes)
 
 
 @pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
@@ -186,7 +279,12 @@ def test_every_export_gives_the_same_test(tmp_path, export):
     assert any("turned" in note or "sign of the current" in note for note in record.notes)
 
 
-@pytest.mark.parametrize("export", EXPORTS, ids=lambda export: export.__name__)
+WITH_STEPS = tuple(
+    export for export in EXPORTS if export is not neware_layers
+)  # whose steps are rows of their own
+
+
+@pytest.mark.parametrize("export", WITH_STEPS, ids=lambda export: export.__name__)
 def test_a_step_of_every_export_can_be_taken(tmp_path, export):
     record = read_measurement(written(tmp_path, export), step="2:3")
     np.testing.assert_allclose(record.current_a, CURRENT[15:45], atol=1e-9)

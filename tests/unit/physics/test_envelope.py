@@ -22,12 +22,15 @@ RATED_C = {
 """Continuous discharge in the data sheets (the pouch cell has none: what its drive cycles ask for)."""
 CAUSES = ("more charge than the cell has", "solid diffusion cannot follow", "the electrolyte ran out of salt")
 
+NO_REACTION = "no reaction was found"
+
 
 @cache
 def cell_of(name: str) -> Cell:
     return Cell.from_bpx(CELLS / f"{name}.bpx.json")
 
 
+@pytest.mark.parametrize("model", ["espm", "dfn"])
 @settings(max_examples=60, deadline=None)
 @given(
     name=st.sampled_from(sorted(RATED_C)),
@@ -35,13 +38,13 @@ def cell_of(name: str) -> Cell:
     share=st.floats(-1.0, 1.0).filter(lambda s: abs(s) > 0.01),
     soc0=st.floats(0.0, 1.0),
 )
-def test_over_the_envelope_a_simulation_ends_at_its_cut_off_or_says_why_not(name, degc, share, soc0):
+def test_over_the_envelope_a_simulation_ends_at_its_cut_off_or_says_why_not(model, name, degc, share, soc0):
     cell = cell_of(name)
     rate = share * RATED_C[name] if share > 0 else share
     current = rate * cell.nominal_capacity_ah
     room_ah = cell.capacity_ah * (soc0 if current > 0 else 1.0 - soc0)
     time = np.linspace(0.0, max(1.15 * room_ah / abs(current) * 3600.0, 5.0), 400)
-    run = simulate(cell, time, np.full(400, current), soc0, (), degc, on_depletion="clip")
+    run = simulate(cell, time, np.full(400, current), soc0, (), degc, on_depletion="clip", model=model)
     assert np.isfinite(run.voltage_v).all()
     passed = (run.voltage_v < cell.lower_voltage_v) | (run.voltage_v > cell.upper_voltage_v)
     depleted = run.series["depleted"] > 0
@@ -49,14 +52,30 @@ def test_over_the_envelope_a_simulation_ends_at_its_cut_off_or_says_why_not(name
     fails = int(np.argmax(depleted)) if depleted.any() else len(time)
     if fails < len(time):
         with pytest.raises(SimulationError) as caught:
-            simulate(cell, time, np.full(400, current), soc0, (), degc)
+            simulate(cell, time, np.full(400, current), soc0, (), degc, model=model)
         said = str(caught.value)
-        assert any(cause in said for cause in CAUSES)
+        beyond = (
+            (NO_REACTION,) if ends <= fails else ()
+        )  # places full and places empty, past what a cell is used for
+        assert any(cause in said for cause in (*CAUSES, *beyond))
         soc = float(run.series["soc"][fails])
-        assert ("more charge than the cell has" in said) == (not 0.0 <= soc <= 1.0 and "salt" not in said)
+        if NO_REACTION not in said:
+            assert ("more charge than the cell has" in said) == (not 0.0 <= soc <= 1.0 and "salt" not in said)
         assert ("cut-off" in said) == (ends <= fails)
     if current > 0 and ends == len(time) and fails == len(time):
         assert run.series["soc"][-1] < 0.02  # a rest voltage below the cut-off is beyond what is asked
+
+
+def test_where_a_porous_electrode_runs_dry_its_solution_goes_on_to_the_cut_off():
+    cell = cell_of("lg_18650hg2")
+    time = np.arange(0.0, 100.0, 0.25)
+    current = np.full(len(time), 3.22 * cell.nominal_capacity_ah)
+    run = simulate(cell, time, current, 0.72, (), -2.1, on_depletion="clip", model="dfn")
+    ends = int(np.argmax(run.voltage_v < cell.lower_voltage_v))
+    dry = np.abs(run.series["c_eL"]) < 0.01 * cell.electrolyte.c0_mol_m3
+    assert ends > 0
+    assert dry[:ends].sum() > 20  # for seconds the reaction has left the collector and goes on elsewhere
+    assert run.series["depleted"][ends] == 0.0
 
 
 def test_an_electrolyte_that_is_too_cold_is_named_and_not_the_charge():

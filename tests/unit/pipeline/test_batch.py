@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 import aesi
+from aesi.calibration.health import HEALTH_WORDS, health_of
 from aesi.errors import InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.folded import folded
-from aesi.pipeline.batch.job import Settings, health_of, run_job
+from aesi.pipeline.batch.job import Settings, run_job
 from aesi.pipeline.batch.plan import Job, read_plan
 from aesi.pipeline.batch.summary import trends, write_summary
 
@@ -105,9 +106,9 @@ def test_health_shows_what_was_lost():
 
 def test_the_summary_has_every_cell_and_the_trend_in_order(tmp_path):
     def row(name, at, resistance):
-        health = {"inventory_ah": 7.0, "negative_ah": 5.0, "positive_ah": 8.0, "capacity_ah": 4.0}
+        health = {f"{key}{end}": 5.0 for key in HEALTH_WORDS for end in ("", "_low", "_high")}
         done = {"status": "done", "verdict": "none", "effects": "", "finding": "none: nothing is missing"}
-        return {"name": name, "specimen": "cell 1", "at": at, **done, "resistance_mohm": resistance, **health}
+        return {"name": name, "specimen": "cell 1", "at": at, **done, **health, "resistance_mohm": resistance}
 
     failed = {"name": "x", "specimen": "", "at": None, "status": "failed", "reason": "x.csv is empty & <odd>"}
     rows = [row("late", 200.0, 3.0), row("early", 0.0, 1.0), failed]
@@ -116,4 +117,5 @@ def test_the_summary_has_every_cell_and_the_trend_in_order(tmp_path):
     assert "2 of 3 cells done" in page
     assert "x.csv is empty &amp; &lt;odd&gt;" in page
     assert "Resistance of contacts and films" in page
+    assert "1 <small>[5, 5]</small>" in page
     assert len((tmp_path / "summary.csv").read_text().splitlines()) == 4

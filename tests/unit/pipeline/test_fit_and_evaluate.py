@@ -5,7 +5,7 @@ import pytest
 from small_experiment import NOISE_V, experiment, fitted, write_record
 
 from aesi.errors import DataError
-from aesi.pipeline.experiment.evaluate import evaluate_models
+from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.report.tables import free_run_band_table
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from small_experiment import NOISE_V, experiment, write_record
 
-from aesi.pipeline.experiment.evaluate import evaluate_models
 from aesi.pipeline.experiment.fit import Fitted, build_problem
+from aesi.pipeline.experiment.judging.evaluate import evaluate_models
+from aesi.pipeline.experiment.judging.validation import validation_mser
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
-from aesi.pipeline.experiment.validation import validation_mser
 from aesi.sparse import Candidate, Genome, evaluate
 from aesi.sparse.yardsticks import Bare
 

@@ -1,6 +1,7 @@
 """What a refit moved, beside the verdict."""
 
-from aesi.pipeline.report.moved import moved_findings, moved_summary
+from aesi.pipeline.report.moved import moved_findings, moved_summary, parameter_words
+from aesi.pipeline.report.sizes import refit_does_as_well
 
 
 def row(parameter, value, deviations, at_limit=False, effect="solid_diffusivity"):
@@ -45,3 +46,19 @@ def test_a_state_of_charge_is_told_with_what_was_declared():
     moved = row("drive", 0.973, -2.7, effect="soc0") | {"unit": "1"}
     text = moved_summary([moved, STAYED])
     assert text == "the initial state of charge of drive 0.973 (declared 1)"
+
+
+def test_a_refit_that_moved_only_what_was_found_is_the_same_explanation():
+    errors = {state: {"test": {"rmse_mv": 1.0}} for state in ("recalibrated", "after")}
+    found = errors | {"effects": ["solid_diffusivity"]}
+    assert not refit_does_as_well(found | {"own_parameters": {"recalibrated": [FAR, STAYED]}})
+    other = row("positive_factor", 3.0, 3.1, effect="charge_transfer_kinetics")
+    assert refit_does_as_well(found | {"own_parameters": {"recalibrated": [FAR, other]}})
+    assert refit_does_as_well(found)
+
+
+def test_a_parameter_that_is_named_by_its_effect_is_not_named_twice():
+    assert (
+        parameter_words(row("resistance_ohm", 8e-3, 2.0, effect="series_resistance")) == "series resistance"
+    )
+    assert parameter_words(FAR) == "solid diffusivity (negative)"

@@ -1,5 +1,8 @@
 """The picture of the README, drawn from a report."""
 
+import json
+import os
+import subprocess
 import sys
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -48,3 +51,23 @@ def test_another_page_is_refused(picture, tmp_path):
     page.write_text("<html></html>")
     with pytest.raises(SystemExit, match="not a report"):
         picture.main(str(page), str(tmp_path / "out.svg"))
+
+
+FINDING = HOOK.with_name("finding.py")
+
+
+def test_a_finding_is_drawn_with_its_name_its_witness_and_the_errors_on_what_chose_nothing(views, tmp_path):
+    view = views.discovery_view(600)
+    write_discovery_report(tmp_path / "report.html", view)
+    (tmp_path / "discovery.json").write_text(json.dumps(view.discovery))
+    out = tmp_path / "out.svg"
+    command = [sys.executable, FINDING, tmp_path, out, "--witness", "calorimeter: 1.3 W"]
+    subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": str(HOOK.parents[2])})
+    text = "".join(ET.parse(out).getroot().itertext())
+    assert "self heating" in text
+    assert "calorimeter: 1.3 W" in text
+    tested = [t for t in view.traces if t.part == "test"]
+    errors = np.concatenate([t.measured_v - t.after_v for t in tested])
+    assert f"with the finding added: {1e3 * np.sqrt(np.mean(errors**2)):.1f} mV RMSE" in text
+    assert "chose nothing" in text
+    assert "nan" not in text

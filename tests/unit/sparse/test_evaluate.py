@@ -81,6 +81,23 @@ def test_residuals_are_honest_and_complete(problem, split):
         assert np.std(honest.one_step_v) == pytest.approx(5e-4, rel=0.2)
 
 
+def test_without_validation_records_aesi_i_was_always_chosen(problem):
+    """Its row of losses stayed at minus infinity there; now pieces that were left out in turn decide."""
+    assert not problem.split.valid
+    tried = (
+        evaluate(problem, whole(problem, 1e-3, lambda2, tau=tau, feedback=False))
+        for lambda2 in (1e-3, 1e-2, 3e-2)
+        for tau in (0.4, 0.7, 0.95)
+    )
+    candidates = [each for each in tried if isinstance(each, Candidate)]
+    assert np.all(np.isfinite([each.valid_losses for each in candidates]))
+    assert {each.better.name for each in candidates} == {"AESI I", "AESI II"}
+    assert all(
+        each.better is (each.bagging, each.stability)[int(np.argmin(each.valid_losses))]
+        for each in candidates
+    )
+
+
 def test_long_pieces_are_left_out_for_free_runs_whatever_the_search_judges_on(split):
     options = Options(p_c=1, d=2, mixed=False, resamples=5, block=60)
     long, short = (Problem.build(split, replace(options, fold=fold)) for fold in (250, 40))

@@ -79,18 +79,16 @@ def test_what_was_fitted_carries_to_a_part_left_out(path):
     assert range_fault(ModelState.of(path.problem, path.chosen)) is None
 
 
-def test_a_model_that_runs_empty_where_the_declared_one_does_not_is_refused(path):
-    cell = path.problem.cell
-    poor = cell.with_positive(theta_max=cell.positive.theta_max + 0.3)
-    state = ModelState(path.problem)
-    gutted = CATALOGUE["active_material_loss_positive"].activate(loss=0.45)
-    problem = replace(path.problem, cell=poor)
-    assert range_fault(ModelState(problem)) is None  # it compares with itself
-    values = {"soc0": {"0": 0.9}, "active_material_loss_positive": gutted.parameters}
-    widened = replace(path.problem, effects={**path.problem.effects, gutted.id: gutted.effect})
-    sentence = range_fault(ModelState(widened, values))
-    assert sentence is None or "before it reaches" in sentence
-    assert state.settled()[0] == cell
+def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refused(path):
+    def fault(diffusivity_factor):
+        poor = CATALOGUE["electrolyte_transport"].activate(diffusivity_factor=diffusivity_factor)
+        widened = replace(path.problem, effects={**path.problem.effects, poor.id: poor.effect})
+        return range_fault(ModelState(widened, {"soc0": {"0": 0.9}, poor.id: poor.parameters}))
+
+    assert range_fault(ModelState(path.problem)) is None
+    assert fault(0.5) is None
+    assert "a full discharge at 2C runs out of lithium or of salt" in fault(0.2)
+    assert "before it reaches its voltage limit" in fault(0.2)
 
 
 def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):

@@ -128,3 +128,24 @@ def test_what_a_refit_moved_is_told_with_its_tolerance(cell, few, make):
     assert {one.name for one in found.own["recalibrated"] if one.owner == "soc0"} == {"made"}
     furthest = [abs(one.deviations) for one in found.own["recalibrated"]]
     assert furthest == sorted(furthest, reverse=True)
+
+
+def test_a_radius_that_is_off_is_one_cause_and_not_a_diffusivity_and_a_rate(cell, make):
+    three = ("particle_radius", "solid_diffusivity", "charge_transfer_kinetics")
+    effects = {name: CATALOGUE[name] for name in three}
+    coarse = CATALOGUE["particle_radius"].activate(negative_factor=1.0, positive_factor=1.7)
+    found = discover(cell, [make((coarse,))], soc0=0.9, effects=effects)
+    assert found.verdict.effects == ("particle_radius",)
+    estimate = next(c for c in found.candidates if c.effect == "particle_radius").parameters[
+        "positive_factor"
+    ]
+    assert estimate.low < 1.7 < estimate.high
+    assert estimate.high - estimate.low < 0.3
+
+
+def test_a_diffusivity_that_is_off_is_no_radius(cell, make):
+    three = ("particle_radius", "solid_diffusivity", "charge_transfer_kinetics")
+    effects = {name: CATALOGUE[name] for name in three}
+    slow = CATALOGUE["solid_diffusivity"].activate(negative_factor=1.0, positive_factor=0.35)
+    found = discover(cell, [make((slow,))], soc0=0.9, effects=effects)
+    assert found.verdict.effects == ("solid_diffusivity",)

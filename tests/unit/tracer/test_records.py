@@ -7,7 +7,8 @@ import pytest
 
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
-from aesi.tracer.case.records import averaged_over, noise_floor_v, prepare, prepare_test
+from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test
+from aesi.tracer.case.thinning import averaged_over
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):

@@ -6,8 +6,8 @@ import pytest
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
-from aesi.tracer.case.records import condensed
 from aesi.tracer.case.stepping import STEPS_A_SAMPLE, stepping
+from aesi.tracer.case.thinning import condensed
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aesi.data.readers.formats import arbin, basytec, biologic, digatron, maccor, neware, novonix
+from aesi.data.readers.formats import arbin, basytec, biologic, digatron, maccor, neware, novonix, pec
 from aesi.data.readers.formats.format import Format
 
 FORMATS: tuple[Format, ...] = (
@@ -14,6 +14,7 @@ FORMATS: tuple[Format, ...] = (
     novonix.FORMAT,
     digatron.FORMAT,
     basytec.FORMAT,
+    pec.FORMAT,
     neware.FORMAT,
 )
 

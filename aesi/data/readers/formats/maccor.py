@@ -12,7 +12,7 @@ FORMAT = Format(
         r"rec#?|record",
         r"cyc(le)?( ?[#cp])?|cyc#",
         r"step( time.*)?",
-        r"(m?amps|current)( ?\(.*\))?",
+        r"(m?amps|current)( ?[(\[].*[)\]])?",
         r"volt.*",
     ),
     columns={
@@ -21,11 +21,11 @@ FORMAT = Format(
             Name(r"test ?time", "h:m:s"),
         ),
         "current_a": (
-            Name(r"(amps|current) ?\((?P<unit>m?a|amps)\)"),
+            Name(r"(amps|current) ?[(\[](?P<unit>m?a|amps)[)\]]"),
             Name(r"amps|current", "A"),
             Name(r"mamps", "mA"),
         ),
-        "voltage_v": (Name(r"(volts|voltage) ?\((?P<unit>m?v|volts)\)"), Name(r"volts|voltage", "V")),
+        "voltage_v": (Name(r"(volts|voltage) ?[(\[](?P<unit>m?v|volts)[)\]]"), Name(r"volts|voltage", "V")),
         "temperature_degc": (
             Name(r"(ev)?temp(erature)? ?1? ?\((?P<unit>°?c|k)\)"),
             Name(r"(ev)?temp(erature)? ?1?", "degC"),

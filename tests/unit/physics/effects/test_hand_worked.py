@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
+from aesi.errors import ParameterError
 from aesi.physics import Cell, EspmModel, Record, Trace, simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.effects.particle_size_distribution import lognormal_bins
@@ -248,10 +249,9 @@ def test_plated_lithium_at_rest_comes_to_nernsts_equilibrium_and_a_fast_charge_g
     assert fast.series["plated_mol_m3"][-1] > equilibrium
 
 
-def test_no_contrast_between_regions_is_one_region():
-    assert shift("reaction_nonuniformity", strength=0.0) == pytest.approx(0.0)
-    slight, full = (np.abs(shift("reaction_nonuniformity", strength=s)).max() for s in (0.05, 1.0))
-    assert slight < 0.3 * full
+def test_a_share_of_the_differences_between_regions_is_no_physics():
+    with pytest.raises(ParameterError, match="strength"):
+        CATALOGUE["reaction_nonuniformity"].activate(strength=0.5)
 
 
 @pytest.mark.parametrize(

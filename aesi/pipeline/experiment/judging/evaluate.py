@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 
 from aesi.conformal import FreeRunBands, Intervals
-from aesi.conformal.free_run import HorizonBand
+from aesi.conformal.horizon_band import HorizonBand
 from aesi.conformal.scores import scores_of
 from aesi.constants import MV_PER_V
 from aesi.numerics.metrics import rmse
@@ -54,7 +54,7 @@ def evaluate_models(
 ) -> EvaluatedModels:
     """Figures of every model on train, validation and test records, and the traces that the report draws.
 
-    validation : model -> reduction over drives that chose nothing, per cent (`aesi.pipeline.experiment.validation`).
+    validation : model -> reduction over drives that chose nothing, per cent (`judging.validation`).
     """
     traces: dict[tuple[Role, str], dict[str, ModelVoltage]] = {}
     rows, outside = [], {}

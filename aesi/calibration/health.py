@@ -1,0 +1,69 @@
+"""State of health that a calibrated cell shows: resistance, cyclable lithium, active material, capacity; intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass, fields
+
+import numpy as np
+
+from aesi.calibration.result import Calibration
+from aesi.calibration.rewind import rewound
+from aesi.constants import MILLI
+from aesi.physics.cell import Cell
+
+STEP = 1e-2
+"""In standard deviations of the priors, for slopes."""
+REACH = 1.96
+"""Standard deviations either side of a 95 % interval."""
+HEALTH_WORDS = {
+    "resistance_mohm": "resistance of contacts and films, mohm",
+    "inventory_ah": "cyclable lithium, Ah",
+    "negative_ah": "active material of the negative electrode, Ah",
+    "positive_ah": "active material of the positive electrode, Ah",
+    "capacity_ah": "capacity, Ah",
+}
+
+
+@dataclass(frozen=True)
+class Health:
+    """State of one check-up, from the calibrated cell.
+
+    resistance_mohm : of contacts and films, beyond the electrolyte and the electrodes.  inventory_ah : cyclable
+    lithium, in both electrodes.  negative_ah, positive_ah : charge that the active material of each can hold.
+    """
+
+    resistance_mohm: float
+    inventory_ah: float
+    negative_ah: float
+    positive_ah: float
+    capacity_ah: float
+
+
+def health_of(cell: Cell) -> Health:
+    """What a calibrated cell says of resistance, inventory and active material."""
+    negative, positive = (cell.electrode_capacity_ah(e) for e in (cell.negative, cell.positive))
+    theta_n, theta_p = cell.stoichiometries(1.0)
+    return Health(
+        resistance_mohm=MILLI * (cell.contact_resistance_ohm + cell.film_resistance_ohm),
+        inventory_ah=negative * theta_n + positive * theta_p,
+        negative_ah=negative,
+        positive_ah=positive,
+        capacity_ah=cell.capacity_ah,
+    )
+
+
+def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
+    """95 % interval of each quantity: the covariance of the fit, carried through to first order."""
+    at = np.array(astuple(health_of(rewound(found.model, found.x))))
+    slopes = np.zeros((len(at), len(found.x)))
+    for j in range(len(found.x)):
+        there = found.x.copy()
+        there[j] += STEP
+        slopes[:, j] = (np.array(astuple(health_of(rewound(found.model, there)))) - at) / STEP
+    reach = REACH * np.sqrt(np.einsum("ij,jk,ik->i", slopes, found.covariance, slopes))
+    middle = np.array(astuple(health_of(found.cell)))
+    return {
+        field.name: (float(max(m - r, 0.0)), float(m + r))
+        for field, m, r in zip(fields(Health), middle, reach, strict=True)
+    }

@@ -1,0 +1,48 @@
+"""One cause in place of several declared parameters that came out wrong together.
+
+A particle radius that is off looks like a diffusivity off by 1/f^2 and a rate constant off by 1/f: declared parameters
+have tolerances, so that the search finds the two before the one. What says as much with fewer numbers is the better
+name; what it stands for is told as its look-alikes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from aesi.physics.effect import Effect
+from aesi.tracer.decide.archive import Archive
+from aesi.tracer.decide.search import ALIKE_NATS, BASE_STEPS, Path, Step, fitted_hypothesis
+from aesi.tracer.decide.verdict import GROUP_SIZE
+
+
+def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
+    """The path with one effect for all of its effects, and the group of look-alikes that it heads; the path as it was
+    and no group where it names no several declared parameters, or no single cause says as much."""
+    chosen = path.chosen
+    effects = path.problem.effects
+    if len(chosen.hypothesis) < 2 or not all(_tolerated(effects[name]) for name in chosen.hypothesis):
+        return path, ()
+    causes = [e.id for e in effects.values() if e.kind == "parameter" and not _tolerated(e)]
+    fits = [
+        fitted_hypothesis(
+            path.problem, path.blocks, (cause,), path.base.placed, chosen.score.delta_v, BASE_STEPS, archive
+        )
+        for cause in causes
+    ]
+    enough = chosen.score.total - ALIKE_NATS
+    said = [fit for fit in fits if fit is not None and fit.score.total > enough and not fit.at_bounds]
+    if not said:
+        return path, ()
+    best = max(said, key=lambda fit: fit.score.total)
+    step = Step((path.base,), (), (best,), best)
+    return replace(path, steps=(*path.steps, step), chosen=best), _group(best.hypothesis, chosen.hypothesis)
+
+
+def _tolerated(effect: Effect) -> bool:
+    """Whether cell files declare what the effect moves, with a tolerance."""
+    return any(p.spread is not None for p in effect.parameters.values())
+
+
+def _group(found: Sequence[str], before: Sequence[str]) -> tuple[str, ...]:
+    return (*found, *before)[:GROUP_SIZE]

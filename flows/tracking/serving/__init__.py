@@ -1,0 +1,1 @@
+"""A hybrid model as MLflow keeps and serves it."""

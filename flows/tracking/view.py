@@ -1,0 +1,63 @@
+"""How MLflow's pages open: what an experiment is about, and the columns of its table of runs.
+
+MLflow keeps a view of an experiment as a tag of it and opens it by name, `?viewStateShareKey=aesi` in the address,
+which `aesi ui` prints. Without it the table shows no figure at all. Tags that are there already stay, so what a person
+has written or saved is not overwritten.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+VIEW = "aesi"
+NOTE = "mlflow.note.content"
+KIND_OF_EXPERIMENT = {"mlflow.experimentKind": "custom_model_development"}
+"""Else MLflow asks everybody who opens the experiment whether it is about language models."""
+
+RUN_COLUMNS = (
+    "params.`chosen_model`",
+    "metrics.`free_run/test_rmse_mv`",
+    "metrics.`free_run/test_mser_pct`",
+    "metrics.`intervals/coverage_pct`",
+    "metrics.`intervals/average_width_mv`",
+    "metrics.`fitness`",
+    "metrics.`free_run/valid_mser_pct`",
+    "metrics.`intervals/valid_coverage_pct`",
+    "metrics.`terms`",
+    "tags.`aesi.chosen`",
+    "tags.`aesi.fallback`",
+)
+"""Of a run its chosen model's figures on test; of a candidate those that it was chosen by."""
+DISCOVERY_COLUMNS = (
+    "tags.`finding`",
+    "tags.`verdict`",
+    "params.`cell`",
+    "params.`data`",
+    "metrics.`before/test_rmse_mv`",
+    "metrics.`recalibrated/test_rmse_mv`",
+    "metrics.`after/test_rmse_mv`",
+    "metrics.`gain_nats`",
+    "metrics.`confidence`",
+)
+HOW_TO_READ = (
+    "A run is one `aesi run`; below it are its candidates (the one that the models come from is tagged `aesi.chosen`) "
+    "and its final models. `free_run/` is without any measured voltage after the first sample, `one_step/` and "
+    "`intervals/` are one step ahead. Sort candidates by `free_run/valid_mser_pct`: selection never meets the test "
+    "records."
+)
+HOW_TO_READ_DISCOVERIES = (
+    "A run is one `aesi discover`; below it are the hypotheses that were fitted, with what each says of unseen data "
+    "(`gain_nats`). `finding` is the verdict in a line; the report is among the artifacts."
+)
+
+
+def experiment_tags(note: str, columns: Sequence[str]) -> dict[str, str]:
+    """Tags of an experiment: its description in Markdown, its kind, and the view that shows the columns."""
+    state = {"selectedColumns": list(columns)}
+    return {NOTE: note, f"mlflow.sharedViewState.{VIEW}": json.dumps(state), **KIND_OF_EXPERIMENT}
+
+
+def view_of(experiment_id: str) -> str:
+    """The part of an address after the server's that opens an experiment with its columns."""
+    return f"#/experiments/{experiment_id}/runs?viewStateShareKey={VIEW}"

@@ -1,0 +1,48 @@
+"""A batch: what is done is taken again, every cell is tracked, and one that failed says why."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from aesi.calibration.health import HEALTH_WORDS
+from aesi.pipeline.batch.job import Settings
+from aesi.pipeline.batch.plan import read_plan
+
+CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
+STATES = ("before", "recalibrated", "after")
+
+
+def done(folder, job, ohm):
+    """A check-up as an earlier run of the batch left it."""
+    row = {"name": job.name, "specimen": job.specimen, "at": job.at, "status": "done", "verdict": "none"}
+    row |= {"effects": "", "finding": "none: nothing is missing", "seconds": 3.0, "report": "report.html"}
+    row |= {f"{state}_test_mv": 2.0 for state in STATES}
+    row |= {f"{key}{end}": ohm for key in HEALTH_WORDS for end in ("", "_low", "_high")}
+    folder.mkdir(parents=True)
+    (folder / "row.json").write_text(json.dumps({"key": job.key(Settings().key), "row": row}))
+
+
+@pytest.mark.parametrize("runner", ["local", "dask"])
+def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
+    from flows.jobs.batch import batch
+    from flows.tracking.store import Store
+
+    for name in ("a.csv", "b.csv"):
+        (tracked / name).write_text(name)
+    plan = tracked / "plan.csv"
+    plan.write_text("name,data,specimen,at\nfresh,a.csv,cell 1,0\naged,b.csv,cell 1,100\nother,a.csv,,\n")
+    out = tracked / "out"
+    for job, ohm in zip(read_plan(plan, CELL), (3.0, 5.0), strict=False):
+        done(out / job.name, job, ohm)
+    rows = batch(plan, out, CELL, workers=1, runner=runner)
+    assert [row["status"] for row in rows] == ["done", "done", "failed"]
+    trend = json.loads((out / "summary.json").read_text())["trends"]["cell 1"]
+    assert [(each["at"], each["resistance_mohm"]) for each in trend] == [(0.0, 3.0), (100.0, 5.0)]
+    store = Store()
+    runs = {run.info.run_name: run for run in store.runs(store.find_experiment("batch"), "")}
+    assert runs["aged"].data.metrics["resistance_mohm"] == 5.0
+    assert runs["other"].info.status == "FAILED"
+    parent = runs["batch, seed 0"]
+    assert parent.data.metrics["failed"] == 1.0
+    assert parent.info.status == "FINISHED"

@@ -1,0 +1,69 @@
+"""Which model of the cell all hypotheses use: the porous electrode where it matters, the single particle where the data
+are one's, or the one that was asked for."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.physics import Cell, simulate
+from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.discovery.discover import discovery_content, found_model
+from aesi.records import Measurement
+from aesi.tracer import discover
+
+from .conftest import CELLS, NOISE_V, steps
+
+FEW = ("series_resistance", "current_sensor_gain", "electrolyte_transport", "reaction_nonuniformity")
+NOTABLE_MV = 0.5
+
+
+@pytest.fixture(scope="module")
+def m50():
+    return Cell.from_bpx(Path(CELLS) / "lg_m50_chen2020.bpx.json")
+
+
+def record(cell, model):
+    """1,800 s of steps to 2C on a cell whose two models differ by millivolts."""
+    rng = np.random.default_rng(5)
+    time, current = np.arange(1800.0), steps(1800, 5.0, rng)
+    voltage = simulate(cell, time, current, 0.85, model=model).voltage_v
+    return Measurement(time, current, voltage + NOISE_V * rng.normal(size=1800), name="made")
+
+
+def found(cell, data, **options):
+    return discover(cell, [data], soc0=0.85, effects={n: CATALOGUE[n] for n in FEW}, **options)
+
+
+@pytest.mark.parametrize("truth", ["dfn", "espm"])
+def test_the_model_is_the_one_that_explains_the_data_and_nothing_is_blamed_on_the_cell(m50, truth):
+    one = found(m50, record(m50, truth))
+    assert one.verdict.word == "none"
+    assert one.choice.model == truth
+    assert 1e3 * one.choice.reduction.shift_v > NOTABLE_MV
+    content = discovery_content(one)
+    assert content["model"]["name"] == truth
+    assert content["model"]["differ_rms_mv"] == pytest.approx(1e3 * one.choice.reduction.shift_v)
+    assert f"{content['model']['differ_rms_mv']:.2f} mV RMS" in " ".join(content["notes"])
+    assert "reaction_nonuniformity" not in {c["effect"] for c in content["candidates"]}
+    assert found_model(one).model == truth
+
+
+def test_the_model_that_was_asked_for_is_used(m50):
+    one = found(m50, record(m50, "dfn"), model="espm", max_effects=0)
+    assert one.choice.model == "espm"
+    assert "as asked" in one.choice.sentence
+
+
+def test_models_that_differ_by_less_than_the_noise_leave_the_single_particle(m50):
+    data = record(m50, "espm")
+    rough = 1e-2 * np.random.default_rng(6).normal(size=len(data))
+    loud = Measurement(
+        data.time_s,
+        0.1 * data.current_a,
+        simulate(m50, data.time_s, 0.1 * data.current_a, 0.85).voltage_v + rough,
+        name="loud",
+    )
+    one = found(m50, loud, max_effects=0)
+    assert one.choice.model == "espm"
+    assert not one.choice.reduction.notable
