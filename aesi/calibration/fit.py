@@ -26,7 +26,9 @@ from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
 
 EVALUATIONS = 40
+"""Twice what the descents to the measured cells take."""
 GAIN = 1e-4
+"""Of the cost: a step that gains less than this share of it is the last."""
 NOTED_ZERO = 0.02
 """Of a record's typical current."""
 NOTED_AGE = 0.01

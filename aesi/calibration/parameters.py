@@ -22,6 +22,7 @@ PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
 """Knots of a diffusivity's and of a rate's course, shares of an electrode's window: dense at both ends, where either
 falls off. Pulse tests come at ten states of charge or more."""
 COURSE_POINTS = 65
+"""Of the table that a course becomes: a hundredth of the window and a half."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,10 @@ RATE_COURSES = (
     "exchange currents of both electrodes leave the square root by factors, Ecker et al. 2015, figure 11"
 )
 COURSE_SD = 1.2
+"""Of a logarithm: a decade over the window is two of them. With 0.8 the rates of a Panasonic NCR18650PF, fitted to its
+pulses, ended at three deviations."""
 DOUBLE_LAYER_F_M2, LAYER_SD = 1.0, 1.2
+"""Between a smooth and a rough surface. With 0.2 and 0.7 the same pulses ended at four deviations, 3.2 F/m2."""
 LAYERS = "0.1 to 0.5 F/m2 of true surface, Ong & Newman 1999, doi:10.1149/1.1392643; up to 50 of the smooth spheres'"
 HALF_CELLS = "scatter of half-cell potentials, tens of millivolts, Chen et al. 2020"
 
