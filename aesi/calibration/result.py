@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
 
 from aesi.calibration.model import Model
+from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -70,3 +75,16 @@ class Calibration:
     model: Model
     x: Array
     covariance: Array
+
+    def __repr__(self) -> str:
+        errors = ", ".join(
+            f"{e.name} {MV_PER_V * e.before_v:.1f} -> {MV_PER_V * e.after_v:.1f} mV" for e in self.errors
+        )
+        return f"Calibration(cell {self.cell.name!r}, {errors})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The parameters with their 95 % intervals, units and where their priors are from."""
+        import pandas as pd
+
+        rows = {name: asdict(interval) for name, interval in self.parameters.items()}
+        return pd.DataFrame.from_dict(rows, orient="index")

@@ -26,8 +26,11 @@ from aesi.physics.espm.kernels import (
 
 SMALLEST_EXPONENT, LARGEST_EXPONENT = -60.0, 60.0
 NEWTON_STEPS = 60
+"""At most; a handful is usual."""
 NEWTON_TOLERANCE_V = 1e-11
+"""Of every potential: well within the 1e-9 V to which an effect vanishes at its neutral value."""
 SMALLEST_SLOPE = 1e-9
+"""Of a potential over its current: a flat one takes a finite step."""
 SMALLEST_SHARE = 1e-12
 """Of a double layer's mean current over a step, at its end."""
 
