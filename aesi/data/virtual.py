@@ -6,8 +6,8 @@ extended single-particle model does not know; `DEFAULT_MIX` is what it has unles
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -55,13 +55,15 @@ STRENGTHS: dict[str, Callable[[float, float], dict[str, float]]] = {
 class Laboratory:
     """A cell file, what is changed in it, and the instruments on it.
 
-    effects : ids of changes at `magnitude` times their typical strength.  seed : of the instruments' noise.
+    effects : ids of changes at `magnitude` times their typical strength.  values : of a change, by its id and their
+    names, in place of those.  seed : of the instruments' noise.
     """
 
     bpx: Path
     model: LaboratoryModel = "DFN"
     effects: tuple[str, ...] = DEFAULT_MIX
     magnitude: float = 1.0
+    values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     instrument: Instrument = INSTRUMENT
     seed: int = 0
 
@@ -101,7 +103,8 @@ class Laboratory:
             raise DataError(
                 f"The change {change.id} has no typical strength; give its values to the simulator."
             )
-        return Applied(name, STRENGTHS[name](self.magnitude, self.capacity_ah))
+        typical = STRENGTHS[name](self.magnitude, self.capacity_ah)
+        return Applied(name, {**typical, **self.values.get(name, {})})
 
 
 @dataclass(frozen=True)

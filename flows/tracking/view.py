@@ -60,4 +60,4 @@ def experiment_tags(note: str, columns: Sequence[str]) -> dict[str, str]:
 
 def view_of(experiment_id: str) -> str:
     """The part of an address after the server's that opens an experiment with its columns."""
-    return f"#/experiments/{experiment_id}/runs?viewStateShareKey={VIEW}"
+    return f"#/experiments/{experiment_id}/runs?workflowType=machine_learning&viewStateShareKey={VIEW}"

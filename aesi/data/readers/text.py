@@ -13,16 +13,14 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Collection, Generator, Sequence
+from collections.abc import Collection, Generator
 from contextlib import closing
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO, cast
 
 import numpy as np
 
-from aesi.data.readers.formats.format import Format
-from aesi.data.readers.heading import LINES_LOOKED_AT, SEPARATORS, find_heading, split
+from aesi.data.readers.layout import NUMBER, Layout, decoded, layout_of
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
@@ -30,36 +28,8 @@ HEAD_BYTES = 1 << 18
 """Read to find the header in: more than any maker's preamble."""
 BLOCK_BYTES = 1 << 22
 """Of a file that is converted at a time; it bounds the memory beyond the numbers."""
-COMMENT = "#"
 MISSING = ("", "nan", "NaN", "NAN", "NA", "N/A", "n/a", "#N/A", "null", "NULL", "None", "-nan", "-NaN")
-BYTE_ORDER_MARKS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF32_LE, "utf-32"),
-    (codecs.BOM_UTF32_BE, "utf-32"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
-WITH_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 DAMAGED = (EOFError, zlib.error, gzip.BadGzipFile)
-
-
-@dataclass(frozen=True)
-class Layout:
-    """How a text table is written: what a look at its head tells.
-
-    layer : empty cells that a row of this table begins with, in a report that holds those of cycles and steps too.
-    """
-
-    encoding: str
-    separator: str
-    decimal: str
-    header: tuple[str, ...]
-    lines_before_data: int
-    notes: tuple[str, ...]
-    format: Format | None = None
-    units: tuple[str, ...] = field(default=())
-    layer: int = 0
 
 
 class TextTable:
@@ -228,114 +198,8 @@ class TextTable:
             raise self._damaged(error) from None
         except OSError as error:
             raise DataError(f"{self.path} cannot be opened: {error}.") from None
-        encoding, text = _decode(head, self.path.name)
-        return _layout(text, encoding, whole=len(head) < HEAD_BYTES, name=self.path.name, wanted=wanted)
-
-
-def _decode(head: bytes, name: str) -> tuple[str, str]:
-    """Encoding and text of the head: by its mark, else UTF-8, else Latin-1, which takes any byte."""
-    for mark, encoding in BYTE_ORDER_MARKS:
-        if head.startswith(mark):
-            try:
-                return encoding, codecs.getincrementaldecoder(encoding)().decode(head)
-            except UnicodeDecodeError:
-                raise DataError(f"{name} starts with a {encoding} mark but is not {encoding}.") from None
-    if b"\x00" in head:
-        raise DataError(f"{name} holds binary data; give a text table (CSV) or a Parquet file.")
-    try:
-        return "utf-8", codecs.getincrementaldecoder("utf-8")().decode(head)
-    except UnicodeDecodeError:
-        return "latin-1", head.decode("latin-1")
-
-
-def _layout(text: str, encoding: str, *, whole: bool, name: str, wanted: Collection[str]) -> Layout:
-    lines = text.splitlines()
-    if not whole:
-        lines = lines[:-1]  # the last one may be cut by the size of the look
-    notes: list[str] = []
-    rows = [_cells(line) for line in lines[:LINES_LOOKED_AT]]
-    heading = find_heading(rows, wanted)
-    if heading is None:
-        start, header, last = *_first_line(lines, name), 0
-    else:
-        start, header, last = heading.line, heading.header, int(heading.has_units)
-    separator = max(SEPARATORS, key=lines[start].count)
-    if start:
-        notes.append(f"{start} lines before the header were passed over.")
-    if last:
-        notes.append("The line of units below the header was read as such.")
-    if encoding == "latin-1":
-        notes.append("The file is not UTF-8; it was read as Latin-1.")
-    if whole and text and not text.endswith(("\n", "\r")):
-        notes.append("The last line does not end: if the file was cut there, its last number is too short.")
-    below = lines[start + 1 + last : start + 50 + last]
-    decimal = _decimal(below, separator)
-    if decimal == ",":
-        notes.append("Numbers were read with a decimal comma.")
-    header = _as_wide_as_the_rows(header, below, separator)
-    form, units = (heading.format, heading.units) if heading else (None, ())
-    layer = _layer(header, below, separator) if form else 0
-    if layer:
-        notes.append("The rows of cycles and steps between the records were passed over.")
-    return Layout(encoding, separator, decimal, header, start + 1 + last, tuple(notes), form, units, layer)
-
-
-def _layer(header: tuple[str, ...], below: Sequence[str], separator: str) -> int:
-    """Columns without a name at the start of the header, where some rows, of other layers, have something there."""
-    nameless = next((i for i, name in enumerate(header) if name), 0)
-    others = any(any(cell.strip() for cell in split(line, separator)[:nameless]) for line in below)
-    return nameless if others else 0
-
-
-def _cells(line: str) -> list[str]:
-    return [] if line.startswith(COMMENT) else split(line, max(SEPARATORS, key=line.count))
-
-
-def _first_line(lines: Sequence[str], name: str) -> tuple[int, tuple[str, ...]]:
-    """Where no line names known columns: the first that is neither blank nor a comment."""
-    start = next((i for i, line in enumerate(lines) if line.strip() and not line.startswith(COMMENT)), None)
-    if start is None:
-        raise DataError(f"{name} has no header line; the first line should name the columns.")
-    separator = max(SEPARATORS, key=lines[start].count)
-    try:
-        header = tuple(cell.strip() for cell in next(csv.reader([lines[start]], delimiter=separator)))
-    except (csv.Error, StopIteration) as error:
-        raise DataError(f"{name}, line {start + 1}: the header cannot be read: {error}.") from None
-    if len(header) == 1 and len(header[0].split()) > 2:
-        raise DataError(
-            f"{name}, line {start + 1}: no comma, semicolon, tab or bar between the names of the columns; "
-            "separate the cells by one of these, or, where this is a block above the table, name its columns "
-            "(--column time_s=NAME --column current_a=NAME --column voltage_v=NAME)."
-        )
-    if len(header) > 1 and all(NUMBER.fullmatch(cell) for cell in header):
-        raise DataError(
-            f"{name}, line {start + 1}: numbers where the header should be; put a line with the names of the "
-            "columns first: time_s,current_a,voltage_v."
-        )
-    return start, header
-
-
-def _as_wide_as_the_rows(header: tuple[str, ...], below: Sequence[str], separator: str) -> tuple[str, ...]:
-    """Loggers end their names or their rows with a separator, not always both."""
-    first = next((line for line in below if line.strip()), None)
-    if first is None:
-        return header
-    cells = split(first, separator)
-    if len(cells) == len(header) - 1 and header[-1] == "":
-        return header[:-1]
-    if len(cells) == len(header) + 1 and not cells[-1].strip():
-        return (*header, "")
-    return header
-
-
-def _decimal(lines: list[str], separator: str) -> str:
-    """A comma, where cells are separated otherwise and more of the first ones have a comma than a point."""
-    if separator == ",":
-        return "."
-    cells = [cell.strip() for line in lines for cell in line.split(separator)]
-    commas = sum(bool(WITH_COMMA.fullmatch(cell)) for cell in cells)
-    points = sum("." in cell and bool(NUMBER.fullmatch(cell)) for cell in cells)
-    return "," if commas > points else "."
+        encoding, text = decoded(head, self.path.name)
+        return layout_of(text, encoding, whole=len(head) < HEAD_BYTES, name=self.path.name, wanted=wanted)
 
 
 def _advice(cell: str) -> str:

@@ -23,6 +23,7 @@ at 10 degC: 56 mol/m3 against -104 at the wall)."""
 SMALLEST_EXPONENT = -10.0
 """Of the salt that is left: products of its powers stay above what a number can hold."""
 LARGEST_RATIO = 1e12
+"""Above it the product of ten factors would leave the range of a number."""
 
 
 @njit(inline="always", fastmath=FASTMATH)

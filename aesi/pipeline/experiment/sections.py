@@ -45,13 +45,15 @@ class VirtualConfig(Section):
     """How a virtual measurement is made (kind: virtual): the paper's profiles on a cell that has more than the ESPM.
 
     effects : what the cell has beyond its declared parameters; None for the laboratory's default mix.
-    magnitude : 1 is typical.  pulse_c : C-rate of the charge pulse after each training schedule.
+    magnitude : 1 is typical.  values : of an effect, by its id and their names, in place of the typical ones.
+    pulse_c : C-rate of the charge pulse after each training schedule.
     other_load : times the vehicle's current in the validation and test schedules; 2 takes them to 3.1C.
     """
 
     model: Literal["DFN", "SPMe"] = "DFN"
     effects: tuple[str, ...] | None = None
     magnitude: Positive = 1.0
+    values: dict[str, dict[str, float]] = {}
     pulse_c: Annotated[float, Field(ge=0)] = 5.0
     other_load: Positive = 2.0
     seed: int = 0

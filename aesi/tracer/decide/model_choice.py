@@ -1,8 +1,9 @@
 """Single particle or porous electrode: settled before an effect is blamed on the cell.
 
-Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one.
+Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
+not where the single particle leaves an error that is many times that difference, which no choice of the model explains.
 What was measured may still be a single particle's (a thin electrode, a file made with one): where that says more of
-the data as declared, it is searched too, and kept only if it explains them to the noise and says more there as well.
+the data as declared, it is kept if it explains them to the noise and says more there as well.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ Search = Callable[[InverseProblem, Archive], Evidence]
 Kept = Callable[[InverseProblem], Archive]
 """The fits of a problem that are known already."""
 
+FAR = 3.0
+"""Times the difference of the models: what is left of a measured cell, 9 mV and more, is mostly far more."""
+
 
 @dataclass(frozen=True)
 class ModelChoice:
@@ -38,34 +42,44 @@ def with_model(
 ) -> tuple[Evidence, ModelChoice]:
     """The search with the model that the user named, or else with the one that the records ask for."""
     reduction = reduction_of(problem)
-    name: ModelName = wanted or ("dfn" if reduction is not None and reduction.notable else "espm")
-    problems = {name: with_fine_numerics(replace(problem, model=name))}
-    evidence = search(problems[name], kept(problems[name]))
     differ = "" if reduction is None else f"; {reduction.sentence}"
+
+    def searched(name: ModelName) -> tuple[InverseProblem, Evidence]:
+        one = with_fine_numerics(replace(problem, model=name))
+        return one, search(one, kept(one))
+
+    def told(evidence: Evidence, name: ModelName, why: str = "") -> tuple[Evidence, ModelChoice]:
+        words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
+        return evidence, ModelChoice(name, words, reduction)
+
     if wanted is not None:
-        return evidence, ModelChoice(
-            name, f"all hypotheses use {MODEL_WORDS[name]}, as asked{differ}.", reduction
+        return told(searched(wanted)[1], wanted, ", as asked")
+    single, first = searched("espm")
+    if reduction is None or not reduction.notable:
+        return told(first, "espm")
+    if first.verdict.word == "unknown" and first.verdict.structured_v > FAR * reduction.shift_v:
+        left = f", whose {1e3 * first.verdict.structured_v:.1f} mV of error are far more than that"
+        return told(first, "espm", left)
+    full, second = searched("dfn")
+    if _believed(first, second) and _says_more(single, full, kept):
+        ahead = first.path.chosen.score.total - second.path.chosen.score.total
+        return told(
+            first, "espm", f", which explains these data to the noise and says {ahead:.0f} nats more of them"
         )
-    if name == "dfn":
-        single = with_fine_numerics(replace(problem, model="espm"))
-        other = _better(evidence, problems[name], single, search, kept)
-        if other is not None:
-            ahead = other.path.chosen.score.total - evidence.path.chosen.score.total
-            why = f"which explains these data to the noise and says {ahead:.0f} nats more of them"
-            return other, ModelChoice(
-                "espm", f"all hypotheses use {MODEL_WORDS['espm']}, {why}{differ}.", reduction
-            )
-    return evidence, ModelChoice(name, f"all hypotheses use {MODEL_WORDS[name]}{differ}.", reduction)
+    return told(second, "dfn")
 
 
-def _better(
-    full: Evidence, problem: InverseProblem, single: InverseProblem, search: Search, kept: Kept
-) -> Evidence | None:
-    """The search with the single particle where it explains the data and says more of them, else None."""
-    bases = [base_of(one, kept(one)) for one in (single, problem)]
-    if bases[0] is None or (bases[1] is not None and bases[0][2].score.total <= bases[1][2].score.total):
-        return None
-    other = search(single, kept(single))
-    explains = other.verdict.word != "unknown"
-    says_more = other.path.chosen.score.total > full.path.chosen.score.total
-    return other if explains and (says_more or full.verdict.word == "unknown") else None
+def _believed(single: Evidence, full: Evidence) -> bool:
+    """Does the single particle explain the data, and say more of them where both do?"""
+    if single.verdict.word == "unknown":
+        return False
+    says_more = single.path.chosen.score.total > full.path.chosen.score.total
+    return says_more or full.verdict.word == "unknown"
+
+
+def _says_more(single: InverseProblem, full: InverseProblem, kept: Kept) -> bool:
+    """Does the single particle as declared, but for its own parameters, say more than the porous electrode?"""
+    bases = [base_of(one, kept(one)) for one in (single, full)]
+    if bases[0] is None:
+        return False
+    return bases[1] is None or bases[0][2].score.total > bases[1][2].score.total

@@ -10,6 +10,7 @@ VIRTUAL = {
     "model": "SPMe",
     "effects": ["series_resistance"],
     "magnitude": 1.0,
+    "values": {},
     "pulse_c": 2.0,
     "other_load": 2.0,
     "seed": 0,

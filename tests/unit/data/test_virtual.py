@@ -66,3 +66,16 @@ def test_the_papers_experiment_on_the_full_model(nmc):
     for record in (*experiment.train, *experiment.valid, *experiment.test):
         assert low < record.voltage_v.min()
         assert record.voltage_v.max() < high + 0.01
+
+
+def test_values_of_an_effect_stand_in_for_the_typical_ones(nmc):
+    lab = Laboratory(
+        nmc,
+        "SPMe",
+        ("self_heating", "particle_size_distribution"),
+        2.0,
+        {"self_heating": {"cooling_w_m2_k": 7.0}},
+    )
+    values = {applied.change: dict(applied.values) for applied in lab.setup().applied}
+    assert values["self_heating"] == {"cooling_w_m2_k": 7.0}
+    assert values["particle_size_distribution"]["negative_spread"] == pytest.approx(0.6)
