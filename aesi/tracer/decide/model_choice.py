@@ -24,7 +24,7 @@ Kept = Callable[[InverseProblem], Archive]
 """The fits of a problem that are known already."""
 
 FAR = 1.5
-"""Times the difference of the models: where the single particle leaves more, that difference is not most of it. A search
+"""Times the difference of the models: where the single particle leaves more, that is not most of it. A search
 with the porous electrode takes ten times as long: more than 90 s of processor on an hour of the LG HG2's drive."""
 
 
