@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.errors import AesiError
-from aesi.numerics.typing import Array
 from aesi.physics.simulation import ModelName
 from aesi.tracer.case.problem import InverseProblem
 
@@ -35,14 +34,11 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
 class Reduction:
     """What the single particle leaves out of the declared porous electrode.
 
-    shift_v : root mean square over what fits see, V.  noise_v : of the sensors there.  single_v, full_v : what the
-    two models leave of the measurement as declared, V.
+    shift_v : root mean square over what fits see, V.  noise_v : of the sensors there.
     """
 
     shift_v: float
     noise_v: float
-    single_v: float
-    full_v: float
 
     @property
     def notable(self) -> bool:
@@ -63,26 +59,17 @@ def reduction_of(problem: InverseProblem) -> Reduction | None:
     or where the declared model takes the reduction back already."""
     if any(active.effect.refines == "reduction" for active in problem.fixed):
         return None
-    voltage = []
+    moved = []
     try:
         for record, data in zip(problem.records, problem.seen, strict=True):
-            voltage.append(
-                [
-                    replace(problem, model=name)
-                    .run(data, record.soc0, problem.fixed, record.thin_hold)
-                    .voltage_v
-                    for name in MODELS
-                ]
+            reduced, full = (
+                replace(problem, model=name).run(data, record.soc0, problem.fixed, record.thin_hold).voltage_v
+                for name in MODELS
             )
+            moved.append(full - reduced)
     except AesiError:
         return None
-    single, full = np.concatenate(voltage, axis=1)
-    left = [_rms(problem.measured - one) for one in (single, full)]
-    return Reduction(_rms(full - single), _noise_v(problem), *left)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
+    return Reduction(float(np.sqrt(np.mean(np.concatenate(moved) ** 2))), _noise_v(problem))
 
 
 def _noise_v(problem: InverseProblem) -> float:
