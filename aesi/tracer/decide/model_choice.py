@@ -74,7 +74,7 @@ def with_model(
 
 
 def _takes_off(problem: InverseProblem, path: Path, kept: Kept) -> bool:
-    """Does the porous electrode, with what the single particle's search ended with, leave notably less of unseen data?"""
+    """Does the porous electrode leave notably less of unseen data with what the single particle ended with?"""
     full = with_fine_numerics(replace(problem, model="dfn"))
     chosen = path.chosen
     fit = fitted_hypothesis(
