@@ -15,7 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.calibration.fit import Calibration, Interval, information_weights
+from aesi.calibration.certainty import information_weights
+from aesi.calibration.result import Calibration, Interval
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 
