@@ -1,8 +1,9 @@
 """Prediction bands of a free run by horizon, the time since the last measured voltage: CV+ over pieces of drives.
 
 Errors of a free run are autocorrelated over minutes, so the exchangeable unit is a piece of a drive and not a sample.
-The errors of piece i are normalised, |error| / s_i, by a scale that depends on current, state of charge and leverage
-(`local_scale`) and is fitted to the other pieces. The half-width k h at a sample solves
+The errors of piece i are normalised, |error| / s_i, by a scale that depends on current, state of charge, leverage and
+distance from the fitted states of charge (`local_scale`) and is fitted to the other pieces. The half-width k h at a
+sample solves
 
     sum_i n_i [share of the normalised errors r of piece i with s_i r <= h]   =   (1 - alpha) sum_i n_i        (1)
     k = t(1 - alpha / 2; m - 1) / z(1 - alpha / 2),     m the number of independent pieces                 (2)
@@ -35,19 +36,22 @@ import numpy as np
 from aesi.conformal.horizon_band import HorizonBand, calibrated_band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
+from aesi.conformal.seen import Seen
 from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.records import ErrorSeries, FreeRun
 
-SCHEMA = "aesi.free_run_bands/3"
+SCHEMA = "aesi.free_run_bands/4"
 
 
 @dataclass(frozen=True, eq=False)
 class FreeRunBands:
-    """Bands at miss rate `alpha` for each calibrated horizon, shortest first."""
+    """Bands at miss rate `alpha` for each calibrated horizon, shortest first; seen : what the model was fitted to,
+    None where nothing is known of it."""
 
     alpha: float
     horizons: tuple[HorizonBand, ...]
+    seen: Seen | None = None
 
     def __repr__(self) -> str:
         return f"FreeRunBands({100 * (1 - self.alpha):.0f} %, {len(self.horizons)} horizons)"
@@ -62,6 +66,8 @@ class FreeRunBands:
         alpha: float = 0.1,
         inside: Sequence[BoolArray] | None = None,
         excess: Sequence[Array | None] | None = None,
+        gap: Sequence[Array | None] | None = None,
+        seen: Seen | None = None,
     ) -> FreeRunBands:
         """Calibrate on honest prediction errors: of records, or pieces, that the model was not fitted to.
 
@@ -72,19 +78,22 @@ class FreeRunBands:
         inside : one (n_i,) array a record, where the model that was asked had been trained on such inputs;
         None for everywhere.
         excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it cannot tell.
+        gap : one (n_i,) array a record, `Seen.gap` of that model.  seen : of the model that the bands are for.
 
         Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
-        beyond = excess or [None] * len(soc)
-        columns = [covariates(i, s, dt_s, x) for i, s, x in zip(current_a, soc, beyond, strict=True)]
+        beyond, apart = excess or [None] * len(soc), gap or [None] * len(soc)
+        columns = [
+            covariates(i, s, dt_s, x, g) for i, s, x, g in zip(current_a, soc, beyond, apart, strict=True)
+        ]
         usable = inside or [np.ones(len(c), dtype=bool) for c in columns]
         bands = [
             calibrated_band(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s)
             for horizon in sorted(errors_by_horizon)
         ]
-        return cls(alpha, tuple(bands))
+        return cls(alpha, tuple(bands), seen)
 
     def at(
         self,
@@ -94,11 +103,13 @@ class FreeRunBands:
         soc: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
+        temperature_degc: Array | None = None,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time.  reach_v : (n,) what to add to it, how far the
         prediction would move if the model went on beyond its trained range."""
-        return self._around(np.full(len(soc), horizon_s), covariates(current_a, soc, dt_s, excess), reach_v)
+        columns = covariates(current_a, soc, dt_s, excess, self._gap(soc))
+        return self._around(np.full(len(soc), horizon_s), columns, reach_v, temperature_degc)
 
     def along(
         self,
@@ -107,6 +118,7 @@ class FreeRunBands:
         soc: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
+        temperature_degc: Array | None = None,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
 
@@ -114,14 +126,22 @@ class FreeRunBands:
         whole drive.  reach_v : as for `at`.
         """
         elapsed = dt_s * np.arange(len(soc), dtype=np.float64)
-        return self._around(elapsed, covariates(current_a, soc, dt_s, excess), reach_v)
+        columns = covariates(current_a, soc, dt_s, excess, self._gap(soc))
+        return self._around(elapsed, columns, reach_v, temperature_degc)
 
     def intervals(
         self, series: ErrorSeries, free: FreeRun, reach_v: Array | float = 0.0, horizon_s: float | None = None
     ) -> Intervals:
         """The band along a free run of a record, or of predictions `horizon_s` ahead, with their own `reach_v`;
         `warm` is False outside the trained range, where the band is not calibrated."""
-        where = (series.dt_s, series.current_a, series.soc, free.excess, reach_v)
+        where = (
+            series.dt_s,
+            series.current_a,
+            series.soc,
+            free.excess,
+            reach_v,
+            series.temperature_degc,
+        )
         low, high = self.along(*where) if horizon_s is None else self.at(horizon_s, *where)
         return Intervals(low, high, ~free.outside)
 
@@ -131,6 +151,7 @@ class FreeRunBands:
             "schema": SCHEMA,
             "alpha": self.alpha,
             "horizons": [band.to_state() for band in self.horizons],
+            "seen": None if self.seen is None else self.seen.to_state(),
         }
 
     @classmethod
@@ -141,11 +162,19 @@ class FreeRunBands:
                 f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}; run the experiment again."
             )
         alpha = float(state["alpha"])
-        return cls(alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]))
+        seen = None if state["seen"] is None else Seen.from_state(state["seen"])
+        return cls(alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]), seen)
 
-    def _around(self, elapsed_s: Array, columns: Array, reach_v: Array | float) -> tuple[Array, Array]:
+    def _gap(self, soc: Array) -> Array | None:
+        return None if self.seen is None else self.seen.gap(soc)
+
+    def _around(
+        self, elapsed_s: Array, columns: Array, reach_v: Array | float, temperature_degc: Array | None
+    ) -> tuple[Array, Array]:
         halves = np.array([band.half_width(columns) for band in self.horizons])
         half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
+        if self.seen is not None:
+            half = half * self.seen.growth(temperature_degc)
         return -half, half
 
 

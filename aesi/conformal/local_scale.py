@@ -1,9 +1,10 @@
 """How the size of a free-run error depends on current, state of charge, and what the model was fitted to.
 
-    s = a + b (LOW_SOC - soc)+ + u |I| + v |mean of I over the last minute| + w x,     a, b, u, v, w >= 0      (1)
+    s = a + b (LOW_SOC - soc)+ + u |I| + v |mean of I over the last minute| + w x + y g,     all weights >= 0    (1)
 
 The error of a cell model grows with the current and towards the steep end of its discharge, and that of any
-regression with the excess x of its leverage, how far a sample lies from the fitted rows. Few terms on
+regression with the excess x of its leverage, how far a sample lies from the fitted rows, and of any model with the
+distance g of the state of charge from theirs (seen.py). Few terms on
 purpose: a flexible function of the state of charge overfits the calibration drive and fails on the next one.
 s is the 1 - alpha quantile of |error|, by linear quantile regression; a term whose weight would be negative is
 left out, so that s does not turn negative where it extrapolates, and a floor keeps it positive.
@@ -33,7 +34,7 @@ MOST_ROWS = 6000
 
 @dataclass(frozen=True, eq=False)
 class LocalScale:
-    """weights : (5,) a, b in V, u, v in V/A and w in V.  floor : V, the least s."""
+    """weights : (6,) a, b in V, u, v in V/A and w, y in V.  floor : V, the least s."""
 
     weights: Array
     floor: float
@@ -59,15 +60,17 @@ class LocalScale:
         return cls(np.asarray(state["weights"], dtype=float), float(state["floor"]))
 
 
-def covariates(current_a: Array, soc: Array, dt_s: float, excess: Array | None = None) -> Array:
-    """Columns of (1) for one continuous record: current_a (n,) A, soc (n,), dt_s in s, excess (n,); (n, p)."""
+def covariates(
+    current_a: Array, soc: Array, dt_s: float, excess: Array | None = None, gap: Array | None = None
+) -> Array:
+    """Columns of (1) for one continuous record: current_a (n,) A, soc (n,), dt_s in s, excess, gap (n,); (n, p)."""
     keep = np.exp(-dt_s / MEMORY_S)
     mean, _ = lfilter(
         [1 - keep], [1, -keep], current_a, zi=[keep * current_a[0]] if len(current_a) else [0.0]
     )
     low = np.maximum(LOW_SOC - soc, 0.0)
-    beyond = np.zeros(len(soc)) if excess is None else excess
-    return np.column_stack([np.ones(len(soc)), low, np.abs(current_a), np.abs(mean), beyond])
+    beyond, apart = (np.zeros(len(soc)) if each is None else each for each in (excess, gap))
+    return np.column_stack([np.ones(len(soc)), low, np.abs(current_a), np.abs(mean), beyond, apart])
 
 
 def _nonnegative_quantile(columns: Array, sizes: Array, level: float) -> Array:

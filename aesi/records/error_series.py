@@ -21,6 +21,7 @@ class ErrorSeries:
     error_v : (n,) V, V_measured - V_model.  inputs : (n, n_inputs) SI, columns `input_names`.
     soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
+    temperature_degc : (n,) of the cell, where it was measured.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -33,6 +34,7 @@ class ErrorSeries:
     model_v: Array
     input_names: tuple[str, ...] = INPUT_NAMES
     physics: Mapping[str, Array] = field(default_factory=dict)
+    temperature_degc: Array | None = None
 
     def __len__(self) -> int:
         return len(self.error_v)
@@ -61,6 +63,7 @@ class ErrorSeries:
             soc=self.soc[rows],
             model_v=self.model_v[rows],
             physics={name: voltage[rows] for name, voltage in self.physics.items()},
+            temperature_degc=None if self.temperature_degc is None else self.temperature_degc[rows],
         )
 
     def left_by(self, name: str) -> Array:

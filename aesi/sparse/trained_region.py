@@ -17,12 +17,11 @@ import numpy as np
 
 from aesi.numerics.blocks import Span
 from aesi.numerics.typing import Array
+from aesi.numerics.visited import distance_to_visited, visited
 
 DISTANCE = 0.1
 LEAST_TESTED = 0.05
 """Of g_t: DISTANCE of an input that grows with the charge and was trained over all of it."""
-RESOLUTION = 0.005
-"""States of charge closer than this are told apart by no correction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +37,12 @@ class TrainedRegion:
     @classmethod
     def of(cls, scaled: Array, soc: Array, tested: float) -> Self:
         """Of rows with scaled inputs (n, n_inputs) and states of charge (n,)."""
-        charge = RESOLUTION * np.unique(np.round(soc / RESOLUTION))
-        return cls(scaled.min(axis=0), scaled.max(axis=0), charge, max(tested, LEAST_TESTED))
+        return cls(scaled.min(axis=0), scaled.max(axis=0), visited(soc), max(tested, LEAST_TESTED))
 
     def remoteness(self, scaled: Array, soc: Array) -> Array:
         """(n,) of (1), >= 0; scaled : (n, n_inputs), not held at the edge."""
         beyond = np.maximum(self.low - scaled, 0.0) + np.maximum(scaled - self.high, 0.0)
-        gap = charge_distance(soc, self.charge) / self.tested
+        gap = distance_to_visited(soc, self.charge) / self.tested
         return np.asarray(np.sum((beyond / DISTANCE) ** 2, axis=1) + gap**2)
 
     def to_dict(self) -> dict[str, Any]:
@@ -63,20 +61,11 @@ class TrainedRegion:
         return cls(low, high, charge, float(data["tested"]))
 
 
-def charge_distance(soc: Array, charge: Array) -> Array:
-    """(n,) from each state of charge to the nearest one of `charge` (k,), sorted; 0 within their resolution."""
-    place = np.clip(np.searchsorted(charge, soc), 1, max(len(charge) - 1, 1))
-    distance = np.minimum(
-        np.abs(soc - charge[place - 1]), np.abs(soc - charge[np.minimum(place, len(charge) - 1)])
-    )
-    return np.asarray(np.maximum(distance - RESOLUTION / 2, 0.0))
-
-
 def farthest_left_out(soc: Array, folds: Sequence[Span]) -> float:
     """g_t of (1): the largest distance of any left-out row to the rows of the other folds."""
     farthest = 0.0
     for a, b in folds:
         others = np.sort(np.delete(soc, np.s_[a:b]))
         if len(others):
-            farthest = max(farthest, float(charge_distance(soc[a:b], others).max()))
+            farthest = max(farthest, float(distance_to_visited(soc[a:b], others).max()))
     return farthest

@@ -1,8 +1,10 @@
-"""One name, one thing: no public class, type or function is defined twice under one name."""
+"""One name, one thing: nothing public is defined twice under one name, and what a text names is there."""
 
 import ast
+import re
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,3 +69,47 @@ def test_a_function_defined_twice_would_be_seen(tmp_path):
         "def run(): ...\nasync def wait(): ...\ndef _own(): ...\nclass Cell:\n    def run(self): ...\n"
     )
     assert list(functions_of(module)) == ["run", "wait"]
+
+
+def texts() -> Iterator[tuple[Path, str]]:
+    """Documentation, notebooks and sources, in which modules, files and names are told of."""
+    for pattern in ("*.md", "docs/**/*.md", "docs/**/*.ipynb", "aesi/**/*.py", "flows/**/*.py"):
+        for path in sorted(ROOT.glob(pattern)):
+            if path.name != "CHANGELOG.md":
+                yield path.relative_to(ROOT), path.read_text(encoding="utf-8")
+
+
+def known(dotted: str) -> bool:
+    """Whether `package.module.Name.attribute` can be imported."""
+    parts = dotted.split(".")
+    for cut in range(len(parts), 0, -1):
+        try:
+            found = import_module(".".join(parts[:cut]))
+        except ModuleNotFoundError:
+            continue
+        for part in parts[cut:]:
+            if not hasattr(found, part):
+                return part in getattr(found, "__dataclass_fields__", {})
+            found = getattr(found, part)
+        return True
+    return False
+
+
+def test_every_dotted_name_that_a_text_tells_of_is_there():
+    told = {
+        (dotted, str(path))
+        for path, text in texts()
+        for dotted in re.findall(r"(?<![\w/.-])(?:aesi|flows)(?:\.[A-Za-z_]\w*){2,}", text)
+    }
+    assert [place for place in sorted(told) if not known(place[0])] == []
+
+
+def test_every_file_that_a_text_tells_of_is_there():
+    told = {
+        (name, str(path))
+        for path, text in texts()
+        for name in re.findall(
+            r"(?<![\w/.-])(?:aesi|flows|tests|docs|experiments)(?:/[\w.-]+)*/[\w-]+(?:\.\w+)+", text
+        )
+    }
+    assert [place for place in sorted(told) if not (ROOT / place[0]).exists()] == []

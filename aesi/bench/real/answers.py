@@ -28,7 +28,7 @@ def scored(
     hit = [name for name, group in groups.items() if group & set(answers)]
     named = bool(hit) if answers else not effects
     row: dict[str, Any] = {
-        key: content[key] for key in ("verdict", "effects", "indistinguishable", "confidence")
+        key: content[key] for key in ("verdict", "effects", "indistinguishable", "confidence", "margin")
     }
     for state in ("before", "recalibrated", "after"):
         row[f"{state}_test_mv"] = content[state]["test"].get("rmse_mv")

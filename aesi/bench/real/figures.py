@@ -34,7 +34,7 @@ def confusion_figure(matrix: Mapping[str, Mapping[str, int]]) -> Figure:
     fig.add_heatmap(
         z=shares,
         x=[s.replace("_", " ") for s in said],
-        y=[a.replace("_", " ") for a in asked],
+        y=[a.replace("_", " ").replace(" or ", " or<br>") for a in asked],
         text=[[str(n) if n else "" for n in row] for row in counts],
         texttemplate="%{text}",
         colorscale=[[0, "rgba(0,114,178,0)"], [1, "rgba(0,114,178,0.7)"]],

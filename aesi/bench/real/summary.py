@@ -151,6 +151,7 @@ def _confusion(rows: Sequence[CaseRow]) -> dict[str, dict[str, int]]:
     out: dict[str, Counter[str]] = {}
     for row in rows:
         asked = " or ".join(row["answer"]) or "no name"
-        said = "+".join(row["effects"]) or row["verdict"]
-        out.setdefault(asked, Counter())[said if row["verdict"] != "unknown" else f"unknown: {said}"] += 1
+        names = "+".join(row["effects"])
+        said = f"unknown: {names}" if names and row["verdict"] == "unknown" else names or row["verdict"]
+        out.setdefault(asked, Counter())[said] += 1
     return {asked: dict(counts) for asked, counts in out.items()}

@@ -18,4 +18,5 @@ def error_series(measurement: Measurement, run: Run, dt_s: float) -> ErrorSeries
         inputs=inputs,
         soc=run.series["soc"],
         model_v=run.voltage_v,
+        temperature_degc=measurement.temperature_degc,
     )

@@ -158,7 +158,8 @@ class HybridModel:
         low = high = np.full(n, np.nan)
         if self.bands is not None:
             reach = 0.0 if self.correction is None else self.correction.reach(series, error0_v=error0_v)
-            low, high = self.bands.along(self.dt_s, series.current_a, series.soc, run.excess, reach)
+            band = self.bands.intervals(series, run, reach)
+            low, high = band.lower_v, band.upper_v
         alpha = None if self.bands is None else self.bands.alpha
         return Prediction.of(series, run.error_v, low, high, run.outside, alpha)
 

@@ -64,14 +64,24 @@ def fitted_map(margins: Sequence[float], right: Sequence[bool]) -> FrequencyMap:
     return FrequencyMap(float(weights[0]), float(weights[1]), len(margins))
 
 
+def kind_of(word: str, effects: Sequence[str]) -> str:
+    """Kind of verdict that has a map of its own: its word, or `named` where names stand beside `unknown`."""
+    return "named" if word == "unknown" and effects else word
+
+
 def maps_of(rows: Sequence[Mapping[str, object]]) -> dict[str, FrequencyMap]:
-    """Kind of verdict -> map, from rows with `verdict`, `margin` and `right`."""
+    """Kind of verdict -> map, from rows with `verdict`, `effects`, `margin` and `right`."""
     out = {}
-    for word in ("found", "none", "unknown"):
-        of_kind = [row for row in rows if row.get("verdict") == word and "margin" in row]
+    for kind in ("found", "none", "unknown", "named"):
+        of_kind = [row for row in rows if "margin" in row and _kind(row) == kind]
         margins = [float(str(row["margin"])) for row in of_kind]
-        out[word] = fitted_map(margins, [bool(row["right"]) for row in of_kind])
+        out[kind] = fitted_map(margins, [bool(row["right"]) for row in of_kind])
     return out
+
+
+def _kind(row: Mapping[str, object]) -> str:
+    effects = row.get("effects", ())
+    return kind_of(str(row.get("verdict")), effects if isinstance(effects, Sequence) else ())
 
 
 def _main(paths: Sequence[str]) -> None:

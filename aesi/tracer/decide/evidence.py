@@ -12,7 +12,7 @@ from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
-from aesi.tracer.decide.confidence import frequency_maps
+from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.one_cause import in_one
 from aesi.tracer.decide.search import (
     Path,
@@ -142,10 +142,10 @@ def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:
 def _sharpened(
     problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
-    """The same finding with the own parameters believed exactly, where that says more of unseen data."""
+    """The same finding with the own parameters believed exactly, where that says as much of unseen data."""
     exact = replace(problem, trust="exact")
     found = refitted(exact, path, archive)
-    if found is None or found.chosen.score.total < path.chosen.score.total:
+    if found is None or found.chosen.score.total < path.chosen.score.total - AS_MUCH_NATS:
         return path, verdict
     left, allowed = structured_v(found, found.chosen), tolerance_v(noise_v(found), thresholds)
     return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
@@ -163,7 +163,8 @@ def _with_one_cause(
 
 
 def _with_confidence(verdict: Verdict) -> Verdict:
-    return replace(verdict, confidence=frequency_maps()[verdict.word].frequency(verdict.margin))
+    kind = kind_of(verdict.word, verdict.effects)
+    return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
 
 
 def _recalibrated(

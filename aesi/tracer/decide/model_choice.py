@@ -1,8 +1,10 @@
 """Single particle or porous electrode: settled before an effect is blamed on the cell.
 
-Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one.
+Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
+not where the single particle cannot explain the data and the fuller one, with the same effects, leaves as much: what is
+missing is something else then, and a search takes ten times as long.
 What was measured may still be a single particle's (a thin electrode, a file made with one): where that says more of
-the data as declared, it is searched too, and kept only if it explains them to the noise and says more there as well.
+the data as declared, it is kept if it explains them to the noise and says more there as well.
 """
 
 from __future__ import annotations
@@ -15,7 +17,14 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.evidence import Evidence
-from aesi.tracer.decide.search import base_of
+from aesi.tracer.decide.search import (
+    HOPELESS_SHARE,
+    REFIT_STEPS,
+    Path,
+    base_of,
+    beyond_noise,
+    fitted_hypothesis,
+)
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
@@ -38,34 +47,57 @@ def with_model(
 ) -> tuple[Evidence, ModelChoice]:
     """The search with the model that the user named, or else with the one that the records ask for."""
     reduction = reduction_of(problem)
-    name: ModelName = wanted or ("dfn" if reduction is not None and reduction.notable else "espm")
-    problems = {name: with_fine_numerics(replace(problem, model=name))}
-    evidence = search(problems[name], kept(problems[name]))
     differ = "" if reduction is None else f"; {reduction.sentence}"
+
+    def searched(name: ModelName) -> tuple[InverseProblem, Evidence]:
+        one = with_fine_numerics(replace(problem, model=name))
+        return one, search(one, kept(one))
+
+    def told(evidence: Evidence, name: ModelName, why: str = "") -> tuple[Evidence, ModelChoice]:
+        words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
+        return evidence, ModelChoice(name, words, reduction)
+
     if wanted is not None:
-        return evidence, ModelChoice(
-            name, f"all hypotheses use {MODEL_WORDS[name]}, as asked{differ}.", reduction
+        return told(searched(wanted)[1], wanted, ", as asked")
+    single, first = searched("espm")
+    if reduction is None or not reduction.notable:
+        return told(first, "espm")
+    if first.verdict.word == "unknown" and not _takes_off(problem, first.paths["tight"], kept):
+        return told(first, "espm", ", what it leaves is not taken off by the other one")
+    full, second = searched("dfn")
+    if _believed(first, second) and _says_more(single, full, kept):
+        ahead = first.path.chosen.score.total - second.path.chosen.score.total
+        return told(
+            first, "espm", f", which explains these data to the noise and says {ahead:.0f} nats more of them"
         )
-    if name == "dfn":
-        single = with_fine_numerics(replace(problem, model="espm"))
-        other = _better(evidence, problems[name], single, search, kept)
-        if other is not None:
-            ahead = other.path.chosen.score.total - evidence.path.chosen.score.total
-            why = f"which explains these data to the noise and says {ahead:.0f} nats more of them"
-            return other, ModelChoice(
-                "espm", f"all hypotheses use {MODEL_WORDS['espm']}, {why}{differ}.", reduction
-            )
-    return evidence, ModelChoice(name, f"all hypotheses use {MODEL_WORDS[name]}{differ}.", reduction)
+    return told(second, "dfn")
 
 
-def _better(
-    full: Evidence, problem: InverseProblem, single: InverseProblem, search: Search, kept: Kept
-) -> Evidence | None:
-    """The search with the single particle where it explains the data and says more of them, else None."""
-    bases = [base_of(one, kept(one)) for one in (single, problem)]
-    if bases[0] is None or (bases[1] is not None and bases[0][2].score.total <= bases[1][2].score.total):
-        return None
-    other = search(single, kept(single))
-    explains = other.verdict.word != "unknown"
-    says_more = other.path.chosen.score.total > full.path.chosen.score.total
-    return other if explains and (says_more or full.verdict.word == "unknown") else None
+def _takes_off(problem: InverseProblem, path: Path, kept: Kept) -> bool:
+    """Does the porous electrode leave notably less of unseen data with what the single particle ended with?"""
+    full = with_fine_numerics(replace(problem, model="dfn"))
+    chosen = path.chosen
+    fit = fitted_hypothesis(
+        full, path.blocks, chosen.hypothesis, chosen.placed, chosen.score.delta_v, REFIT_STEPS, kept(full)
+    )
+    if fit is None:
+        return False
+    return beyond_noise(full, path.blocks, fit) < HOPELESS_SHARE * beyond_noise(
+        path.problem, path.blocks, chosen
+    )
+
+
+def _believed(single: Evidence, full: Evidence) -> bool:
+    """Does the single particle explain the data, and say more of them where both do?"""
+    if single.verdict.word == "unknown":
+        return False
+    says_more = single.path.chosen.score.total > full.path.chosen.score.total
+    return says_more or full.verdict.word == "unknown"
+
+
+def _says_more(single: InverseProblem, full: InverseProblem, kept: Kept) -> bool:
+    """Does the single particle as declared, but for its own parameters, say more than the porous electrode?"""
+    bases = [base_of(one, kept(one)) for one in (single, full)]
+    if bases[0] is None:
+        return False
+    return bases[1] is None or bases[0][2].score.total > bases[1][2].score.total

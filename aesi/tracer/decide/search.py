@@ -32,6 +32,8 @@ PROMISING = 9
 """Effects that are grown on a hypothesis with effects: those that say most to first order."""
 BEAM = 2
 """Hypotheses that a further effect is tried on."""
+NINETY = 1.645
+"""Standard deviations either side of a 90 % interval."""
 WRONG_SDS = 2.0
 """Of its spread: a declared parameter that the data put further off, with 95 % probability, is wrong and is named."""
 HOPELESS_SHARE = 0.7
@@ -155,7 +157,7 @@ def searched(
         steps.append(step)
         if step.admitted is None:
             break
-        left = [_beyond_noise(problem, blocks, fit) for fit in (chosen, step.admitted)]
+        left = [beyond_noise(problem, blocks, fit) for fit in (chosen, step.admitted)]
         chosen = step.admitted
         if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
             break
@@ -166,25 +168,40 @@ def searched(
 
 
 def with_wrong_parameters(path: Path, archive: Archive) -> Path:
-    """The path with those declared parameters as effects that the data put beyond what cell files are off by."""
+    """The path with those declared parameters as effects that the data put beyond what cell files are off by.
+
+    One at a time, that which says most: another one may only have made up for it.
+    """
     chosen = path.chosen
-    sds = np.sqrt(np.diagonal(chosen.score.covariance))
-    beyond = {
-        f.owner: abs(float(x)) - 1.645 * float(sd)
-        for f, x, sd in zip(chosen.free, chosen.point.x, sds, strict=True)
-        if f.own and f.owner in path.problem.effects and path.problem.effects[f.owner].refines is None
-        if abs(float(x)) - 1.645 * float(sd) > WRONG_SDS
-    }
-    for owner in sorted(beyond, key=lambda name: -beyond[name]):
-        hypothesis = (*chosen.hypothesis, owner)
+    while beyond := _beyond_spread(path.problem, chosen):
         start, size = chosen.placed, chosen.score.delta_v
-        fit = fitted_hypothesis(path.problem, path.blocks, hypothesis, start, size, 2 * REFIT_STEPS, archive)
-        if fit is not None and fit.score.total > chosen.score.total - ALIKE_NATS and not fit.at_bounds:
-            chosen = fit
+        fits = [
+            fitted_hypothesis(
+                path.problem, path.blocks, (*chosen.hypothesis, owner), start, size, 2 * REFIT_STEPS, archive
+            )
+            for owner in beyond
+        ]
+        said = chosen.score.total - ALIKE_NATS
+        better = [f for f in fits if f is not None and f.score.total > said and not f.at_bounds]
+        if not better:
+            break
+        chosen = max(better, key=lambda f: f.score.total)
     if chosen is path.chosen:
         return path
     step = Step((path.chosen,), (), (chosen,), chosen)
     return replace(path, steps=(*path.steps, step), chosen=chosen)
+
+
+def _beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
+    """Ids of the effects whose own parameters are off by more than files are, with 95 % probability."""
+    sds = np.sqrt(np.diagonal(fit.score.covariance))
+    owners = [
+        f.owner
+        for f, x, sd in zip(fit.free, fit.point.x, sds, strict=True)
+        if f.own and f.owner in problem.effects and problem.effects[f.owner].refines is None
+        if abs(float(x)) - NINETY * float(sd) > WRONG_SDS
+    ]
+    return list(dict.fromkeys(owners))
 
 
 def _pruned(
@@ -216,7 +233,7 @@ def _pruned(
     return chosen
 
 
-def _beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
+def beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
     """V**2 beyond the noise on unseen data."""
     return max(unseen_rmse_v(blocks, fit) ** 2 - float(np.mean(problem.white_v**2)), 0.0)
 

@@ -18,6 +18,8 @@ from aesi.tracer.likelihood.model_error import MEASURED_V
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
 """Names that a group of look-alikes holds at most."""
+MOST_SDS = 50.0
+"""Where nothing comes close."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class Verdict:
 
     effects : ids in the order in which they were added.  groups : look-alikes, each group begins with a member of
     `effects`.  structured_v, tolerance_v : what is left on unseen data beyond noise, and how much may be.
-    margin : standard score behind the confidence, see `decide.confidence`.
+    margin : standard deviations behind the confidence, see `decide.confidence`: of an answer with names those by which
+    the closest rival lags, or those of the weakest name's gain; of one without, the distance from the tolerance.
     """
 
     word: Word
@@ -157,7 +160,15 @@ def look_alikes(
         alike.sort()
         if alike:
             groups.append((name, *(other for _, other in alike[: GROUP_SIZE - 1])))
-    return tuple(groups), float(min(margin, 50.0))
+    return tuple(groups), float(min(margin, _weakest_sds(path, tried), MOST_SDS))
+
+
+def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> float:
+    """What the weakest of the effects that were chosen says more than the rest, as that many standard deviations."""
+    chosen = frozenset(path.chosen.hypothesis)
+    rests = (tried.get(chosen - {name}) for name in chosen)
+    gains = [path.chosen.score.total - rest.score.total for rest in rests if rest is not None]
+    return float(np.sqrt(2.0 * max(min(gains), 0.0))) if gains else MOST_SDS
 
 
 def _rivals(

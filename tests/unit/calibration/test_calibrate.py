@@ -15,7 +15,7 @@ from aesi.physics import simulate
 
 @pytest.fixture(scope="module")
 def found(start, records):
-    return calibrate(start, records)
+    return calibrate(start, records, evaluations=12)
 
 
 def test_the_records_of_both_temperatures_are_followed(found):
@@ -38,6 +38,14 @@ def test_every_parameter_has_an_interval_and_a_source(found):
     for interval in found.parameters.values():
         assert interval.low <= interval.value <= interval.high
         assert interval.source
+
+
+def test_a_calibration_is_short_in_words_and_a_table_of_its_parameters(found):
+    assert len(repr(found)) < 200
+    assert "at_25" in repr(found)
+    table = found.to_frame()
+    assert table.loc["negative.rate", "low"] < table.loc["negative.rate", "value"]
+    assert list(table.columns) == ["value", "low", "high", "unit", "source"]
 
 
 def test_the_state_of_health_holds_the_true_one_within_its_intervals(found, truth):

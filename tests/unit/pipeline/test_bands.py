@@ -79,3 +79,14 @@ def test_a_model_that_holds_nothing_at_an_edge_reaches_nowhere(drive) -> None:
     errors = HonestErrors.of([(Held(), drive, WHOLE)], (drive,), (10.0,))
     assert errors.reach.keys() == errors.by_horizon.keys()
     assert not any(each[0].any() for each in errors.reach.values())
+
+
+def test_a_left_out_piece_is_as_far_from_the_charges_of_the_others_as_they_lie(drive) -> None:
+    half = slice(N // 2, N)
+    errors = HonestErrors.of([(Held(), drive, half), (Held(), drive, slice(1, 1))], (drive,), (10.0,))
+    left, nothing = errors.gap
+    assert left[: N // 2].max() < 1e-6
+    assert (np.diff(left[half][10:]) >= 0).all()
+    assert left[-1] > 0.9
+    assert nothing.max() < 1e-6
+    assert errors.seen.gap(drive.soc).max() < 1e-6

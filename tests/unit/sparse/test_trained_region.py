@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from sparse_records import make_record
 
+from aesi.numerics.visited import RESOLUTION
 from aesi.records import Split
 from aesi.sparse import Options, Problem
 from aesi.sparse.trained_region import (
     DISTANCE,
     LEAST_TESTED,
-    RESOLUTION,
     TrainedRegion,
-    charge_distance,
     farthest_left_out,
 )
 
@@ -39,16 +38,6 @@ def test_a_gap_between_two_drives_is_remote_though_it_is_within_every_range():
     trained = region(np.concatenate([np.linspace(1.0, 0.8, 200), np.linspace(0.2, 0.0, 200)]), tested=0.2)
     remote = trained.remoteness(np.zeros((3, 2)), np.array([0.9, 0.6, 0.5]))
     np.testing.assert_allclose(remote, [0.0, 1.0, 2.25], rtol=0.05)
-
-
-def test_distances_are_those_to_the_nearest_row():
-    rng = np.random.default_rng(0)
-    charge, soc = np.sort(rng.uniform(0.2, 0.8, 40)), rng.uniform(0.0, 1.0, 300)
-    nearest = np.abs(soc[:, None] - charge).min(axis=1)
-    np.testing.assert_allclose(charge_distance(soc, charge), np.maximum(nearest - RESOLUTION / 2, 0.0))
-    np.testing.assert_allclose(
-        charge_distance(soc, charge[:1]), np.maximum(np.abs(soc - charge[0]) - RESOLUTION / 2, 0)
-    )
 
 
 def test_a_correction_counts_as_tested_as_far_as_left_out_drives_lay_from_the_others():

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.conformal import WHOLE_DRIVE, FreeRunBands
+from aesi.conformal.seen import Seen
 from aesi.numerics.typing import Array, BoolArray
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
@@ -28,7 +29,8 @@ class HonestErrors:
 
     by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
     current_a, soc : A and 1.  inside : True where the model had been trained on such inputs.
-    excess : `FreeRun.excess` of each model.  reach : as by_horizon, `reach` of each prediction, V.
+    excess : `FreeRun.excess` of each model.  gap : how far from the states of charge that each was fitted to.
+    seen : what a model fitted to all training records has seen.  reach : as by_horizon, `reach` of each prediction, V.
     """
 
     dt_s: float
@@ -37,6 +39,8 @@ class HonestErrors:
     soc: list[Array]
     inside: list[BoolArray]
     excess: list[Array | None]
+    gap: list[Array | None]
+    seen: Seen
     reach: dict[float, list[Array]]
 
     @classmethod
@@ -59,6 +63,8 @@ class HonestErrors:
             soc=[series.soc for _, series, _ in pairs],
             inside=[_inside(model, series, rows, train) for model, series, rows in pairs],
             excess=[run.excess for run in runs],
+            gap=[_seen(train, series, rows).gap(series.soc) for _, series, rows in pairs],
+            seen=_seen(train),
             reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
         )
 
@@ -72,6 +78,8 @@ class HonestErrors:
             alpha=alpha,
             inside=self.inside,
             excess=self.excess,
+            gap=self.gap,
+            seen=self.seen,
         )
 
 
@@ -116,6 +124,21 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     low = np.min([rows.min(axis=0) for rows in seen if len(rows)], axis=0)
     high = np.max([rows.max(axis=0) for rows in seen if len(rows)], axis=0)
     return np.asarray(((series.inputs >= low) & (series.inputs <= high)).all(axis=1))
+
+
+def _seen(train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE) -> Seen:
+    """Of the training records without the given rows of one of them, where that is one."""
+    kept = [
+        _others(len(record), rows) if left_out is not None and record.name == left_out.name else slice(None)
+        for record in train
+    ]
+    return Seen.of(
+        [record.soc[rows] for record, rows in zip(train, kept, strict=True)],
+        [
+            None if r.temperature_degc is None else r.temperature_degc[k]
+            for r, k in zip(train, kept, strict=True)
+        ],
+    )
 
 
 def _steps(series: ErrorSeries, horizon_s: float) -> int:

@@ -1,0 +1,74 @@
+"""What a model was fitted to: states of charge and temperatures; a band widens away from them.
+
+    g(x) = sqrt(1 - exp(-(d(x) / LENGTH)**2)),     d the distance in the state of charge to the nearest fitted row   (1)
+    k_T  = exp(E / R |1 / T - 1 / T_near|),     T_near the nearest temperature of the fitted rows           (2)
+
+What a model misses at a state of charge that nothing was fitted to is not known from elsewhere: (1) is the standard
+deviation that a smooth random function has left at a distance d from where it is known, and a term of the scale
+(local_scale.py), whose weight is learned from left-out pieces. No piece at one temperature can tell of another, so
+there the band grows as the overpotentials do, whose share the error is: (2), with the activation energy E that
+kinetics and diffusion have in common. A temperature that nobody measured counts as the fitted one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
+from aesi.numerics.typing import Array, SavedState
+from aesi.numerics.visited import distance_to_visited, visited
+
+LENGTH = 0.12
+"""Share of the charge over which errors of a potential change, as in the effect ocp_shape."""
+ENERGY_J_MOL = 40e3
+"""The mean of 53 and 44 (Ecker et al. 2015), 35 and 18 (Chen et al. 2020), 55 and 35 kJ/mol (About:Energy 2022)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """charge : (k,) states of charge, sorted.  temperature_degc : the lowest and the highest, None if not measured."""
+
+    charge: Array
+    temperature_degc: tuple[float, float] | None = None
+
+    @classmethod
+    def of(cls, soc: Sequence[Array], temperature_degc: Sequence[Array | None]) -> Self:
+        """Of one array a record; temperatures None where they were not measured."""
+        measured = [each for each in temperature_degc if each is not None and len(each)]
+        span = (
+            (min(float(t.min()) for t in measured), max(float(t.max()) for t in measured))
+            if measured
+            else None
+        )
+        return cls(visited(np.concatenate(list(soc))), span)
+
+    def gap(self, soc: Array) -> Array:
+        """(n,) of (1), 0 to 1."""
+        distance = distance_to_visited(soc, self.charge)
+        return np.asarray(np.sqrt(-np.expm1(-((distance / LENGTH) ** 2))))
+
+    def growth(self, temperature_degc: Array | None) -> Array | float:
+        """(n,) k_T of (2), >= 1."""
+        if self.temperature_degc is None or temperature_degc is None:
+            return 1.0
+        near = np.clip(temperature_degc, *self.temperature_degc) + ZERO_CELSIUS_K
+        apart = np.abs(1.0 / (temperature_degc + ZERO_CELSIUS_K) - 1.0 / near)
+        return np.asarray(np.exp(ENERGY_J_MOL / GAS_CONSTANT_J_MOL_K * apart))
+
+    def to_state(self) -> SavedState:
+        """Plain values and a numpy array."""
+        span = None if self.temperature_degc is None else list(self.temperature_degc)
+        return {"charge": self.charge, "temperature_degc": span}
+
+    @classmethod
+    def from_state(cls, state: SavedState) -> Self:
+        """Inverse of `to_state`."""
+        span = state["temperature_degc"]
+        return cls(
+            np.asarray(state["charge"], dtype=float),
+            None if span is None else (float(span[0]), float(span[1])),
+        )
