@@ -232,7 +232,11 @@ def _best_carried(
     ]
     fit_options = [o for o in more if o.left_out.no_worse_than([b.left_out for b in basic])]
     ranked = sorted([*basic, *fit_options], key=lambda o: o.left_out.pooled_v)
-    named = [o for o in fit_options if o.explanation is path.chosen and verdict.effects]
+    named = [
+        o
+        for o in more
+        if o.explanation is path.chosen and verdict.effects and o.left_out.no_worse_than([declared.left_out])
+    ]
     fault = None
     for option in (*named, *ranked):
         fault = range_fault(option.state, ORDINARY_C) if option.explanation is not None else None
