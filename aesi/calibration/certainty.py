@@ -11,6 +11,7 @@ from aesi.calibration.result import Interval, Open
 from aesi.numerics.typing import Array
 
 BOUND_SHARE = 0.02
+"""Of a parameter's range, next to a bound: what counts as the bound."""
 
 
 def information_weights(model: Model, errors: Sequence[Array]) -> list[Array]:

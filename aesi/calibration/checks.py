@@ -11,7 +11,9 @@ from aesi.physics.cell import Cell
 from aesi.records import Measurement
 
 VOLTAGE_MARGIN_V = 0.3
+"""Beyond the voltage limits of the file that a record may go."""
 SOC_MARGIN = 0.12
+"""Beyond full and empty, by the declared capacity: new cells hold more than they are sold for."""
 
 
 def check_voltage(cell: Cell, data: Measurement) -> None:
