@@ -8,13 +8,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.optimize import least_squares
 
-from aesi.calibration.certainty import at_bounds, information_weights, intervals, undetermined
-from aesi.calibration.checks import check_charge, check_voltage
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import AGEING_SD, Model
 from aesi.calibration.parameters import free_parameters
-from aesi.calibration.records import Prepared, prepared, with_temperatures
-from aesi.calibration.result import Calibration, RecordError
+from aesi.calibration.records import Prepared, check_charge, check_voltage, prepared, with_temperatures
+from aesi.calibration.result import (
+    Calibration,
+    RecordError,
+    at_bounds,
+    information_weights,
+    intervals,
+    undetermined,
+)
 from aesi.calibration.rewind import rewound, usual_share
 from aesi.calibration.shapes import SPAN_K, Shapes
 from aesi.calibration.start import one_branch, sized, with_activation

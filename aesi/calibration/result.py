@@ -1,10 +1,12 @@
-"""What a calibration gives back."""
+"""What a calibration gives back, and what its records determine: intervals, combinations that stay open, bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from aesi.calibration.model import Model
 from aesi.constants import MV_PER_V
@@ -13,6 +15,8 @@ from aesi.physics.cell import Cell
 
 if TYPE_CHECKING:
     import pandas as pd
+
+BOUND_SHARE = 0.02
 
 
 @dataclass(frozen=True)
@@ -88,3 +92,63 @@ class Calibration:
 
         rows = {name: asdict(interval) for name, interval in self.parameters.items()}
         return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def information_weights(model: Model, errors: Sequence[Array]) -> list[Array]:
+    """Factor on each row's weight that makes a record count as many rows as say something of their own.
+
+    What is left after the fit repeats itself: n rows of first autocorrelation rho are n (1 - rho)/(1 + rho).
+    """
+    out = []
+    for record, error, weight in zip(model.records, errors, model.weights, strict=True):
+        seen = error[record.trusted]
+        rms = max(float(np.sqrt(np.mean(seen**2))), 1e-6)
+        centred = seen - seen.mean()
+        rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
+        share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
+        out.append(np.sqrt(share) / rms / np.where(weight > 0.0, weight, 1.0))
+    return out
+
+
+def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
+    """Value and 95 % interval of every global parameter."""
+    out = {}
+    for j, free in enumerate(model.free):
+        reach = 1.96 * float(np.sqrt(covariance[j, j]))
+        out[free.name] = Interval(
+            free.value(float(x[j])), free.value(float(x[j]) - reach), free.value(float(x[j]) + reach),
+            free.unit, free.source,
+        )  # fmt: skip
+    return out
+
+
+def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
+    """Combinations of global parameters along which the records say less than the priors.
+
+    Eigenvectors of the information of the records on the global parameters, with all others marginalised, in units of
+    the priors: an eigenvalue below one is less than the prior's own.
+    """
+    n = len(model.free)
+    information = jacobian.T @ jacobian
+    here, rest = information[:n, :n], information[n:, n:]
+    marginal = here - information[:n, n:] @ np.linalg.solve(rest, information[n:, :n])
+    values, vectors = np.linalg.eigh(marginal - np.eye(n))
+    out = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value >= 1.0:
+            break
+        vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
+        heavy = [j for j in np.argsort(-np.abs(vector)) if abs(vector[j]) > 0.3]
+        weights = tuple((model.free[j].name, float(vector[j])) for j in heavy)
+        out.append(Open(weights, float(1.0 / np.sqrt(1.0 + max(value, 0.0)))))
+    return tuple(out)
+
+
+def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
+    """Names of the parameters that ended on a bound of their range."""
+    width = BOUND_SHARE * (model.high - model.low)
+    return tuple(
+        f.name
+        for j, f in enumerate(model.free)
+        if model.high[j] - x[j] < width[j] or (x[j] - model.low[j] < width[j] and f.low != 0.0)
+    )
