@@ -1,5 +1,6 @@
 """Fit a cell's own parameters to records of any temperatures together."""
 
-from aesi.calibration.fit import Calibration, RecordError, calibrate
+from aesi.calibration.fit import calibrate
+from aesi.calibration.result import Calibration, RecordError
 
 __all__ = ["Calibration", "RecordError", "calibrate"]

@@ -7,7 +7,8 @@ from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 
-from aesi.calibration.fit import Calibration, rewound
+from aesi.calibration.result import Calibration
+from aesi.calibration.rewind import rewound
 from aesi.constants import MILLI
 from aesi.physics.cell import Cell
 

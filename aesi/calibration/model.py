@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.parameters import Free, Shapes, moved
+from aesi.calibration.parameters import Free, moved
 from aesi.calibration.records import Prepared
+from aesi.calibration.shapes import Shapes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.model import EspmModel
@@ -40,8 +41,7 @@ class WorkingVector:
     """Where the parts of a working vector stand."""
 
     globals: int
-    ocp: int
-    entropic: int
+    knots: int
     records: int
 
     @property
@@ -52,7 +52,7 @@ class WorkingVector:
     @property
     def shapes(self) -> slice:
         """Of the knots."""
-        return slice(self.globals + 1, self.globals + 1 + self.ocp + self.entropic)
+        return slice(self.globals + 1, self.globals + 1 + self.knots)
 
     @property
     def size(self) -> int:
@@ -81,7 +81,7 @@ class Model:
     ) -> None:
         self.physics = physics
         self.cell, self.records, self.free, self.shapes = cell, records, free, shapes
-        self.layout = WorkingVector(len(free), shapes.n_ocp, shapes.n_entropic, len(records))
+        self.layout = WorkingVector(len(free), shapes.size, len(records))
         self.zero_a = ZERO_SHARE * max(float(np.abs(r.data.current_a).max()) for r in records)
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
@@ -93,8 +93,7 @@ class Model:
     def cell_at(self, x: Array) -> Cell:
         """The cell with all that is global moved."""
         values = {f.name: f.value(float(z)) for f, z in zip(self.free, x, strict=False)}
-        cell = moved(self.cell, values)
-        return replace(cell, positive=self.shapes.on(cell.positive, x[self.layout.shapes]))
+        return self.shapes.on(moved(self.cell, values), x[self.layout.shapes])
 
     def run(self, index: int, cell: Cell, x: Array) -> Array:
         """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`)."""
@@ -148,7 +147,7 @@ class Model:
             rise = (
                 np.full(len(record.rows), cell.initial_temperature_k) if kelvin is None else kelvin
             ) - cell.reference_temperature_k
-            blocks[i][:, self.layout.shapes] = self.shapes.columns(runs[i][2], rise)
+            blocks[i][:, self.layout.shapes] = self.shapes.columns(runs[i][1], runs[i][2], rise)
             for j in (self.layout.soc(i), self.layout.age(i)):
                 there = x.copy()
                 there[j] += 10.0 * STEP

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.calibration.fit import Calibration, Interval, information_weights
+from aesi.calibration.result import Calibration, Interval, information_weights
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 

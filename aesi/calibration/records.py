@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.calibration.start import flowing
 from aesi.calibration.thinning import thinned
-from aesi.constants import ZERO_CELSIUS_K
+from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
@@ -21,6 +21,8 @@ SOC_SD = 0.005
 """Of a state of charge that a potential in doubt gave; one that was given is believed."""
 SLOW_C_RATE = 0.15
 """Below this a cycler's zero is a share of the current."""
+VOLTAGE_MARGIN_V = 0.3
+SOC_MARGIN = 0.12
 MOST_ROWS = 4000
 """Rows of a drive that a fit sees: windows grow until there are no more."""
 
@@ -117,3 +119,34 @@ def with_temperatures(
             notes.append(f"{record.name}: no temperature; taken at that of the cell file.")
         out.append(record)
     return tuple(out), tuple(notes)
+
+
+def check_voltage(cell: Cell, data: Measurement) -> None:
+    """Refuse voltages that this cell cannot have."""
+    low, high = cell.lower_voltage_v - VOLTAGE_MARGIN_V, cell.upper_voltage_v + VOLTAGE_MARGIN_V
+    outside = np.flatnonzero((data.voltage_v < low) | (data.voltage_v > high))
+    if len(outside):
+        row = int(outside[0])
+        raise DataError(
+            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s (row {row}) is outside the range of "
+            f"{cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to another cell, "
+            "or the voltage is not in volts."
+        )
+
+
+def check_charge(cell: Cell, record: Prepared) -> None:
+    """Refuse charge that takes the cell far beyond full or empty."""
+    rows = record.rows
+    mean = (
+        rows.current_a[1:] if record.hold == "backward" else 0.5 * (rows.current_a[1:] + rows.current_a[:-1])
+    )
+    moved_ah = np.concatenate([[0.0], np.cumsum(mean * np.diff(rows.time_s))]) / SECONDS_PER_HOUR
+    soc = record.start.soc - moved_ah / cell.capacity_ah
+    wrong = (soc < -SOC_MARGIN) | (soc > 1.0 + SOC_MARGIN)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(
+            f"{record.name}: the charge moved takes the cell to a state of charge of {100 * soc[row]:.0f} % at "
+            f"{rows.time_s[row]:g} s, from {100 * record.start.soc:.0f} % at the start and with {cell.capacity_ah:.3g} "
+            "Ah; check the cell file, --soc0 and the sign and unit of the current."
+        )

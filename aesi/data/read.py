@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
-from aesi.data.channels.checks import (
-    Columns,
-    Context,
-    check_alive,
-    check_finite,
-    check_ranges,
-    check_sign,
-    check_time,
-    find_gaps,
-    gap_error,
-    is_rest,
-)
+from aesi.data.channels.checks import check_alive, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import REQUIRED, Mapped
-from aesi.data.channels.implausible import check_scale, check_signed
+from aesi.data.channels.gaps import without_gaps
+from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import load_columns
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
@@ -30,8 +20,6 @@ __all__ = ["Duplicates", "Reading", "Sign", "read", "read_measurement"]
 
 MAX_ROWS = 2_000_000
 """A tenth of a second for two days; more rows are decimated, and a note says so."""
-FEW_RESTS = 3
-"""Told one by one; more are told by their number."""
 SUFFIXES = (".gz", ".csv", ".txt", ".tsv", ".bdf", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax")
 
 
@@ -88,7 +76,7 @@ def read(
     check_finite(data, context)
     check_time(data["time_s"], context)
     check_ranges(data, context)
-    data = _without_gaps(data, context, notes)
+    data = without_gaps(data, context, notes)
     check_alive(data, context)
     if "temperature_degc" in data and not data["temperature_degc"].any():
         notes.append(
@@ -124,38 +112,6 @@ def _sign_advice(mapped: Mapped, reading: Reading) -> str:
         else "was assumed"
     )
     return f": {told} {who}; give --sign {other} if the file is meant so"
-
-
-def _without_gaps(data: Columns, context: Context, notes: list[str]) -> Columns:
-    """Refuse gaps; pass over a rest logged sparsely and a lone row long after the test, with a note."""
-    n = len(data["time_s"])
-    rests: list[tuple[float, float]] = []
-    for k in find_gaps(data):
-        seconds = float(data["time_s"][k + 1] - data["time_s"][k])
-        if is_rest(data, k):
-            rests.append((float(data["time_s"][k]), seconds))
-        elif k == n - 2 and n > 2:
-            notes.append(
-                f"The last row, {seconds:.6g} s after the one before it, is not of this test and was dropped."
-            )
-            data = {q: v[:-1] for q, v in data.items()}
-        else:
-            raise gap_error(data, k, context)
-    notes += _rests_told(rests)
-    return data
-
-
-def _rests_told(rests: Sequence[tuple[float, float]]) -> list[str]:
-    """A note on each of few sparsely logged rests (start, length in s), one on many."""
-    if len(rests) <= FEW_RESTS:
-        return [
-            f"No rows for {length:.6g} s from {start:.10g} s on; the cell rested." for start, length in rests
-        ]
-    lengths = [length for _, length in rests]
-    return [
-        f"No rows for {min(lengths):.3g} to {max(lengths):.3g} s at {len(rests)} places, the first at "
-        f"{rests[0][0]:.10g} s; the cell rested."
-    ]
 
 
 def _stem(path: Path) -> str:

@@ -148,10 +148,11 @@ class _Linear:
             faster *= (
                 float(electrode.diffusivity(np.array([at]))[0]) / solid_diffusion(electrode.diffusivity).d0
             )
+            factor = float(electrode.rate_factor(np.array([at]))[0])
             for u in here:
                 answer = units.lump[u] / s
                 answer = answer + (units.gains[u] / (s[:, None] + faster * units.rates[u])).sum(axis=1)
-                resistance = thermal / (units.exchange[u] * kinetic * np.sqrt(at * (1.0 - at)))
+                resistance = thermal / (units.exchange[u] * kinetic * factor * np.sqrt(at * (1.0 - at)))
                 out[:, u] = resistance - slope * answer
         return out
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
+from aesi.physics.cell.parts import UNITY
 from aesi.physics.cell.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
@@ -100,6 +101,10 @@ class EspmModel:
             and self.regions == 1
             and self.heat is None
             and all(isinstance(d, Constant) for d in solids)
+            and all(
+                x.rate_factor == UNITY and x.double_layer_f_m2 == 0.0
+                for x in (self.cell.negative, self.cell.positive)
+            )
         )
 
 

@@ -61,8 +61,10 @@ def calibrate_files(
         temperatures_degc=asked.temperatures_degc,
         physics=model,
     )
-    if asked.title is not None:
-        found = replace(found, cell=replace(found.cell, name=asked.title, description=_made_from(found)))
+    name = declared.name if asked.title is None else asked.title
+    described = replace(found.cell, name=name, description=_made_from(found), fitted_with=found.model.physics)
+    shares = tuple((e.name, found.capacities[e.name]) for e in found.errors)
+    found = replace(found, cell=replace(described, capacity_shares=shares))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra = held_against(found.cell, asked.impedance, model=model)
     content = calibration_content(found, [note for m in measurements for note in m.notes], posterior, spectra)
@@ -80,7 +82,8 @@ def calibrate_files(
 
 def _made_from(found: Calibration) -> str:
     records = ", ".join(e.name for e in found.errors)
-    return f"Fitted by aesi calibrate to {records}, from {found.declared.name}."
+    with_model = MODEL_WORDS[found.model.physics]
+    return f"Fitted by aesi calibrate with {with_model} to {records}, from {found.declared.name}."
 
 
 def calibration_content(

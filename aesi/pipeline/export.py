@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from aesi.errors import InputError
 from aesi.physics import Cell
+from aesi.physics.cell.parts import UNITY
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
@@ -55,18 +56,35 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
         held.append("State of charge 0 and 1 are now those of the changed electrodes.")
     if to == "bpx":
         left += [f"{_said(effect)}: BPX has no field for it." for effect in found.left]
+        left += _beyond_bpx(found.cell)
         if found.cell.contact_resistance_ohm:
             left.append(
                 f"{found.cell.contact_resistance_ohm:.4g} ohm of contacts: in the section User-defined, which other "
                 "tools do not read; --to pybamm hands it over."
             )
         return Exported((_write(out, _bpx(found.cell)),), tuple(held), tuple(left))
+    left += _beyond_bpx(found.cell)
     more, unknown = _for_pybamm(found.cell, found.left)
     held += [f"{_said(effect)}: as an option of the model." for effect in found.left if effect not in unknown]
     left += [f"{_said(effect)}: PyBaMM's model from BPX has no counterpart." for effect in unknown]
     beside = out.with_suffix(".bpx.json")
     written = (_write(out, _script(beside.name, more)), _write(beside, _bpx(found.cell)))
     return Exported(written, tuple(held), tuple(left))
+
+
+def _beyond_bpx(cell: Cell) -> list[str]:
+    """What a calibrated cell holds in its section User-defined that neither target takes over."""
+    both = (cell.negative, cell.positive)
+    own = {
+        "resistance of films": bool(cell.film_resistance_ohm),
+        "rates over stoichiometry": any(x.rate_factor != UNITY for x in both),
+        "double layers": any(x.double_layer_f_m2 for x in both),
+    }
+    return [
+        f"{name}: in the section User-defined, which other tools do not read."
+        for name, has in own.items()
+        if has
+    ]
 
 
 def _for_pybamm(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[_Pybamm, list[ActiveEffect]]:

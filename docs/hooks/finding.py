@@ -1,9 +1,9 @@
 """The picture of a finding, from the folder that `aesi discover` wrote, whatever it found:
 
-    python docs/hooks/finding.py FOLDER docs/images/finding.svg [--thermocouple RECORD] [--witness TEXT]
+    python docs/hooks/finding.py FOLDER docs/images/finding.svg [--thermocouple RECORD [--until-s S]] [--witness TEXT]
 
 The measured voltage, its residual as declared, recalibrated and with what was found, the name and size of that, and
-what was measured beside it: RECORD, a file whose temperature the loop was not given, or TEXT in your own words. Errors
+what was measured beside it: RECORD, one whose temperature the loop was not given, or TEXT in your own words. Errors
 are of the part that chose nothing, shaded here. All curves are those that the folder's report carries.
 """
 
@@ -23,6 +23,7 @@ from picture import POINTS, Series, nice, series_of
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.data import read_measurement
+from aesi.data.catalogue import locate
 from aesi.numerics.typing import Array
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import style
@@ -62,17 +63,24 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Draw a finding.")
     parser.add_argument("folder", type=Path)
     parser.add_argument("out", type=Path)
-    parser.add_argument("--thermocouple", help="file of the record with its temperature")
+    parser.add_argument(
+        "--thermocouple", help="file of the record with its temperature, or SET/NAME of a data set"
+    )
+    parser.add_argument("--until-s", type=float, help="seconds of that record that the loop was given")
     parser.add_argument("--witness", default="", help="what was measured beside it, in words")
     asked = parser.parse_args()
-    told = witness(asked.folder, asked.thermocouple) if asked.thermocouple else asked.witness
+    told = asked.witness
+    if asked.thermocouple:
+        told = witness(asked.folder, asked.thermocouple, asked.until_s)
     asked.out.write_text(draw(asked.folder, told), encoding="utf-8")
     print(asked.out)
 
 
-def witness(folder: Path, record: str) -> str:
-    """The thermocouple's mean beside the temperature of the model that was found."""
-    measured = read_measurement(record).temperature_degc
+def witness(folder: Path, record: str, until_s: float | None) -> str:
+    """The thermocouple's mean, up to `until_s`, beside the temperature of the model that was found."""
+    place, _, name = record.partition("/")
+    path = Path(record) if Path(record).exists() else locate(place, name)
+    measured = read_measurement(path, stop_s=until_s).temperature_degc
     if measured is None:
         raise SystemExit(f"{record} has no temperature.")
     told = f"thermocouple on the case, not given to the loop: {np.mean(measured):.1f} °C in the mean"

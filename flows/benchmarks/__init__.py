@@ -12,6 +12,7 @@ from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 
 BENCHMARKS = OF_THE_PACKAGE | {
     "blind": "flows.benchmarks.blind",
+    "cells": "flows.benchmarks.cells",
     "splits": "flows.benchmarks.splits",
     "real": "flows.benchmarks.real",
     "tracking": "flows.benchmarks.tracking",

@@ -16,6 +16,8 @@ import numpy as np
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, against, chosen_splits, judged
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.load import Loaded
 
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
 """A look at every split in hours; `whole` runs them at the settings of an experiment."""
@@ -95,7 +97,8 @@ def _row(case: SplitCase, seed: int, config: ExperimentConfig) -> dict[str, Any]
     return head | figures | {"cpu_s": round(time.process_time() - started, 1)}
 
 
-def _judged(case: SplitCase, config: ExperimentConfig) -> dict[str, Any]:
+def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float], Sequence[Fitted]]:
+    """The stages of `aesi run`, untracked: what was loaded, validation MSER (per cent), the models of Table 1."""
     from aesi.pipeline.experiment.candidate import genome_space, weights
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
@@ -121,6 +124,11 @@ def _judged(case: SplitCase, config: ExperimentConfig) -> dict[str, Any]:
     chosen = known[found.best().trial.number]
     fitted = conformalise(final_models(problem, chosen, config), problem, chosen, config, loaded.left_out)
     validation = validation_mser(loaded, problem, [c for c in known.values() if isinstance(c, Candidate)])
+    return loaded, validation, fitted
+
+
+def _judged(case: SplitCase, config: ExperimentConfig) -> dict[str, Any]:
+    loaded, validation, fitted = search_and_fit(config)
     home = [series for series in loaded.split.test if series.name not in case.abroad]
     figures: dict[str, Any] = {
         "validation_mser_pct": validation,

@@ -1,31 +1,35 @@
 """`aesi bench cells`: the physics alone on every measured cell, record and temperature, in free run.
 
-Each record is simulated whole, from the state of charge that `initial_state` finds, three times: as the start file of
-its cell declares it (for a cell with published parameters: as published), with the cell file of this project that was
-calibrated on other records of it, and with that file at the record's measured temperature. `aged` is the last one with
-the capacity that a calibration record of the same month had. A record that entered the calibration of its file is
-marked: its figure is no test.
+Each record is simulated whole, from the state of charge that `initial_state` finds: as the start file of its cell
+declares it (for a cell with published parameters: as published), with the cell file of this project that was calibrated
+on other records of it, with that file at the record's measured temperature, and the same with the capacity that the
+calibration found on the pulses of the same month (`aged`): a cell that was tested for five months is not the same cell.
+`windows` is ours under a protocol of others: windows of 1,024 rows, each from rest at a state of charge that is given.
 
-What others print is beside ours with its protocol; none of it was run here.
+A model that runs out (a surface or the electrolyte, see `aesi.physics.depletion`) is held at its edge to the end of the
+record and said in `ran_out`; its figure counts all rows. A record that entered the calibration of its file is marked:
+its figure is no test. What others print is beside ours with its protocol; none of it was run here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aesi.constants import MV_PER_V
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError
+from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import Cell, initial_state, simulate
 from aesi.records import Measurement
 
+WINDOW_ROWS = 1024
+"""As ECM-UDE judges."""
 NCR, HG2, NMC, M50T = "panasonic_ncr18650pf", "lg_18650hg2", "about_energy_nmc", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
@@ -38,8 +42,8 @@ PUBLISHED = "porous-electrode model, published parameters, full charge taken as 
 class MeasuredRecord:
     """A record: its set and file, whether its cell's file was fitted to it, and what others print on it.
 
-    until_s : where it is read to.  capacity_share : of the file's, found on a calibration record of the same month.
-    others_mv, protocol : the best figure known, and how it was had.
+    until_s : where it is read to.  others_mv, protocol : the best figure known, and how it was had.
+    same_month : a record of the calibration whose capacity the cell had then.
     """
 
     data: str
@@ -100,6 +104,7 @@ def run(cells: str = "experiments/cells", only: Sequence[str] | str = ()) -> Ite
         "summary": True,
         "records": len(rows),
         "failed": sum("error" in r for r in rows),
+        "ran_out": sum(bool(r.get("ran_out")) for r in rows),
         "test_records": len(tests),
         "median_rmse_mv": float(np.median([best(r) for r in tests])) if tests else None,
         "others_printed": len(beaten),
@@ -114,27 +119,71 @@ def best(row: dict[str, Any]) -> float:
     )
 
 
+COLUMNS = {
+    "declared_mv": "declared",
+    "calibrated_mv": "calibrated",
+    "with_temperature_mv": "with temperature",
+    "aged_mv": "aged",
+    "windows_mv": "windows",
+    "hybrid_mv": "hybrid",
+}
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Lines of Markdown: the rows, then the protocols of others."""
+    protocols = list(dict.fromkeys(r["others"] for r in rows if r.get("others")))
+    lines = [f"| cell | record | mean degC | {' | '.join(COLUMNS.values())} | others |"]
+    lines.append("|" + "---|" * (len(COLUMNS) + 4))
+    for row in rows:
+        name = row["record"] + (" (fitted)" if row["fitted"] else "")
+        shown = [_shown(row, key) for key in COLUMNS]
+        others = (
+            f"{row['others_mv']:g} [{protocols.index(row['others']) + 1}]" if row.get("others_mv") else ""
+        )
+        degc = "" if row.get("mean_degc") is None else f"{row['mean_degc']:.1f}"
+        lines.append(f"| {row['cell']} | {name} | {degc} | {' | '.join(shown)} | {others} |")
+    return [*lines, "", *(f"[{k}] {text}.  " for k, text in enumerate(protocols, start=1))]
+
+
+def _shown(row: Mapping[str, Any], key: str) -> str:
+    if key == "hybrid_mv" and row.get("trained"):
+        return "trained"
+    if row.get(key) is None:
+        return ""
+    ran_out = row.get("ran_out", {}).get(key.removesuffix("_mv"))
+    return f"{row[key]:.1f}" + ("" if ran_out is None else f" (ran out at {ran_out:.0f} s)")
+
+
 def judged(cells: Path, record: MeasuredRecord) -> dict[str, Any]:
     """RMSE of one record, mV; a record that cannot be had or simulated says why."""
     head: dict[str, Any] = {"cell": record.data, "record": record.name, "fitted": record.fitted}
     try:
-        data = read_measurement(locate(record.data, record.name), stop_s=record.until_s)
-        measured = data.temperature_degc
-        head["mean_degc"] = None if measured is None else round(float(measured.mean()), 1)
-        bare = replace(data, temperature_degc=None)
-        start, calibrated = FILES[record.data]
-        head["declared_mv"] = rmse_mv(cell_of(cells, record.data, start), bare)
-        if calibrated is not None:
-            cell = cell_of(cells, record.data, calibrated)
-            head["calibrated_mv"] = rmse_mv(cell, bare)
-            head["with_temperature_mv"] = None if measured is None else rmse_mv(cell, data)
-            if record.same_month is not None:
-                share = capacity_share(cells, record.data, calibrated, record.same_month)
-                head["aged_mv"] = rmse_mv(aged(cell, share), data)
-                head["capacity_share"] = round(share, 3)
+        return head | _figures(cells, record) | {"others_mv": record.others_mv, "others": record.protocol}
     except AesiError as error:
         return head | {"error": str(error)}
-    return head | {"others_mv": record.others_mv, "others": record.protocol}
+
+
+def _figures(cells: Path, record: MeasuredRecord) -> dict[str, Any]:
+    data = read_measurement(locate(record.data, record.name), stop_s=record.until_s)
+    measured = data.temperature_degc
+    bare = replace(data, temperature_degc=None)
+    start, calibrated = FILES[record.data]
+    runs = {"declared": free_run(cell_of(cells, record.data, start), bare)}
+    best_cell = cell_of(cells, record.data, start)
+    out: dict[str, Any] = {"mean_degc": None if measured is None else round(float(measured.mean()), 1)}
+    if calibrated is not None:
+        best_cell = cell_of(cells, record.data, calibrated)
+        runs["calibrated"] = free_run(best_cell, bare)
+        if measured is not None:
+            runs["with_temperature"] = free_run(best_cell, data)
+        share = dict(best_cell.capacity_shares).get(record.same_month or "")
+        if share is not None:
+            out["capacity_share"] = round(share, 3)
+            runs["aged"] = free_run(aged(best_cell, share), data)
+    if "windows" in record.protocol:
+        out["windows_mv"] = windows_mv(best_cell, data)
+    out |= {f"{name}_mv": run.rmse_mv for name, run in runs.items()}
+    return out | {"ran_out": {name: run.ran_out_s for name, run in runs.items() if run.ran_out_s is not None}}
 
 
 def cell_of(cells: Path, data: str, name: str | None) -> Cell:
@@ -154,20 +203,41 @@ NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
 """As the makers state them, for cell files of another size of the same chemistry."""
 
 
-def rmse_mv(cell: Cell, data: Measurement) -> float:
-    """Root mean square error of a free run over all rows, held backward as loggers write."""
-    start = initial_state(cell, data)
-    run = simulate(
-        cell,
-        data.time_s,
-        data.current_a,
-        start.soc,
-        (),
-        data.temperature_degc,
-        "backward",
-        on_depletion="clip",
+@dataclass(frozen=True)
+class FreeRun:
+    """rmse_mv : of all rows.  ran_out_s : from when on the model was held at an edge; None where it never was."""
+
+    rmse_mv: float
+    ran_out_s: float | None
+
+
+def free_run(cell: Cell, data: Measurement) -> FreeRun:
+    """A free run over all rows, held backward as loggers write, from the state of charge of the first."""
+    error, gone = _errors(cell, data, initial_state(cell, data).soc)
+    out_s = float(data.time_s[int(np.argmax(gone))]) if gone.any() else None
+    return FreeRun(round(MV_PER_V * float(np.sqrt(np.mean(error**2))), 2), out_s)
+
+
+def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
+    """Root mean square error, mV, over windows of `rows` rows, each from rest at the state of charge there.
+
+    That is the record's first less the charge passed since: what one who gives the state of charge has.
+    """
+    moved_ah = (
+        np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(data.time_s))]) / SECONDS_PER_HOUR
     )
-    return round(MV_PER_V * float(np.sqrt(np.mean((data.voltage_v - run.voltage_v) ** 2))), 2)
+    soc = initial_state(cell, data).soc - moved_ah / cell.capacity_ah
+    parts = [slice(k, k + rows) for k in range(0, len(data), rows)]
+    errors = [_errors(cell, data.take(part), float(soc[part.start]))[0] for part in parts]
+    return round(MV_PER_V * float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), 2)
+
+
+def _errors(cell: Cell, data: Measurement, soc0: float) -> tuple[Array, BoolArray]:
+    """(n,) V measured less model, and whether the model is held at an edge there."""
+    run = simulate(
+        cell, data.time_s, data.current_a, soc0, (), data.temperature_degc, "backward", on_depletion="clip"
+    )
+    return data.voltage_v - run.voltage_v, run.series["depleted"] > 0.0
 
 
 def aged(cell: Cell, share: float) -> Cell:
@@ -175,14 +245,3 @@ def aged(cell: Cell, share: float) -> Cell:
     n, p = cell.negative, cell.positive
     cell = cell.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share)
     return cell.with_positive(c_max_mol_m3=p.c_max_mol_m3 * share)
-
-
-@cache
-def capacity_share(cells: Path, data: str, name: str, record: str) -> float:
-    """Share of the file's capacity at which a calibration record is met best, by its error over the whole record."""
-    until = next(r.until_s for r in RECORDS if (r.data, r.name) == (data, record))
-    measured = read_measurement(locate(data, record), stop_s=until)
-    cell = cell_of(cells, data, name)
-    shares = np.linspace(0.86, 1.0, 8)
-    errors = [rmse_mv(aged(cell, float(s)), measured) for s in shares]
-    return float(shares[int(np.argmin(errors))])

@@ -1,8 +1,8 @@
 """What a measurement must be before anyone computes with it. Nothing is repaired here:
 each check passes, or raises a DataError that names file, column and first row.
 
-The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC. What only the
-columns together tell (a unit, a sign that was left out) is in `aesi.data.channels.implausible`.
+The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC. Gaps are in
+`aesi.data.channels.gaps`; what only the columns together tell (a unit, a sign) in `aesi.data.channels.implausible`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 
@@ -24,26 +23,8 @@ TEMPERATURE_RANGE_DEGC = (-60.0, 150.0)
 """Colder than any cell is cycled, warmer than any survives; kelvins lie above."""
 HIGHEST_CURRENT_A = 20_000.0
 """Above what any single cell takes; a smaller current in mA is told by `check_scale`."""
-GAP_FLOOR_S = 5.0
-"""A gap is an interval longer than this, and longer than GAP_RATIO times the longest of NEIGHBOURS intervals either
-side: loggers that write by change of voltage stay within that."""
-GAP_RATIO = 10.0
-NEIGHBOURS = 10
-REST_GAP_S = SECONDS_PER_HOUR
-REST_CURRENT_SHARE = 0.02
-"""A gap is a rest where the current beside it is below this share of the largest and the voltage moved by less than
-REST_VOLTAGE_V."""
-REST_VOLTAGE_V = 0.005
-STEP_SHARE = 0.05
-"""A step of the current counts where it is above this share of the largest step; ENOUGH_STEPS of them have to."""
-ENOUGH_STEPS = 5
-CLEAR_CORRELATION = 0.5
-"""Of current and voltage steps: beyond it they say which sign the current has. Voltage falls with the current, so
-that measured records lie near -1."""
-VOLTAGE_TREND_V = 0.05
-"""A voltage that moves by less than this along the test has no trend."""
-TREND_POINTS = 200
-"""Strides that a record is cut into, over which noise averages out."""
+ENOUGH_ROWS = 10
+"""From which a voltage that never changes is one that does not answer."""
 
 
 @dataclass(frozen=True)
@@ -135,98 +116,11 @@ def check_ranges(columns: Columns, context: Context) -> None:
             )
 
 
-def check_sign(columns: Columns, context: Context, advice: str) -> None:
-    """Discharge lowers the voltage: at steps of the current, or else along the test.
-
-    advice : what the user can do about it, from '; ' on.
-    """
-    found = steps(columns)
-    if found is not None and abs(found[1]) > CLEAR_CORRELATION:
-        contradicts, evidence = found[1] > 0, "at its steps"
-    else:
-        trend = _trend(columns)
-        contradicts, evidence = trend > CLEAR_CORRELATION, "along the test"
-    if contradicts:
-        row = int(np.argmax(np.abs(np.diff(columns["current_a"])))) + 1
-        raise DataError(
-            f"{context.at('current_a', row)}: the voltage rises with the current {evidence}, so its sign "
-            f"contradicts the one declared{advice}."
-        )
-
-
 def check_alive(columns: Columns, context: Context) -> None:
     """The voltage answers: it is not one value throughout while the current varies."""
     voltage, current = columns["voltage_v"], columns["current_a"]
-    if np.ptp(voltage) == 0 and len(voltage) >= NEIGHBOURS and np.ptp(current) > 0:
+    if np.ptp(voltage) == 0 and len(voltage) >= ENOUGH_ROWS and np.ptp(current) > 0:
         raise DataError(
             f"{context.at('voltage_v', 0)}: the voltage is {voltage[0]:.6g} V in all {len(voltage)} rows "
             "while the current varies; check the sensor or the column."
         )
-
-
-def find_gaps(columns: Columns) -> list[int]:
-    """Rows k after which rows seem to be missing: an interval much longer than those around it."""
-    step = np.diff(columns["time_s"])
-    gaps = []
-    for k in np.flatnonzero(step > GAP_FLOOR_S):
-        around = np.concatenate([step[max(0, k - NEIGHBOURS) : k], step[k + 1 : k + 1 + NEIGHBOURS]])
-        if len(around) and step[k] > GAP_RATIO * np.max(around):
-            gaps.append(int(k))
-    return gaps
-
-
-def is_rest(columns: Columns, k: int) -> bool:
-    """Whether the cell simply rested between rows k and k + 1, so that nothing is lost without rows there."""
-    pair = slice(k, k + 2)
-    current = columns["current_a"]
-    small = REST_CURRENT_SHARE * float(np.max(np.abs(current)))
-    return bool(
-        columns["time_s"][k + 1] - columns["time_s"][k] <= REST_GAP_S
-        and np.all(np.abs(current[pair]) <= small)
-        and np.ptp(columns["voltage_v"][pair]) <= REST_VOLTAGE_V
-    )
-
-
-def gap_error(columns: Columns, k: int, context: Context) -> DataError:
-    """The sentence for a gap between rows k and k + 1."""
-    time = columns["time_s"]
-    last, first = float(time[k]), float(time[k + 1])
-    return DataError(
-        f"{context.at('time_s', k + 1)}: a gap of {first - last:.6g} s after {last:.10g} s, "
-        f"where rows come every {np.median(np.diff(time)):.3g} s; what the cell did there is unknown. "
-        f"Split the file there, or read one side of it: --to-s {last:.10g} or --from-s {first:.10g}."
-    )
-
-
-def steps(columns: Columns) -> tuple[float, float] | None:
-    """Slope dV/dI in ohm and its correlation over the clear steps of the current; None without enough."""
-    rise = np.diff(columns["current_a"])
-    answer = np.diff(columns["voltage_v"])
-    clear = np.abs(rise) > STEP_SHARE * np.max(np.abs(rise), initial=0.0)
-    if int(np.sum(clear)) < ENOUGH_STEPS or np.all(answer[clear] == 0):
-        return None
-    x, y = rise[clear], answer[clear]
-    slope = float(np.sum(x * y) / np.sum(x * x))
-    return slope, float(np.sum(x * y) / np.sqrt(np.sum(x * x) * np.sum(y * y)))
-
-
-def _trend(columns: Columns) -> float:
-    """How one-sidedly the voltage follows a held current: -1 as it must, 1 as it cannot.
-
-    Looked at row by row and in strides of a two-hundredth, over which noise averages out. 0 without evidence.
-    """
-    stride = max(1, len(columns["time_s"]) // TREND_POINTS)
-    both = (_following(columns, slice(None)), _following(columns, slice(None, None, stride)))
-    return max(both, key=abs)
-
-
-def _following(columns: Columns, rows: slice) -> float:
-    """Steps and rests do not count: after a pulse the voltage comes back."""
-    current, voltage = columns["current_a"][rows], columns["voltage_v"][rows]
-    size = STEP_SHARE * float(np.max(np.abs(current)))
-    held = (np.abs(np.diff(current)) <= size) & (np.abs(current[1:]) > size)
-    moved = np.diff(voltage)[held]
-    along = float(np.sum(np.sign(current[1:][held]) * moved))
-    if int(np.sum(held)) < NEIGHBOURS or abs(along) < VOLTAGE_TREND_V:
-        return 0.0
-    return along / float(np.sum(np.abs(moved)))

@@ -13,7 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.channels.checks import STEP_SHARE, Columns, Context, find_gaps, steps
+from aesi.data.channels.checks import Columns, Context
+from aesi.data.channels.gaps import find_gaps
 from aesi.data.channels.headers import nearest
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -22,7 +23,6 @@ HIGHEST_CHARGE_AH = 1_500.0
 """The largest cells sold hold about 1,000 Ah: more that flows one way is a current in mA."""
 LOWEST_RESISTANCE_OHM = 30e-6
 """Cells of 1,000 Ah have some 150 microohm."""
-CLEAR_CORRELATION = 0.5
 HIGHEST_CHARGE_RESISTANCE_OHM_AH = 10.0
 """Capacity times resistance is 0.05 to 0.8 ohm Ah for those 46 records: a thousand times more is time in ms."""
 CONTRADICTING_SHARE = 0.04
@@ -39,6 +39,16 @@ FASTEST_SLIDE_S = 30.0
 records shorter than SHORT_RECORD_S are asked."""
 SLIDE_V = 0.5
 SHORT_RECORD_S = 200.0
+STEP_SHARE = 0.05
+"""A step of the current counts where it is above this share of the largest step; ENOUGH_STEPS of them have to."""
+ENOUGH_STEPS = 5
+CLEAR_CORRELATION = 0.5
+"""Of current and voltage steps: beyond it they say which sign the current has. Voltage falls with the current, so
+that measured records lie near -1."""
+VOLTAGE_TREND_V = 0.05
+"""A voltage that moves by less than this along the test has no trend."""
+TREND_POINTS = 200
+"""Strides that a record is cut into, over which noise averages out."""
 
 
 def check_scale(columns: Columns, context: Context) -> None:
@@ -47,7 +57,7 @@ def check_scale(columns: Columns, context: Context) -> None:
     time, current = columns["time_s"], columns["current_a"]
     charge = np.concatenate([[0.0], np.cumsum(current[1:] * np.diff(time))]) / SECONDS_PER_HOUR
     moved = float(np.ptp(charge))
-    found = steps(columns)
+    found = _steps(columns)
     resistance = -found[0] if found is not None and found[1] < -CLEAR_CORRELATION else None
     row = int(np.argmax(np.abs(current)))
     if resistance is not None and resistance < LOWEST_RESISTANCE_OHM:
@@ -92,6 +102,25 @@ def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> N
         f"{way}, and yet {evidence}: the file holds magnitudes. Name the column that says which way the current "
         f"flows: {option}; without such a column, export the current with its sign."
     )
+
+
+def check_sign(columns: Columns, context: Context, advice: str) -> None:
+    """Discharge lowers the voltage: at steps of the current, or else along the test.
+
+    advice : what the user can do about it, from '; ' on.
+    """
+    found = _steps(columns)
+    if found is not None and abs(found[1]) > CLEAR_CORRELATION:
+        contradicts, evidence = found[1] > 0, "at its steps"
+    else:
+        trend = _trend(columns)
+        contradicts, evidence = trend > CLEAR_CORRELATION, "along the test"
+    if contradicts:
+        row = int(np.argmax(np.abs(np.diff(columns["current_a"])))) + 1
+        raise DataError(
+            f"{context.at('current_a', row)}: the voltage rises with the current {evidence}, so its sign "
+            f"contradicts the one declared{advice}."
+        )
 
 
 def _check_pace(columns: Columns, context: Context) -> None:
@@ -151,3 +180,37 @@ def _held(columns: Columns) -> list[slice]:
     return [
         slice(int(first) + 1, int(last) + 1) for first, last in pairwise(ends) if last - first > ENOUGH_ROWS
     ]
+
+
+def _steps(columns: Columns) -> tuple[float, float] | None:
+    """Slope dV/dI in ohm and its correlation over the clear steps of the current; None without enough."""
+    rise = np.diff(columns["current_a"])
+    answer = np.diff(columns["voltage_v"])
+    clear = np.abs(rise) > STEP_SHARE * np.max(np.abs(rise), initial=0.0)
+    if int(np.sum(clear)) < ENOUGH_STEPS or np.all(answer[clear] == 0):
+        return None
+    x, y = rise[clear], answer[clear]
+    slope = float(np.sum(x * y) / np.sum(x * x))
+    return slope, float(np.sum(x * y) / np.sqrt(np.sum(x * x) * np.sum(y * y)))
+
+
+def _trend(columns: Columns) -> float:
+    """How one-sidedly the voltage follows a held current: -1 as it must, 1 as it cannot.
+
+    Looked at row by row and in strides of a two-hundredth, over which noise averages out. 0 without evidence.
+    """
+    stride = max(1, len(columns["time_s"]) // TREND_POINTS)
+    both = (_following(columns, slice(None)), _following(columns, slice(None, None, stride)))
+    return max(both, key=abs)
+
+
+def _following(columns: Columns, rows: slice) -> float:
+    """Steps and rests do not count: after a pulse the voltage comes back."""
+    current, voltage = columns["current_a"][rows], columns["voltage_v"][rows]
+    size = STEP_SHARE * float(np.max(np.abs(current)))
+    held = (np.abs(np.diff(current)) <= size) & (np.abs(current[1:]) > size)
+    moved = np.diff(voltage)[held]
+    along = float(np.sum(np.sign(current[1:][held]) * moved))
+    if int(np.sum(held)) < ENOUGH_ROWS or abs(along) < VOLTAGE_TREND_V:
+        return 0.0
+    return along / float(np.sum(np.abs(moved)))

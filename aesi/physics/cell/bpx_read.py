@@ -9,10 +9,15 @@ from typing import Any
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.parts import (
+    CAPACITY_SHARES,
     CONTACT_RESISTANCE,
+    DOUBLE_LAYERS,
     FILM_ENERGY,
     FILM_RESISTANCE,
+    FITTED_WITH,
     HEAT_TRANSFER,
+    RATE_FACTORS,
+    UNITY,
     CellParameters,
     Electrode,
     Electrolyte,
@@ -45,9 +50,9 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
     reference = float(fields.get("Reference temperature [K]") or DEFAULT_TEMPERATURE_K)
     user = parts.get("User-defined") or {}
     cell = CellParameters(
-        negative=_electrode(parts["Negative electrode"], f"{where}: Negative electrode"),
+        negative=_electrode(parts["Negative electrode"], user, "Negative", where),
         separator=_separator(parts["Separator"]),
-        positive=_electrode(parts["Positive electrode"], f"{where}: Positive electrode"),
+        positive=_electrode(parts["Positive electrode"], user, "Positive", where),
         electrolyte=_electrolyte(parts["Electrolyte"], initial, f"{where}: Electrolyte"),
         electrode_area_m2=float(fields["Electrode area [m2]"]),
         electrode_pairs=int(fields["Number of electrode pairs connected in parallel to make a cell"]),
@@ -65,6 +70,8 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         contact_resistance_ohm=float(user.get(CONTACT_RESISTANCE, 0.0)),
         film_resistance_ohm=float(user.get(FILM_RESISTANCE, 0.0)),
         film_ea_j_mol=float(user.get(FILM_ENERGY, 0.0)),
+        capacity_shares=tuple((str(k), float(v)) for k, v in (user.get(CAPACITY_SHARES) or {}).items()),
+        fitted_with=str(user.get(FITTED_WITH, "")),
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
@@ -78,7 +85,10 @@ def _optional(fields: Fields, name: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _electrode(fields: Fields, what: str) -> Electrode:
+def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode:
+    what = f"{where}: {side} electrode"
+    factor = user.get(RATE_FACTORS[side])
+
     def optional_relation(name: str) -> Relation | None:
         return None if fields.get(name) is None else relation(fields[name], f"{what}, {name}")
 
@@ -96,6 +106,8 @@ def _electrode(fields: Fields, what: str) -> Electrode:
         ocp=relation(fields["OCP [V]"], f"{what}, OCP [V]"),
         rate_constant=float(fields["Reaction rate constant [mol.m-2.s-1]"]),
         entropic=optional_relation("Entropic change coefficient [V.K-1]") or Constant(0.0),
+        double_layer_f_m2=float(user.get(DOUBLE_LAYERS[side], 0.0)),
+        rate_factor=UNITY if factor is None else relation(factor, f"{where}: {RATE_FACTORS[side]}"),
         diffusivity_ea_j_mol=float(fields.get("Diffusivity activation energy [J.mol-1]") or 0.0),
         rate_ea_j_mol=float(fields.get("Reaction rate constant activation energy [J.mol-1]") or 0.0),
         ocp_lithiation=optional_relation("OCP (lithiation) [V]"),

@@ -5,10 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 from aesi.physics.cell.parts import (
+    CAPACITY_SHARES,
     CONTACT_RESISTANCE,
+    DOUBLE_LAYERS,
     FILM_ENERGY,
     FILM_RESISTANCE,
+    FITTED_WITH,
     HEAT_TRANSFER,
+    RATE_FACTORS,
+    UNITY,
     CellParameters,
     Electrode,
 )
@@ -59,9 +64,18 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
             "Transport efficiency": cell.separator.transport_efficiency,
         },
     }
-    own = {CONTACT_RESISTANCE: cell.contact_resistance_ohm, FILM_RESISTANCE: cell.film_resistance_ohm}
+    own: dict[str, Any] = {
+        CONTACT_RESISTANCE: cell.contact_resistance_ohm,
+        FILM_RESISTANCE: cell.film_resistance_ohm,
+        FITTED_WITH: cell.fitted_with,
+        CAPACITY_SHARES: dict(cell.capacity_shares),
+    }
     if cell.film_resistance_ohm:
         own[FILM_ENERGY] = cell.film_ea_j_mol
+    for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
+        if electrode.rate_factor != UNITY:
+            own[RATE_FACTORS[side]] = to_bpx(electrode.rate_factor)
+        own[DOUBLE_LAYERS[side]] = electrode.double_layer_f_m2
     if any(own.values()):
         parts["User-defined"] = {name: value for name, value in own.items() if value}
     surroundings = {"Ambient temperature [K]": cell.ambient_temperature_k}

@@ -16,11 +16,17 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell.relations import Constant, Relation
 
 NO_ENTROPY = Constant(0.0)
+UNITY = Constant(1.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
 HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
+FITTED_WITH = "Fitted with model"
+CAPACITY_SHARES = "Capacity share by record"
 FILM_RESISTANCE = "Film resistance [Ohm]"
 FILM_ENERGY = "Film resistance activation energy [J.mol-1]"
+RATE_FACTORS = {side: f"{side} electrode reaction rate factor" for side in ("Negative", "Positive")}
+"""The fields of `Electrode.rate_factor` in the user-defined section."""
+DOUBLE_LAYERS = {side: f"{side} electrode double-layer capacity [F.m-2]" for side in ("Negative", "Positive")}
 
 
 @dataclass(frozen=True)
@@ -29,8 +35,8 @@ class Electrode:
 
     Lengths in m, concentrations in mol/m3, diffusivity in m2/s at stoichiometry x, open-circuit potential in
     V against Li/Li+, entropic coefficient in V/K, effective solid conductivity in S/m, rate constant in
-    mol/(m2 s) so that the exchange current density is F K sqrt(c_e/c_e0 x (1 - x)), activation energies in
-    J/mol.
+    mol/(m2 s) so that the exchange current density is F K f(x) sqrt(c_e/c_e0 x (1 - x)) with f the rate factor at
+    stoichiometry x, activation energies in J/mol, capacity of the double layer in F per m2 of reactive surface.
     """
 
     thickness_m: float
@@ -46,6 +52,8 @@ class Electrode:
     ocp: Relation
     rate_constant: float
     entropic: Relation = NO_ENTROPY
+    rate_factor: Relation = UNITY
+    double_layer_f_m2: float = 0.0
     diffusivity_ea_j_mol: float = 0.0
     rate_ea_j_mol: float = 0.0
     ocp_lithiation: Relation | None = None
@@ -86,7 +94,9 @@ class CellParameters:
     Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no
     thermal data), contact resistance in ohm in series with the whole cell; it is that
     of metal, the same at any temperature. That of films on the particles, ohm at the reference temperature, falls as
-    exp(E/R (1/T - 1/T_ref)) with its activation energy in J/mol.
+    exp(E/R (1/T - 1/T_ref)) with its activation energy in J/mol.  fitted_with : the model whose parameters these are,
+    "espm" or "dfn", where they were fitted.  capacity_shares : (record, share of this capacity that the cell had then)
+    of the records that they were fitted to.
     """
 
     negative: Electrode
@@ -109,6 +119,8 @@ class CellParameters:
     contact_resistance_ohm: float = 0.0
     film_resistance_ohm: float = 0.0
     film_ea_j_mol: float = 0.0
+    fitted_with: str = ""
+    capacity_shares: tuple[tuple[str, float], ...] = ()
     name: str = "cell"
     description: str = ""
     references: str = ""

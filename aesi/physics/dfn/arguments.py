@@ -11,7 +11,13 @@ from aesi.numerics.modes.collocation import gauss_layer, lobatto_to
 from aesi.numerics.modes.galerkin import gauss_lobatto, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.layout import Electrodes, Particles, Stack
-from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table, solid_diffusion
+from aesi.physics.espm.tables import (
+    conductivity_table,
+    electrolyte_diffusion,
+    ocp_table,
+    rate_tables,
+    solid_diffusion,
+)
 from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
 
 NO_PLATING = Plating(0.0, 0.5)
@@ -112,7 +118,10 @@ def _electrodes(model: EspmModel) -> Electrodes:
     layer = gauss_layer(model.electrode_points)
     sides = ((n, model.negative), (p, model.positive))
     capacity = [
-        layer.weight * x.area_per_volume_1_m * x.thickness_m * interface.double_layer_f_m2
+        layer.weight
+        * x.area_per_volume_1_m
+        * x.thickness_m
+        * (x.double_layer_f_m2 + interface.double_layer_f_m2)
         for x, interface in sides
     ]
     exchange = [
@@ -127,8 +136,9 @@ def _electrodes(model: EspmModel) -> Electrodes:
         solid=np.array([layer.solid * x.thickness_m / x.conductivity_s_m for x in (n, p)]),
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
+        rate=rate_tables(cell),
         alpha=np.array([x.transfer_coefficient for _, x in sides]),
-        has_layers=any(x.double_layer_f_m2 > 0.0 for _, x in sides),
+        has_layers=any(x.double_layer_f_m2 + y.double_layer_f_m2 > 0.0 for x, y in sides),
         capacity=np.concatenate(capacity),
         exchange=np.concatenate(exchange),
         node_share=np.concatenate([layer.weight, layer.weight]),

@@ -63,9 +63,9 @@ class Stack(NamedTuple):
 class Electrodes(NamedTuple):
     """Constants of both electrodes and of the cell.
 
-    before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.  ocp, entropic : (2, table).
-    alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.  node_share : (places,) weights.
-    plating : rate A/m2 of cell at c0, transfer coefficient, c0.
+    before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.
+    ocp, entropic, rate : (2, table).  alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.
+    node_share : (places,) weights.  plating : rate A/m2 of cell at c0, transfer coefficient, c0.
     plating_to_c : mol/m3 per C/m2.  energies : (7,) J/mol.  heat : (3,).  area : m2.  contact, film : ohm.
     transference : cation transference number.
     """
@@ -75,6 +75,7 @@ class Electrodes(NamedTuple):
     solid: Array
     ocp: Array
     entropic: Array
+    rate: Array
     alpha: Array
     has_layers: bool
     capacity: Array

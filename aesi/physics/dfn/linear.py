@@ -87,7 +87,8 @@ def _local(
         modes = (p.gains / (s[:, None] + faster[side] * p.rates[kind])).sum(axis=1)
         surface = p.scale[u] * (3.0 / s + modes)
         occupancy = float(np.sqrt(rest[side] * (1.0 - rest[side])))
-        resistance = thermal / (p.exchange[u] * rates[2 + side] * occupancy)
+        factor = float(electrodes[side].rate_factor(rest[side : side + 1])[0])
+        resistance = thermal / (p.exchange[u] * rates[2 + side] * factor * occupancy)
         admittance[:, place] += 1.0 / (resistance - slopes_v[side] * surface)
     return cast(ComplexArray, 1.0 / admittance)
 

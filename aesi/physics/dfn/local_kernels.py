@@ -60,6 +60,17 @@ def occupancy(theta):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def rate_course(rate, side, theta):  # type: ignore[no-untyped-def]
+    """Factor of the rate constant at a surface stoichiometry, and the slope of its logarithm."""
+    last = rate.shape[1] - 1
+    s = min(max(theta, 0.0), 1.0) * last
+    i = min(int(s), last - 1)
+    step = rate[side, i + 1] - rate[side, i]
+    value = rate[side, i] + (s - i) * step
+    return value, step * last / value
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def salt_logarithm(s):  # type: ignore[no-untyped-def]
     """Logarithm of the salt over its rest concentration and its slope; a straight line near zero."""
     if s < SMALLEST_SALT:

@@ -20,6 +20,7 @@ from aesi.physics.dfn.local_kernels import (
     equilibrium,
     kinetic_drop,
     occupancy,
+    rate_course,
     salt_logarithm,
 )
 from aesi.physics.espm.electrode_kernels import bounded_exp
@@ -112,15 +113,18 @@ def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, give
         theta[u] = surface
         s = max(salt[r], SMALLEST_SALT)
         room, d_room = occupancy(surface)
+        quicker, d_quicker = rate_course(e.rate, side, surface)
         eta, d_eta = kinetic_drop(
-            y[u], t.rates[2 + side] * p.exchange[u] * math.sqrt(s * room), e.alpha[side], thermal
+            y[u], t.rates[2 + side] * p.exchange[u] * quicker * math.sqrt(s * room), e.alpha[side], thermal
         )
         level, falls = equilibrium(e.ocp, e.entropic, side, rise, surface)
         n.pot[u] = level + eta
         moved = (
             -0.5 * y[u] * d_eta
         )  # with the logarithm of the salt, or of the occupancy, in the exchange current
-        n.slope[u] = max(d_eta - t.give[u] * (falls + moved * d_room), SMALLEST_SLOPE * d_eta)
+        n.slope[u] = max(
+            d_eta - t.give[u] * (falls + moved * (d_room + 2.0 * d_quicker)), SMALLEST_SLOPE * d_eta
+        )
         n.by_salt[u] = moved / s if salt[r] > SMALLEST_SALT else 0.0
         if first and (u == 0 or p.place[u - 1] != r):
             psi[r] = n.pot[u]

@@ -22,7 +22,7 @@ PARAMETERS = {
 
 
 def add_capacity(model: EspmModel, *, negative_f_m2: float, positive_f_m2: float) -> EspmModel:
-    """The model with double layers."""
+    """The model with double layers beside those of its cell file."""
     return replace(
         model,
         negative=replace(model.negative, double_layer_f_m2=negative_f_m2),

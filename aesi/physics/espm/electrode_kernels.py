@@ -6,7 +6,8 @@ between its collector and the electrolyte at the separator's edge:
     Phi = U(theta_u) + eta(y_u) + (L/sigma S + L/kappa E) y + chi ln(c_r / c_mean),   sum y + capacitive + plating = J
 
 with y_u the current of unit u per cell area, positive for delithiation, J = I/A in the negative electrode and -I/A
-in the positive. Newton's method on all y and Phi; one plain unit has a closed form.
+in the positive. Newton's method on all y and Phi, of one unit on its y alone: without a double layer it is there at
+once.
 """
 
 import math
@@ -30,6 +31,8 @@ NEWTON_TOLERANCE_V = 1e-11
 """Of every potential: well within the 1e-9 V to which an effect vanishes at its neutral value."""
 SMALLEST_SLOPE = 1e-9
 """Of a potential over its current: a flat one takes a finite step."""
+SMALLEST_SHARE = 1e-12
+"""Of a double layer's mean current over a step, at its end."""
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -75,18 +78,37 @@ def end_weight(z):  # type: ignore[no-untyped-def]
     return 1.0 / (1.0 - math.exp(-min(z, LARGEST_EXPONENT))) - 1.0 / z
 
 
+@njit(inline="always", fastmath=FASTMATH)
+def relaxed(z):  # type: ignore[no-untyped-def]
+    """Current at the end of a step of z time constants over its mean, of an exponential that a jump began."""
+    return z / math.expm1(min(z, LARGEST_EXPONENT)) if z > 1e-6 else 1.0 - 0.5 * z
+
+
 @njit(cache=True, nogil=True, fastmath=FASTMATH)
 def solve_electrode(  # type: ignore[no-untyped-def]
-    lo, hi, side, total, dt, thermal, temperature_rise, chi, exchange_factor, particles, surfaces, memory
+    lo,
+    hi,
+    side,
+    total,
+    dt,
+    held,
+    thermal,
+    temperature_rise,
+    chi,
+    exchange_factor,
+    particles,
+    surfaces,
+    memory,
 ):
     """Currents y[lo:hi] of the units of one electrode; returns Phi.
 
-    total : A/m2 of cell, positive for delithiation.  thermal : R T / F, V.  chi : 2 (1 - t+) R T / F, V.
-    exchange_factor : of temperature.  particles, surfaces, memory : see `layout`; memory.delta and memory.layer are
-    old in, new out.
+    total : A/m2 of cell, positive for delithiation.  held : whether it jumped to this where the step began; a double
+    layer's current is then no continuation of the last one, and would ring.  thermal : R T / F, V.
+    chi : 2 (1 - t+) R T / F, V.  exchange_factor : of temperature.  particles, surfaces, memory : see `layout`;
+    memory.delta and memory.layer are old in, new out.
     """
     region_of, share, exchange = particles.place[:, 1], particles.share, particles.exchange
-    ocp, entropic = surfaces.ocp[side], surfaces.entropic[side]
+    ocp, entropic, rate = surfaces.ocp[side], surfaces.entropic[side], surfaces.rate[side]
     alpha, capacity, plating = surfaces.alpha[side], surfaces.capacity[side], surfaces.plating
     y, theta, theta_pred, give, ohm, salt, log_salt, region_salt = memory[:8]
     delta, dl_current, region_total, plated, plating_current, work = memory[8:]
@@ -97,7 +119,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
     matrix = work[2 : 3 + n, : n + 2]
     new_delta, gain, fitted, new_current = work[3 + n], work[4 + n], work[5 + n], work[6 + n]
     new_current[:] = 0.0
-    phi = 0.0
+    phi, least, most = 0.0, -math.inf, math.inf
     for step in range(NEWTON_STEPS):
         for r in range(regions):
             region_total[first + r] = 0.0
@@ -110,7 +132,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
             k = 3 * (first + r)
             occupancy = max(t * (1.0 - t), SMALLEST_OCCUPANCY)
             eta, d_eta = overpotential(
-                y[u], exchange[u] * exchange_factor, occupancy,
+                y[u], exchange[u] * exchange_factor * lookup(rate, t), occupancy,
                 salt[k], salt[k + 1], salt[k + 2], log_salt[first + r] , alpha, thermal,
             )  # fmt: skip
             inside = min(max(t, 0.0), 1.0)
@@ -127,9 +149,11 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                 extra, d_extra = 0.0, 0.0
                 if capacity > 0.0 and dt > 0.0:
                     if step == 0:
-                        fitted[r] = end_weight(dt / (capacity * slope[i]))
-                    charging = capacity * (potential[i] - delta[first + r]) / dt
-                    charging = (charging - (1.0 - fitted[r]) * dl_current[first + r]) / fitted[r]
+                        z = dt / (capacity * slope[i])
+                        fitted[r] = 1.0 / max(relaxed(z), SMALLEST_SHARE) if held else end_weight(z)
+                    charging = capacity * (potential[i] - delta[first + r]) / (dt * fitted[r])
+                    if not held:
+                        charging -= (1.0 - fitted[r]) / fitted[r] * dl_current[first + r]
                     new_current[r] = charging
                     extra += charging
                     d_extra += capacity / (dt * fitted[r])
@@ -145,9 +169,21 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                     d_extra += ((1.0 - plating[1]) * up + plating[1] * down) / thermal
                 region_total[first + r] += extra
                 gain[i] += d_extra * slope[i]
-        if n == 1 and capacity == 0.0 and plating[0] == 0.0:
-            delta[first] = potential[0]
-            return potential[0] + ohm[0, 0] * total + chi * log_salt[first]
+        if n == 1:
+            phi = potential[0] + ohm[0, 0] * total + chi * log_salt[first]
+            off = region_total[first] - total
+            region_total[first] = total
+            if abs(off) * slope[0] < NEWTON_TOLERANCE_V * gain[0]:
+                break
+            # What is given grows with y, but as a logarithm far out, where Newton's step leaps to the other side.
+            if off > 0.0:
+                most = y[lo]
+            else:
+                least = y[lo]
+            ahead = y[lo] - off / gain[0]
+            bracketed = least < ahead < most or math.isinf(least) or math.isinf(most)
+            y[lo] = ahead if bracketed else 0.5 * (least + most)
+            continue
         if step == 0:
             phi = potential[0]
         worst = 0.0

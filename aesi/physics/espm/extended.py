@@ -19,6 +19,7 @@ from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
     ocp_table,
+    rate_tables,
     solid_diffusion,
 )
 from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
@@ -133,6 +134,7 @@ def _surfaces(model: EspmModel) -> Surfaces:
     return Surfaces(
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
+        rate=rate_tables(model.cell),
         alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),
         capacity=np.array([interface_capacity(model, side) for side in range(2)]),
         plating=np.array([area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient]),
@@ -147,7 +149,7 @@ def interface_capacity(model: EspmModel, side: int) -> float:
     cell = model.cell
     electrode, interface = ((cell.negative, model.negative), (cell.positive, model.positive))[side]
     area = electrode.area_per_volume_1_m * electrode.thickness_m / model.regions
-    return interface.double_layer_f_m2 * area
+    return (electrode.double_layer_f_m2 + interface.double_layer_f_m2) * area
 
 
 def ohmic_drops(model: EspmModel) -> tuple[Array, Array]:

@@ -156,7 +156,19 @@ def run_general(  # type: ignore[no-untyped-def]
                 region_drops(surfaces.solid[side], surfaces.salt[side], kappa, side * regions, ohm)
                 quicker = arrhenius(energies[2 + side], t_k, reference_k)
                 phi = solve_electrode(
-                    lo, hi, side, total, dt, thermal, rise, chi, quicker, particles, surfaces, memory
+                    lo,
+                    hi,
+                    side,
+                    total,
+                    dt,
+                    backward,
+                    thermal,
+                    rise,
+                    chi,
+                    quicker,
+                    particles,
+                    surfaces,
+                    memory,
                 )
                 if side == 0:
                     phi_n = phi

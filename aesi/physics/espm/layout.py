@@ -134,13 +134,15 @@ class Salt(NamedTuple):
 class Surfaces(NamedTuple):
     """Constants of both electrodes' surfaces.
 
-    ocp, entropic : (2, table) V and V/K.  alpha : (2,) transfer coefficients.  capacity : (2,) F/m2 of cell a region.
-    plating : rate, A/m2 of cell, and transfer coefficient.  plating_to_c : mol/m3 per C/m2.
+    ocp, entropic, rate : (2, table) V, V/K and factor of the rate constant.  alpha : (2,) transfer coefficients.
+    capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and transfer coefficient.
+    plating_to_c : mol/m3 per C/m2.
     solid : (2, regions, regions) ohm m2.  salt : the same times the conductivity, by region crossed.
     """
 
     ocp: Array
     entropic: Array
+    rate: Array
     alpha: Array
     capacity: Array
     plating: Array

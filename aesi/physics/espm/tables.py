@@ -9,11 +9,14 @@ import numpy as np
 
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Constant, Relation, tabulated
 
 OCP_POINTS = 8193
 """Four times as many points move the voltage by less than 1e-4 mV RMS under the load of `aesi bench espm`, and so for
 the electrolyte's."""
+RATE_POINTS = 513
+"""Courses of rates are smooth in their logarithm; a point every 0.2 % of stoichiometry follows them."""
 ELECTROLYTE_POINTS = 2049
 ELECTROLYTE_SPAN = 4.0
 """Tables of electrolyte properties run from zero to this many times the rest concentration."""
@@ -43,6 +46,20 @@ def ocp_table(ocp: Relation, what: str) -> Array:
         bad = float(np.flatnonzero(~np.isfinite(values))[0]) / (OCP_POINTS - 1)
         raise CellError(f"the open-circuit potential of the {what} electrode is not finite at x = {bad:.4f}.")
     return values
+
+
+def rate_tables(cell: Cell) -> Array:
+    """(2, points) factors on the rates of the negative and the positive electrode over stoichiometry [0, 1].
+
+    Raises CellError where one is not positive.
+    """
+    factors = [cell.negative.rate_factor, cell.positive.rate_factor]
+    points = 2 if all(isinstance(f, Constant) for f in factors) else RATE_POINTS
+    tables = np.array([tabulated(f, 0.0, 1.0, points) for f in factors])
+    for table, side in zip(tables, ("negative", "positive"), strict=True):
+        if not (np.isfinite(table).all() and (table > 0.0).all()):
+            raise CellError(f"the reaction rate factor of the {side} electrode has to be positive on [0, 1].")
+    return tables
 
 
 @dataclass(frozen=True, eq=False)

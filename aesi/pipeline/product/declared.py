@@ -13,13 +13,17 @@ Declared = str | PathLike[str] | Cell | HybridModel
 
 
 def declared_model(source: Declared) -> HybridModel:
-    """The model that is declared: of a BPX file or a cell, the physics alone.
+    """The model that is declared: of a BPX file or a cell, the physics alone, by the model that they were fitted with.
 
     Raises CellError or InputError, one sentence, for what cannot be read.
     """
     if isinstance(source, HybridModel):
         return source
     if isinstance(source, Cell):
-        return HybridModel(source)
+        return _alone(source)
     path = Path(source)
-    return HybridModel.load(path) if path.is_dir() else HybridModel(Cell.from_bpx(path))
+    return HybridModel.load(path) if path.is_dir() else _alone(Cell.from_bpx(path))
+
+
+def _alone(cell: Cell) -> HybridModel:
+    return HybridModel(cell, model="dfn" if cell.fitted_with == "dfn" else "espm")

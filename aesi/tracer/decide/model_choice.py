@@ -1,7 +1,8 @@
 """Single particle or porous electrode: settled before an effect is blamed on the cell.
 
 Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
-not where the single particle leaves an error that is many times that difference, which no choice of the model explains.
+not where the single particle cannot explain the data and the fuller one, with the same effects, leaves as much: what is
+missing is something else then, and a search takes ten times as long.
 What was measured may still be a single particle's (a thin electrode, a file made with one): where that says more of
 the data as declared, it is kept if it explains them to the noise and says more there as well.
 """
@@ -16,15 +17,19 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.evidence import Evidence
-from aesi.tracer.decide.search import base_of
+from aesi.tracer.decide.search import (
+    HOPELESS_SHARE,
+    REFIT_STEPS,
+    Path,
+    base_of,
+    beyond_noise,
+    fitted_hypothesis,
+)
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
 Kept = Callable[[InverseProblem], Archive]
 """The fits of a problem that are known already."""
-
-FAR = 3.0
-"""Times the difference of the models: what is left of a measured cell, 9 mV and more, is mostly far more."""
 
 
 @dataclass(frozen=True)
@@ -57,9 +62,8 @@ def with_model(
     single, first = searched("espm")
     if reduction is None or not reduction.notable:
         return told(first, "espm")
-    if first.verdict.word == "unknown" and first.verdict.structured_v > FAR * reduction.shift_v:
-        left = f", whose {1e3 * first.verdict.structured_v:.1f} mV of error are far more than that"
-        return told(first, "espm", left)
+    if first.verdict.word == "unknown" and not _takes_off(problem, first.paths["tight"], kept):
+        return told(first, "espm", ", what it leaves is not taken off by the other one")
     full, second = searched("dfn")
     if _believed(first, second) and _says_more(single, full, kept):
         ahead = first.path.chosen.score.total - second.path.chosen.score.total
@@ -67,6 +71,20 @@ def with_model(
             first, "espm", f", which explains these data to the noise and says {ahead:.0f} nats more of them"
         )
     return told(second, "dfn")
+
+
+def _takes_off(problem: InverseProblem, path: Path, kept: Kept) -> bool:
+    """Does the porous electrode leave notably less of unseen data with what the single particle ended with?"""
+    full = with_fine_numerics(replace(problem, model="dfn"))
+    chosen = path.chosen
+    fit = fitted_hypothesis(
+        full, path.blocks, chosen.hypothesis, chosen.placed, chosen.score.delta_v, REFIT_STEPS, kept(full)
+    )
+    if fit is None:
+        return False
+    return beyond_noise(full, path.blocks, fit) < HOPELESS_SHARE * beyond_noise(
+        path.problem, path.blocks, chosen
+    )
 
 
 def _believed(single: Evidence, full: Evidence) -> bool:

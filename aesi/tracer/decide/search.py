@@ -157,7 +157,7 @@ def searched(
         steps.append(step)
         if step.admitted is None:
             break
-        left = [_beyond_noise(problem, blocks, fit) for fit in (chosen, step.admitted)]
+        left = [beyond_noise(problem, blocks, fit) for fit in (chosen, step.admitted)]
         chosen = step.admitted
         if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
             break
@@ -233,7 +233,7 @@ def _pruned(
     return chosen
 
 
-def _beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
+def beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
     """V**2 beyond the noise on unseen data."""
     return max(unseen_rmse_v(blocks, fit) ** 2 - float(np.mean(problem.white_v**2)), 0.0)
 

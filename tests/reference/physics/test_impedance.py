@@ -10,6 +10,7 @@ import pytest
 
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, impedance, simulate
+from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effects import CATALOGUE
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -50,6 +51,18 @@ def test_a_small_sine_in_time_gives_the_same_impedance(effects):
     in_time = np.array([sine_response(NMC, f, SOC, 10.0, active) for f in frequency])
     # Tables of potentials and kinetics that bend by a part in a thousand at this amplitude.
     assert np.abs(ours - in_time) == pytest.approx(0.0, abs=2e-3 * np.abs(ours).max())
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_a_rate_that_depends_on_stoichiometry_and_a_double_layer_of_the_file_are_in_both(model):
+    slow = LookupTable((0.0, 0.3, 1.0), (3.0, 0.4, 0.2))
+    cell = NMC.with_negative(rate_factor=slow, double_layer_f_m2=2.0)
+    cell = cell.with_positive(rate_factor=slow, double_layer_f_m2=0.5)
+    frequency = np.array([0.003, 0.1, 3.0])
+    ours = impedance(cell, frequency, SOC, 10.0, model=model)
+    assert np.abs(ours - impedance(NMC, frequency, SOC, 10.0, model=model)).max() > 0.05 * np.abs(ours).max()
+    in_time = np.array([sine_response(cell, f, SOC, 10.0, (), model=model) for f in frequency])
+    assert np.abs(ours - in_time) == pytest.approx(0.0, abs=3e-3 * np.abs(ours).max())
 
 
 @pytest.mark.parametrize(

@@ -77,6 +77,21 @@ def test_contact_resistance_travels_in_the_user_section(content):
     assert Cell.from_bpx(cell.to_bpx()) == cell
 
 
+def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
+    content["Parameterisation"]["User-defined"] = {
+        "Negative electrode reaction rate factor": {"x": [0.1, 0.9], "y": [0.5, 2.0]},
+        "Positive electrode double-layer capacity [F.m-2]": 0.3,
+        "Fitted with model": "dfn",
+        "Capacity share by record": {"march": 1.0, "july": 0.9},
+    }
+    cell = Cell.from_bpx(content)
+    assert float(cell.negative.rate_factor(np.array([0.5]))[0]) == pytest.approx(1.25)
+    assert cell.positive.double_layer_f_m2 == 0.3
+    assert cell.fitted_with == "dfn"
+    assert dict(cell.capacity_shares) == {"march": 1.0, "july": 0.9}
+    assert Cell.from_bpx(cell.to_bpx()) == cell
+
+
 def test_tables_are_accepted_for_every_function(content):
     parts = content["Parameterisation"]
     parts["Negative electrode"]["OCP [V]"] = {"x": [0.0, 0.5, 1.0], "y": [1.0, 0.2, 0.05]}

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, SimulationError
 from aesi.physics import Cell, simulate
+from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effects import CATALOGUE
 
 LG_M50 = Cell.from_bpx(
@@ -41,6 +42,21 @@ def test_lithium_is_kept_with_every_effect_that_shares_currents(nmc, load):
     run = simulate(nmc, time, current, soc0=0.9, effects=effects)
     plain = simulate(nmc, time, current, soc0=0.9)
     assert run.series["soc"] == pytest.approx(plain.series["soc"], abs=1e-9)
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_a_rate_factor_is_a_rate_and_a_double_layer_of_the_file_that_of_the_effect(nmc, load, model):
+    time, current = load
+    doubled = nmc.with_positive(rate_factor=LookupTable((0.0, 1.0), (2.0, 2.0)))
+    faster = nmc.with_positive(rate_constant=2.0 * nmc.positive.rate_constant)
+    voltages = [simulate(cell, time, current, 0.6, model=model).voltage_v for cell in (doubled, faster)]
+    # A constant rate is stepped by the plain path, whose electrolyte takes one step a row.
+    assert voltages[0] == pytest.approx(voltages[1], abs=1e-4)
+    layered = nmc.with_negative(double_layer_f_m2=3.0).with_positive(double_layer_f_m2=1.0)
+    effect = CATALOGUE["double_layer"].activate(negative_f_m2=3.0, positive_f_m2=1.0)
+    own = simulate(layered, time, current, 0.6, model=model).voltage_v
+    assert own == pytest.approx(simulate(nmc, time, current, 0.6, [effect], model=model).voltage_v, abs=1e-12)
+    assert np.abs(own - simulate(nmc, time, current, 0.6, model=model).voltage_v).max() > 1e-3
 
 
 def test_a_cell_at_rest_stays_at_its_rest_voltage(nmc):

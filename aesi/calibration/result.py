@@ -1,0 +1,154 @@
+"""What a calibration gives back, and what its records determine: intervals, combinations that stay open, bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from aesi.calibration.model import Model
+from aesi.constants import MV_PER_V
+from aesi.numerics.typing import Array
+from aesi.physics.cell import Cell
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+BOUND_SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A parameter with its 95 % interval, its unit and where its prior is from."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+    source: str
+
+
+@dataclass(frozen=True)
+class RecordError:
+    """RMSE of one record's rows, V: as the start file declares the cell, and calibrated."""
+
+    name: str
+    temperature_degc: float | None
+    before_v: float
+    after_v: float
+
+
+@dataclass(frozen=True)
+class Open:
+    """A combination of parameters that the data do not determine.
+
+    weights : of the parameters in it, in deviations of their priors.  narrowed : what the data leave of the prior's
+    deviation along it (1: nothing was learnt).
+    """
+
+    weights: tuple[tuple[str, float], ...]
+    narrowed: float
+
+    @property
+    def sentence(self) -> str:
+        """For a reader."""
+        names = " with ".join(f"{name} ({weight:+.2f})" for name, weight in self.weights)
+        return f"the data do not determine {names}: {100 * self.narrowed:.0f} % of the prior's width is left"
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A calibrated cell, and how sure it is.
+
+    parameters : name -> value with its interval.  undetermined : combinations that the data leave open.
+    at_bounds : parameters that ended on a bound.  errors : of each record.  capacities : share of the cell's capacity
+    that each record's has.  x, covariance : working vector and its covariance, for the posterior.
+    """
+
+    cell: Cell
+    declared: Cell
+    parameters: Mapping[str, Interval]
+    undetermined: tuple[Open, ...]
+    at_bounds: tuple[str, ...]
+    errors: tuple[RecordError, ...]
+    capacities: Mapping[str, float]
+    notes: tuple[str, ...]
+    seconds: float
+    model: Model
+    x: Array
+    covariance: Array
+
+    def __repr__(self) -> str:
+        errors = ", ".join(
+            f"{e.name} {MV_PER_V * e.before_v:.1f} -> {MV_PER_V * e.after_v:.1f} mV" for e in self.errors
+        )
+        return f"Calibration(cell {self.cell.name!r}, {errors})"
+
+    def to_frame(self) -> pd.DataFrame:
+        """The parameters with their 95 % intervals, units and where their priors are from."""
+        import pandas as pd
+
+        rows = {name: asdict(interval) for name, interval in self.parameters.items()}
+        return pd.DataFrame.from_dict(rows, orient="index")
+
+
+def information_weights(model: Model, errors: Sequence[Array]) -> list[Array]:
+    """Factor on each row's weight that makes a record count as many rows as say something of their own.
+
+    What is left after the fit repeats itself: n rows of first autocorrelation rho are n (1 - rho)/(1 + rho).
+    """
+    out = []
+    for record, error, weight in zip(model.records, errors, model.weights, strict=True):
+        seen = error[record.trusted]
+        rms = max(float(np.sqrt(np.mean(seen**2))), 1e-6)
+        centred = seen - seen.mean()
+        rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
+        share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
+        out.append(np.sqrt(share) / rms / np.where(weight > 0.0, weight, 1.0))
+    return out
+
+
+def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
+    """Value and 95 % interval of every global parameter."""
+    out = {}
+    for j, free in enumerate(model.free):
+        reach = 1.96 * float(np.sqrt(covariance[j, j]))
+        out[free.name] = Interval(
+            free.value(float(x[j])), free.value(float(x[j]) - reach), free.value(float(x[j]) + reach),
+            free.unit, free.source,
+        )  # fmt: skip
+    return out
+
+
+def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
+    """Combinations of global parameters along which the records say less than the priors.
+
+    Eigenvectors of the information of the records on the global parameters, with all others marginalised, in units of
+    the priors: an eigenvalue below one is less than the prior's own.
+    """
+    n = len(model.free)
+    information = jacobian.T @ jacobian
+    here, rest = information[:n, :n], information[n:, n:]
+    marginal = here - information[:n, n:] @ np.linalg.solve(rest, information[n:, :n])
+    values, vectors = np.linalg.eigh(marginal - np.eye(n))
+    out = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value >= 1.0:
+            break
+        vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
+        heavy = [j for j in np.argsort(-np.abs(vector)) if abs(vector[j]) > 0.3]
+        weights = tuple((model.free[j].name, float(vector[j])) for j in heavy)
+        out.append(Open(weights, float(1.0 / np.sqrt(1.0 + max(value, 0.0)))))
+    return tuple(out)
+
+
+def at_bounds(model: Model, x: Array) -> tuple[str, ...]:
+    """Names of the parameters that ended on a bound of their range."""
+    width = BOUND_SHARE * (model.high - model.low)
+    return tuple(
+        f.name
+        for j, f in enumerate(model.free)
+        if model.high[j] - x[j] < width[j] or (x[j] - model.low[j] < width[j] and f.low != 0.0)
+    )

@@ -1,0 +1,90 @@
+"""Rows that seem to be missing: a sparsely logged rest is passed over with a note, any other gap is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aesi.constants import SECONDS_PER_HOUR
+from aesi.data.channels.checks import Columns, Context
+from aesi.errors import DataError
+
+GAP_FLOOR_S = 5.0
+"""A gap is an interval longer than this, and longer than GAP_RATIO times the longest of NEIGHBOURS intervals either
+side: loggers that write by change of voltage stay within that."""
+GAP_RATIO = 10.0
+NEIGHBOURS = 10
+REST_GAP_S = SECONDS_PER_HOUR
+REST_CURRENT_SHARE = 0.02
+"""A gap is a rest where the current beside it is below this share of the largest and the voltage moved by less than
+REST_VOLTAGE_V."""
+REST_VOLTAGE_V = 0.005
+FEW_RESTS = 3
+"""Told one by one; more are told by their number."""
+
+
+def without_gaps(data: Columns, context: Context, notes: list[str]) -> Columns:
+    """Refuse gaps; pass over a rest logged sparsely and a lone row long after the test, with a note."""
+    n = len(data["time_s"])
+    rests: list[tuple[float, float]] = []
+    for k in find_gaps(data):
+        seconds = float(data["time_s"][k + 1] - data["time_s"][k])
+        if is_rest(data, k):
+            rests.append((float(data["time_s"][k]), seconds))
+        elif k == n - 2 and n > 2:
+            notes.append(
+                f"The last row, {seconds:.6g} s after the one before it, is not of this test and was dropped."
+            )
+            data = {q: v[:-1] for q, v in data.items()}
+        else:
+            raise gap_error(data, k, context)
+    notes += _rests_told(rests)
+    return data
+
+
+def _rests_told(rests: Sequence[tuple[float, float]]) -> list[str]:
+    """A note on each of few sparsely logged rests (start, length in s), one on many."""
+    if len(rests) <= FEW_RESTS:
+        return [
+            f"No rows for {length:.6g} s from {start:.10g} s on; the cell rested." for start, length in rests
+        ]
+    lengths = [length for _, length in rests]
+    return [
+        f"No rows for {min(lengths):.3g} to {max(lengths):.3g} s at {len(rests)} places, the first at "
+        f"{rests[0][0]:.10g} s; the cell rested."
+    ]
+
+
+def find_gaps(columns: Columns) -> list[int]:
+    """Rows k after which rows seem to be missing: an interval much longer than those around it."""
+    step = np.diff(columns["time_s"])
+    gaps = []
+    for k in np.flatnonzero(step > GAP_FLOOR_S):
+        around = np.concatenate([step[max(0, k - NEIGHBOURS) : k], step[k + 1 : k + 1 + NEIGHBOURS]])
+        if len(around) and step[k] > GAP_RATIO * np.max(around):
+            gaps.append(int(k))
+    return gaps
+
+
+def is_rest(columns: Columns, k: int) -> bool:
+    """Whether the cell simply rested between rows k and k + 1, so that nothing is lost without rows there."""
+    pair = slice(k, k + 2)
+    current = columns["current_a"]
+    small = REST_CURRENT_SHARE * float(np.max(np.abs(current)))
+    return bool(
+        columns["time_s"][k + 1] - columns["time_s"][k] <= REST_GAP_S
+        and np.all(np.abs(current[pair]) <= small)
+        and np.ptp(columns["voltage_v"][pair]) <= REST_VOLTAGE_V
+    )
+
+
+def gap_error(columns: Columns, k: int, context: Context) -> DataError:
+    """The sentence for a gap between rows k and k + 1."""
+    time = columns["time_s"]
+    last, first = float(time[k]), float(time[k + 1])
+    return DataError(
+        f"{context.at('time_s', k + 1)}: a gap of {first - last:.6g} s after {last:.10g} s, "
+        f"where rows come every {np.median(np.diff(time)):.3g} s; what the cell did there is unknown. "
+        f"Split the file there, or read one side of it: --to-s {last:.10g} or --from-s {first:.10g}."
+    )

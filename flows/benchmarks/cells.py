@@ -1,0 +1,76 @@
+"""`aesi bench cells` with the hybrid beside the physics, and its table for the docs.
+
+The hybrid of a cell is one quick fit of its experiment: the correction learnt on the records that the experiment names
+for training and validation (marked `trained`), free run on all others with their measured temperature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from aesi.bench.hybrid.splits import judged
+from aesi.bench.physics import cells as physics
+from aesi.errors import AesiError
+from aesi.pipeline.experiment.config import read_experiment
+from flows.benchmarks.splits import BLOCK_S, CHEAP, QUICK, search_and_fit
+
+EXPERIMENTS = {physics.NCR: "panasonic_ncr18650pf.yaml", physics.HG2: "lg_18650hg2.yaml"}
+"""Those whose experiment trains on whole records."""
+HYBRID = "AESI I"
+BEGIN, END = "<!-- table of aesi bench cells -->", "<!-- end -->"
+
+
+def run(
+    cells: str = "experiments/cells",
+    only: Sequence[str] | str = (),
+    hybrid: bool = False,
+    experiments: str = "experiments",
+    write: str | None = None,
+) -> Iterator[dict[str, Any]]:
+    """One dict a record, and a last one with `summary`: true.
+
+    cells, only : see `aesi.bench.physics.cells.run`.  hybrid : add `hybrid_mv`, some minutes.  experiments : folder of
+    the experiment files.  write : a page whose part between the two marks becomes the table.
+    """
+    rows = []
+    for row in physics.run(cells, only):
+        if hybrid and not row.get("summary") and row["cell"] in EXPERIMENTS and "error" not in row:
+            row |= _hybrid(Path(experiments), row["cell"], row["record"])
+        rows.append(row)
+        yield row
+    if write is not None:
+        page = Path(write).read_text(encoding="utf-8")
+        before, after = page.split(BEGIN)[0], page.split(END)[1]
+        table = "\n".join(physics.table(rows[:-1]))
+        Path(write).write_text(f"{before}{BEGIN}\n{table}\n{END}{after}", encoding="utf-8")
+
+
+def _hybrid(experiments: Path, cell: str, record: str) -> dict[str, Any]:
+    figures = hybrids(experiments, cell)
+    return figures.get(record, {})
+
+
+@cache
+def hybrids(experiments: Path, cell: str) -> Mapping[str, dict[str, Any]]:
+    """Record -> `hybrid_mv` of the cell's hybrid, or `trained` where the record was used."""
+    file = experiments / EXPERIMENTS[cell]
+    data = read_experiment(file, ()).data
+    used = {*data.train, *data.valid}
+    drives = [r.name for r in physics.RECORDS if r.data == cell and not r.fitted and r.name not in used]
+    laid = [
+        f"data.test=[{', '.join(drives)}]", f"data.dt_s={QUICK['dt_s']}", f"search.block={round(BLOCK_S)}",
+        f"search.candidates={QUICK['candidates']}", f"search.resamples={QUICK['resamples']}",
+        f'models=["ESPM", "{HYBRID}"]', *CHEAP,
+    ]  # fmt: skip
+    out: dict[str, dict[str, Any]] = {name: {"trained": True} for name in used}
+    try:
+        config = read_experiment(file, laid)
+        loaded, _, fitted = search_and_fit(config)
+    except AesiError as error:
+        return out | {name: {"hybrid_error": str(error)} for name in drives}
+    for series in loaded.split.test:
+        out[series.name] = {"hybrid_mv": round(judged(fitted, [series])[HYBRID]["rmse_mv"], 2)}
+    return out
