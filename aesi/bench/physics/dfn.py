@@ -35,7 +35,7 @@ OURS = ((3, 6), (4, 8), (6, 12), (8, 16), (12, 24))
 """(points across an electrode, modes in a particle); the third is in use."""
 PEERS = ((10, 10), (20, 20), (40, 40))
 """(volumes across an electrode, volumes in a particle); the second is its default."""
-FINE, LESS_FINE = (80, 60), (40, 40)
+FINE, LESS_FINE = (160, 200), (120, 120)
 """Graded towards the surfaces of the particles, unlike the peer's own."""
 PEER = "PyBaMM DFN IDAKLU"
 

@@ -85,3 +85,100 @@ def test_a_diffusivity_that_varies_is_a_function_of_stoichiometry(pulsed):
     solution = theirs(pulsed, update=update)
     run = ours(pulsed, "concentration_dependent_diffusivity", **slopes, **curved)
     assert rmse_mv(run.voltage_v, solution["Voltage [V]"](pulsed.time)) < REACHED_MV
+
+
+@pytest.fixture(scope="module")
+def plain_dfn_v(pulsed):
+    """PyBaMM's porous electrode without an effect, (n,) V."""
+    return np.asarray(theirs(pulsed)["Voltage [V]"](pulsed.time))
+
+
+def test_hysteresis_is_one_state_hysteresis_in_the_mean(pulsed, plain_dfn_v):
+    """Ours is one state of the cell, PyBaMM's one at every place: the change differs by how the reaction does."""
+    import pybamm
+
+    half_gap, decay = 0.02, 40.0
+    values = pybamm.ParameterValues.create_from_bpx_obj(pulsed.cell.to_bpx())
+    declared = values["Positive electrode OCP [V]"]
+    solution = theirs(
+        pulsed,
+        options={"open-circuit potential": ("single", "one-state hysteresis")},
+        update={
+            "Positive electrode lithiation OCP [V]": lambda x: declared(x) - half_gap,
+            "Positive electrode delithiation OCP [V]": lambda x: declared(x) + half_gap,
+            "Positive particle lithiation hysteresis decay rate": decay,
+            "Positive particle delithiation hysteresis decay rate": decay,
+            "Initial hysteresis state in positive electrode": 0.0,
+        },
+    )
+    rate = (
+        0.5
+        * decay
+        * pulsed.cell.nominal_capacity_ah
+        / pulsed.cell.electrode_capacity_ah(pulsed.cell.positive)
+    )
+    run = ours(pulsed, "ocv_hysteresis", magnitude_v=half_gap, rate=rate)
+    voltage = solution["Voltage [V]"](pulsed.time)
+    assert rmse_mv(voltage, plain_dfn_v) > 2.0
+    assert rmse_mv(run.voltage_v, voltage) < REACHED_MV
+
+
+def test_asymmetric_kinetics_is_asymmetric_butler_volmer(pulsed):
+    names = "electrode Butler-Volmer transfer coefficient"
+    solution = theirs(
+        pulsed,
+        options={"intercalation kinetics": "asymmetric Butler-Volmer"},
+        update={f"Negative {names}": 0.35, f"Positive {names}": 0.6},
+    )
+    run = ours(pulsed, "asymmetric_kinetics", negative_alpha=0.35, positive_alpha=0.6)
+    assert rmse_mv(run.voltage_v, solution["Voltage [V]"](pulsed.time)) < REACHED_MV
+
+
+def test_lithium_plating_is_reversible_plating(pulsed):
+    import pybamm
+
+    charged = Peer(pulsed.content, pulsed.cell, pulsed.time, -np.abs(pulsed.current), 0.5)
+    rate, faraday = 1e-9, pybamm.constants.F
+    solution = theirs(
+        charged,
+        options={"lithium plating": "reversible", "surface form": "algebraic"},
+        update={
+            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_e,
+            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_li,
+            "Initial plated lithium concentration [mol.m-3]": 0.0,
+            "Typical plated lithium concentration [mol.m-3]": 1000.0,
+            "Lithium plating transfer coefficient": 0.65,
+            "Lithium metal partial molar volume [m3.mol-1]": 1.3e-5,
+            "Initial SEI thickness [m]": 5e-9,
+            "SEI partial molar volume [m3.mol-1]": 9.585e-5,
+        },
+    )
+    run = ours(charged, "lithium_plating", rate_m_s=rate)
+    assert rmse_mv(run.voltage_v, solution["Voltage [V]"](charged.time)) < REACHED_MV
+    plated = solution["X-averaged negative lithium plating concentration [mol.m-3]"](charged.time)
+    assert plated.max() > 0.0
+    assert run.series["plated_mol_m3"] == pytest.approx(plated, abs=0.02 * plated.max())
+
+
+@pytest.mark.slow
+def test_particle_sizes_are_the_size_distribution(pulsed):
+    import pybamm
+
+    values = pybamm.ParameterValues.create_from_bpx_obj(pulsed.cell.to_bpx())
+    spread = pybamm.get_size_distribution_parameters(values, sd_n=0.3, sd_p=0.3, R_max_n=3.2, R_max_p=3.2)
+    sizes = {k: spread[k] for k in dict(spread) if "area-weighted" in k or "radius" in k.lower()}
+    voltages = [
+        pulsed.solve(model="DFN", through=12, radial=20, graded=True, options=options, update=update)[
+            "Voltage [V]"
+        ](pulsed.time)
+        for options, update in (
+            ({"particle size": "distribution", "surface form": "algebraic"}, sizes),
+            ({}, None),
+        )
+    ]
+    moved = np.asarray(voltages[0]) - np.asarray(voltages[1])
+    run = ours(pulsed, "particle_size_distribution", negative_sd=0.3, positive_sd=0.3)
+    bare = simulate(pulsed.cell, pulsed.time, pulsed.current, pulsed.soc0, model="dfn")
+    change = run.voltage_v - bare.voltage_v
+    assert rmse_mv(moved, 0.0 * moved) > 1.0
+    assert rmse_mv(change, moved) < 0.1 * rmse_mv(moved, 0.0 * moved)
