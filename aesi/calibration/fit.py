@@ -37,6 +37,7 @@ GAIN = 1e-4
 NOTED_ZERO = 0.02
 """Of a record's typical current."""
 NOTED_AGE = 0.01
+"""Of the capacity: what a record's differs by and is told."""
 
 
 def calibrate(

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 BOUND_SHARE = 0.02
+"""Of a parameter's range, next to a bound: what counts as the bound."""
 
 
 @dataclass(frozen=True)

@@ -204,18 +204,18 @@ NOMINAL_AH = {NCR: 2.9, HG2: 3.0}
 
 
 @dataclass(frozen=True)
-class FreeRun:
+class FreeRunError:
     """rmse_mv : of all rows.  ran_out_s : from when on the model was held at an edge; None where it never was."""
 
     rmse_mv: float
     ran_out_s: float | None
 
 
-def free_run(cell: Cell, data: Measurement) -> FreeRun:
+def free_run(cell: Cell, data: Measurement) -> FreeRunError:
     """A free run over all rows, held backward as loggers write, from the state of charge of the first."""
     error, gone = _errors(cell, data, initial_state(cell, data).soc)
     out_s = float(data.time_s[int(np.argmax(gone))]) if gone.any() else None
-    return FreeRun(round(MV_PER_V * float(np.sqrt(np.mean(error**2))), 2), out_s)
+    return FreeRunError(round(MV_PER_V * float(np.sqrt(np.mean(error**2))), 2), out_s)
 
 
 def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:

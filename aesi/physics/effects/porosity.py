@@ -2,8 +2,9 @@
 
     eps_i = f_i eps_i,declared,   B_i = f_i^1.5 B_i,declared        i negative or positive, B transport efficiency
 
-Less pore space conducts worse (Bruggeman's exponent) and holds less salt, so that it also depletes sooner. Leaves out
-the separator and a tortuosity that is off at the right porosity (electrolyte_transport). Holds at any rate;
+Less pore space conducts worse (Bruggeman's exponent) and holds less salt, so that it also depletes sooner.
+
+Leaves out the separator and a tortuosity that is off at the right porosity (electrolyte_transport). Holds at any rate;
 below 1C it looks like a resistance, and while the salt is not far from even like a conductivity.
 
 Source: Bruggeman's relation as used in Chen et al., J. Electrochem. Soc. 167 (2020) 080534,
