@@ -16,7 +16,9 @@ def visited(places: Array) -> Array:
 
 
 def distance_to_visited(places: Array, known: Array) -> Array:
-    """(n,) from each place to the nearest of `known` (k,), sorted; 0 within the resolution."""
+    """(n,) from each place to the nearest of `known` (k,), sorted; 0 within the resolution, inf where nothing is known."""
+    if not len(known):
+        return np.full(len(places), np.inf)
     last = len(known) - 1
     place = np.clip(np.searchsorted(known, places), 1, max(last, 1))
     below, above = np.abs(places - known[place - 1]), np.abs(places - known[np.minimum(place, last)])

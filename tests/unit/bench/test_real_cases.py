@@ -72,6 +72,7 @@ def content(*effects, groups=(), parameters=None, verdict="found"):
         "effects": list(effects),
         "indistinguishable": [list(g) for g in groups],
         "confidence": 0.9,
+        "margin": 3.0,
         "before": errors,
         "recalibrated": errors,
         "after": errors,
