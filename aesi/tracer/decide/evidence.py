@@ -220,9 +220,7 @@ def _best_carried(
     if recalibrated is not None:
         problem, fit = recalibrated
         other = ModelState.of(problem, fit)
-        if (
-            range_fault(other, ORDINARY_C) is None
-        ):  # what cannot be adopted itself is no yardstick for what can
+        if range_fault(other) is None:  # what cannot be adopted itself is no yardstick for what can
             basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
     tried = [(other.problem, fit) for other in others for fit in (other.base, other.chosen)]
     more = [
@@ -239,7 +237,8 @@ def _best_carried(
     ]
     fault = None
     for option in (*named, *ranked):
-        fault = range_fault(option.state, ORDINARY_C) if option.explanation is not None else None
+        rates_c = ORDINARY_C if option in named else (*ORDINARY_C, *FAST_C)
+        fault = range_fault(option.state, rates_c) if option.explanation is not None else None
         if fault is None:
             why = _why(path, option, more, fit_options)
             limits = () if option.explanation is None else _limits(option.state)
