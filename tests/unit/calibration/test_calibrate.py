@@ -15,7 +15,7 @@ from aesi.physics import simulate
 
 @pytest.fixture(scope="module")
 def found(start, records):
-    return calibrate(start, records, evaluations=12)
+    return calibrate(start, records)
 
 
 def test_the_records_of_both_temperatures_are_followed(found):
