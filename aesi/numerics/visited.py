@@ -16,7 +16,7 @@ def visited(places: Array) -> Array:
 
 
 def distance_to_visited(places: Array, known: Array) -> Array:
-    """(n,) from each place to the nearest of `known` (k,), sorted; 0 within the resolution, inf where nothing is known."""
+    """(n,) from each place to the nearest of `known` (k,), sorted; 0 within the resolution, inf where none is known."""
     if not len(known):
         return np.full(len(places), np.inf)
     last = len(known) - 1
