@@ -122,7 +122,7 @@ def _line(one: Series, end: float, limit: float) -> str:
 
 
 def _label(one: Series, position: int) -> str:
-    x = LEFT + 0.29 * position * (WIDTH - LEFT)
+    x = LEFT + 0.33 * position * (WIDTH - LEFT)
     return (
         f'<rect x="{x}" y="18" width="18" height="4" fill="{one.colour}"/>'
         f'<text x="{x + 24}" y="25" fill="{style.INK}">{escape(one.name)}: '
