@@ -15,6 +15,7 @@ from aesi.physics.cell import Cell
 
 if TYPE_CHECKING:
     import pandas as pd
+    from plotly.graph_objects import Figure
 
 BOUND_SHARE = 0.02
 """Of a parameter's range, next to a bound: what counts as the bound."""
@@ -93,6 +94,18 @@ class Calibration:
 
         rows = {name: asdict(interval) for name, interval in self.parameters.items()}
         return pd.DataFrame.from_dict(rows, orient="index")
+
+    def plot(self) -> Figure:
+        """The error of each record as declared and as calibrated, RMSE in mV: a plotly figure."""
+        from plotly.graph_objects import Bar, Figure
+
+        names = [error.name for error in self.errors]
+        states = {
+            "declared": [MV_PER_V * error.before_v for error in self.errors],
+            "calibrated": [MV_PER_V * error.after_v for error in self.errors],
+        }
+        bars = [Bar(name=state, x=names, y=left) for state, left in states.items()]
+        return Figure(bars, {"barmode": "group", "yaxis": {"title": {"text": "error, mV RMSE"}}})
 
 
 def information_weights(model: Model, errors: Sequence[Array]) -> list[Array]:

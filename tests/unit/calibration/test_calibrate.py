@@ -48,6 +48,12 @@ def test_a_calibration_is_short_in_words_and_a_table_of_its_parameters(found):
     assert list(table.columns) == ["value", "low", "high", "unit", "source"]
 
 
+def test_a_calibration_draws_the_error_of_each_record(found):
+    declared, calibrated = found.plot().data
+    assert list(declared.x) == ["at_25", "at_0"]
+    assert all(after < before for before, after in zip(declared.y, calibrated.y, strict=True))
+
+
 def test_the_state_of_health_holds_the_true_one_within_its_intervals(found, truth):
     intervals, true, ours = health_intervals(found), health_of(truth), health_of(found.cell)
     assert set(intervals) == set(HEALTH_WORDS)
