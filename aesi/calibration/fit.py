@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import AGEING_SD, Model
 from aesi.calibration.parameters import free_parameters
-from aesi.calibration.records import Prepared, check_charge, check_voltage, prepared, with_temperatures
+from aesi.calibration.records import Prepared, check_charge, prepared, with_temperatures
 from aesi.calibration.result import (
     Calibration,
     RecordError,
@@ -26,6 +26,7 @@ from aesi.calibration.start import one_branch, sized, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.typing import Array
+from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.simulation import ModelName
 from aesi.records import Measurement

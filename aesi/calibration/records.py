@@ -12,6 +12,7 @@ from aesi.calibration.thinning import thinned
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
+from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.simulation import ModelName
@@ -21,8 +22,6 @@ SOC_SD = 0.005
 """Of a state of charge that a potential in doubt gave; one that was given is believed."""
 SLOW_C_RATE = 0.15
 """Below this a cycler's zero is a share of the current."""
-VOLTAGE_MARGIN_V = 0.3
-SOC_MARGIN = 0.12
 MOST_ROWS = 4000
 """Rows of a drive that a fit sees: windows grow until there are no more."""
 
@@ -119,19 +118,6 @@ def with_temperatures(
             notes.append(f"{record.name}: no temperature; taken at that of the cell file.")
         out.append(record)
     return tuple(out), tuple(notes)
-
-
-def check_voltage(cell: Cell, data: Measurement) -> None:
-    """Refuse voltages that this cell cannot have."""
-    low, high = cell.lower_voltage_v - VOLTAGE_MARGIN_V, cell.upper_voltage_v + VOLTAGE_MARGIN_V
-    outside = np.flatnonzero((data.voltage_v < low) | (data.voltage_v > high))
-    if len(outside):
-        row = int(outside[0])
-        raise DataError(
-            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s (row {row}) is outside the range of "
-            f"{cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to another cell, "
-            "or the voltage is not in volts."
-        )
 
 
 def check_charge(cell: Cell, record: Prepared) -> None:

@@ -10,12 +10,13 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from aesi.errors import DataError
+from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
-from aesi.tracer.case.checks import check_measurement, check_record, check_same_cell
+from aesi.tracer.case.checks import check_record, check_same_cell
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.archive import Archive, context_of
@@ -121,7 +122,7 @@ def discover(
     if not measurements:
         raise DataError("give at least one measurement to look at.")
     for data in (*measurements, *tests):
-        check_measurement(cell, data)
+        check_voltage(cell, data)
     records = prepare_all(cell, measurements, soc0, 0.0 if tests else holdout, given)
     for record in records:
         check_record(cell, record)

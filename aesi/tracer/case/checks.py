@@ -7,14 +7,10 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
+from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
-from aesi.records import Measurement
 from aesi.tracer.case.records import PreparedRecord
 
-VOLTAGE_MARGIN_V = 0.3
-"""Beyond the voltage limits of the file that a record may go: fast pulses and old cells do."""
-SOC_MARGIN = 0.12
-"""Beyond full and empty, by the declared capacity: new cells hold more than they are sold for."""
 FEWEST_SAMPLES = 200
 """For a record of less than ten times SHORTEST_S."""
 SHORTEST_S = 300.0
@@ -24,19 +20,6 @@ LEAST_C_RATE = 0.02
 FOREIGN_CELL_V = 0.25
 """A model of the right chemistry, however badly parametrised, is closer than this to the voltage in the
 median."""
-
-
-def check_measurement(cell: Cell, data: Measurement) -> None:
-    """Raises DataError where the voltage leaves what the cell file admits."""
-    low, high = cell.lower_voltage_v - VOLTAGE_MARGIN_V, cell.upper_voltage_v + VOLTAGE_MARGIN_V
-    outside = np.flatnonzero((data.voltage_v < low) | (data.voltage_v > high))
-    if len(outside):
-        row = int(outside[0])
-        raise DataError(
-            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s (row {row}) is outside "
-            f"the range of {cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to "
-            "another cell, or the voltage is not in volts."
-        )
 
 
 def check_record(cell: Cell, record: PreparedRecord) -> None:

@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from aesi.tracer.decide.search import Path
+from aesi.tracer.decide.search import NINETY, Path
 from aesi.tracer.decide.verdict import Verdict
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
-
-NINETY = 1.645
-"""Standard deviations either side of a 90 % interval."""
 
 
 @dataclass(frozen=True)
