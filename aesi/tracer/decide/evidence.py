@@ -10,19 +10,9 @@ import numpy as np
 from aesi.errors import DataError
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem, Trust
-from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.one_cause import in_one
-from aesi.tracer.decide.search import (
-    Path,
-    Report,
-    base_of,
-    refitted,
-    searched,
-    unseen_rmse_v,
-    with_wrong_parameters,
-)
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
@@ -36,6 +26,11 @@ from aesi.tracer.decide.verdict import (
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import base_of
+from aesi.tracer.search.forward import refitted, searched
+from aesi.tracer.search.path import Path, Report, unseen_rmse_v
+from aesi.tracer.search.wrong_parameters import with_wrong_parameters
 
 AS_DECLARED_NATS = 5.0
 """Own parameters as declared are believed where freeing them says no more than this."""

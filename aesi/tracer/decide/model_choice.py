@@ -15,16 +15,11 @@ from dataclasses import dataclass, replace
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
-from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.evidence import Evidence
-from aesi.tracer.decide.search import (
-    HOPELESS_SHARE,
-    REFIT_STEPS,
-    Path,
-    base_of,
-    beyond_noise,
-    fitted_hypothesis,
-)
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import REFIT_STEPS, base_of, fitted_hypothesis
+from aesi.tracer.search.forward import HOPELESS_SHARE
+from aesi.tracer.search.path import Path, beyond_noise
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
