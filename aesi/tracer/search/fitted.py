@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from aesi.tracer.case.blocks import Blocks, blocks_of
+from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import coordinates_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
@@ -19,13 +19,9 @@ ALIKE_NATS = 3.0
 """Hypotheses within this of each other say as much."""
 
 
-def base_of(
-    problem: InverseProblem, archive: Archive
-) -> tuple[InverseProblem, Blocks, FittedHypothesis] | None:
+def base_of(problem: InverseProblem, blocks: Blocks, archive: Archive) -> FittedHypothesis | None:
     """The hypothesis without effects; None where it cannot be simulated."""
-    blocks = blocks_of(problem)
-    fit = fitted_hypothesis(problem, blocks, (), None, PRIORS[problem.trust].median_v, BASE_STEPS, archive)
-    return None if fit is None else (problem, blocks, fit)
+    return fitted_hypothesis(problem, blocks, (), None, PRIORS[problem.trust].median_v, BASE_STEPS, archive)
 
 
 def fitted_hypothesis(

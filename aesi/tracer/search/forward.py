@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from aesi.numerics.typing import Array
-from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Grown, Parent
@@ -27,7 +27,8 @@ BEAM = 2
 HOPELESS_SHARE = 0.7
 """Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
 LEAST_V = 1.5e-4
-"""And what it has to take off the error on unseen data: less is within what two solvers of one model differ by."""
+"""What an effect has to take off the error on unseen data, as squares: less is within what two solvers of one model
+differ by."""
 
 
 def searched(
@@ -41,10 +42,10 @@ def searched(
 
     enough : is what a hypothesis leaves within what a right one leaves? Then nothing is added that does not say much.
     """
-    based = base_of(problem, archive)
-    if based is None:
+    blocks = blocks_of(problem)
+    base = base_of(problem, blocks, archive)
+    if base is None:
         return None
-    problem, blocks, base = based
     steps: list[Step] = []
     notes: list[str] = []
     parents, chosen = [base], base
@@ -97,10 +98,10 @@ def _pruned(
 
 def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | None:
     """The chosen hypothesis of a path at another trust in the declared parameters, with nothing else tried."""
-    based = base_of(problem, archive)
-    if based is None:
+    blocks = blocks_of(problem)
+    base = base_of(problem, blocks, archive)
+    if base is None:
         return None
-    problem, blocks, base = based
     start, size = path.chosen.placed, path.chosen.score.delta_v
     fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, start, size, BASE_STEPS, archive)
     return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
