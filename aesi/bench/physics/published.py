@@ -21,8 +21,8 @@ PUBLISHED_MV = {
     (SET, "1C"): 13.412,
     (f"{SET}_2c", "2C"): 24.688,
 }
-"""Root mean square error by record, as printed in NMC/validation-plots.ipynb of the set's source: PyBaMM's DFN, 16 volumes
-a layer and in a particle, the current straight between rows."""
+"""Root mean square error by record, as printed in NMC/validation-plots.ipynb of the set's source: PyBaMM's DFN, 16
+volumes a layer and in a particle, the current straight between rows."""
 FULL = 1.0
 """State of charge at the start, as taken there."""
 
