@@ -104,3 +104,23 @@ def peer():
 def plain_v(peer):
     """PyBaMM's SPMe of that cell, (n,) V."""
     return peer.voltage()
+
+
+def reversible_plating(rate_m_s):
+    """Options and parameters of PyBaMM's plating, for `Peer.solve`, as the effect `lithium_plating` has it."""
+    import pybamm
+
+    faraday = pybamm.constants.F
+    return {
+        "options": {"lithium plating": "reversible", "surface form": "algebraic"},
+        "update": {
+            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate_m_s * c_e,
+            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate_m_s * c_li,
+            "Initial plated lithium concentration [mol.m-3]": 0.0,
+            "Typical plated lithium concentration [mol.m-3]": 1000.0,
+            "Lithium plating transfer coefficient": 0.65,
+            "Lithium metal partial molar volume [m3.mol-1]": 1.3e-5,
+            "Initial SEI thickness [m]": 5e-9,
+            "SEI partial molar volume [m3.mol-1]": 9.585e-5,
+        },
+    }

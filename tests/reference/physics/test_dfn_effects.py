@@ -6,7 +6,7 @@ import pytest
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 
-from .conftest import Peer, read
+from .conftest import Peer, read, reversible_plating
 from .test_dfn import RADIAL, THROUGH, pulses, rmse_mv
 
 REACHED_MV = 0.3
@@ -135,23 +135,11 @@ def test_asymmetric_kinetics_is_asymmetric_butler_volmer(pulsed):
 
 
 def test_lithium_plating_is_reversible_plating(pulsed):
-    import pybamm
-
     charged = Peer(pulsed.content, pulsed.cell, pulsed.time, -np.abs(pulsed.current), 0.5)
-    rate, faraday = 1e-9, pybamm.constants.F
+    rate = 1e-9
     solution = theirs(
         charged,
-        options={"lithium plating": "reversible", "surface form": "algebraic"},
-        update={
-            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_e,
-            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_li,
-            "Initial plated lithium concentration [mol.m-3]": 0.0,
-            "Typical plated lithium concentration [mol.m-3]": 1000.0,
-            "Lithium plating transfer coefficient": 0.65,
-            "Lithium metal partial molar volume [m3.mol-1]": 1.3e-5,
-            "Initial SEI thickness [m]": 5e-9,
-            "SEI partial molar volume [m3.mol-1]": 9.585e-5,
-        },
+        **reversible_plating(rate),
     )
     run = ours(charged, "lithium_plating", rate_m_s=rate)
     assert rmse_mv(run.voltage_v, solution["Voltage [V]"](charged.time)) < REACHED_MV

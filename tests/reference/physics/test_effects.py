@@ -11,7 +11,7 @@ import pytest
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
 
-from .conftest import Peer
+from .conftest import Peer, reversible_plating
 
 DOUBLE_LAYER_F_M2 = 5.0
 
@@ -215,22 +215,10 @@ def test_windows_after_a_loss_are_the_peers_electrode_balance(peer, name, loss):
 
 
 def test_lithium_plating_is_reversible_plating(peer):
-    import pybamm
-
     charge = Peer(peer.content, peer.cell, peer.time, -np.abs(peer.current), 0.5)
-    rate, faraday = 1e-9, pybamm.constants.F
+    rate = 1e-9
     theirs = charge.solve(
-        options={"lithium plating": "reversible", "surface form": "algebraic"},
-        update={
-            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_e,
-            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_li,
-            "Initial plated lithium concentration [mol.m-3]": 0.0,
-            "Typical plated lithium concentration [mol.m-3]": 1000.0,
-            "Lithium plating transfer coefficient": 0.65,
-            "Lithium metal partial molar volume [m3.mol-1]": 1.3e-5,
-            "Initial SEI thickness [m]": 5e-9,
-            "SEI partial molar volume [m3.mol-1]": 9.585e-5,
-        },
+        **reversible_plating(rate),
     )
     without = charge.voltage(options={"surface form": "algebraic"})
     change = ours(charge, "lithium_plating", rate_m_s=rate)
