@@ -35,10 +35,11 @@ __all__ = ["Basis", "InitialState", "initial_state"]
 REST_C_RATE = 1.0 / 50.0
 """Below this current a cell rests: the drop at C/50 is within what the potentials are uncertain by."""
 MOVING_V = 4e-3
-"""A voltage that moves more than this over the rest before the current is not yet that of a rest."""
+"""A voltage that moves more than this over the rest before the current is not yet that of a rest. A convention."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
-"""A given state of charge further than this from that of a record's voltage is contradicted by it."""
+"""A given state of charge further than this from that of a record's voltage is contradicted by it, at rest and under
+load. Conventions."""
 
 
 def initial_state(
