@@ -8,11 +8,11 @@ from typing import Any, TypeVar
 from flows.base import environment
 from flows.evaluation.dask_pool import connect
 
-Item = TypeVar("Item")
-Result = TypeVar("Result")
+T = TypeVar("T")
+R = TypeVar("R")
 
 
-def in_processes(function: Callable[[Item], Result], items: Sequence[Item], workers: int) -> Iterator[Result]:
+def in_processes(function: Callable[[T], R], items: Sequence[T], workers: int) -> Iterator[R]:
     """Results by processes that start anew; `function` is one that they can import, or a partial of one.
 
     What has not begun is given up where the caller stops asking.
@@ -29,9 +29,7 @@ def in_processes(function: Callable[[Item], Result], items: Sequence[Item], work
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def on_dask(
-    function: Callable[[Item], Result], items: Sequence[Item], workers: int, address: str | None
-) -> Iterator[Result]:
+def on_dask(function: Callable[[T], R], items: Sequence[T], workers: int, address: str | None) -> Iterator[R]:
     """Results by the scheduler at an address, or by a cluster of `workers` processes here.
 
     Raises as `connect` does.
