@@ -106,16 +106,17 @@ def plain_v(peer):
     return peer.voltage()
 
 
-def reversible_plating(rate_m_s):
-    """Options and parameters of PyBaMM's plating, for `Peer.solve`, as the effect `lithium_plating` has it."""
+@pytest.fixture(scope="session")
+def reversible_plating():
+    """Rate constant (m/s), and PyBaMM's options and parameters of plating and stripping at it."""
     import pybamm
 
-    faraday = pybamm.constants.F
-    return {
+    rate, faraday = 1e-9, pybamm.constants.F
+    return rate, {
         "options": {"lithium plating": "reversible", "surface form": "algebraic"},
         "update": {
-            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate_m_s * c_e,
-            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate_m_s * c_li,
+            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_e,
+            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_li,
             "Initial plated lithium concentration [mol.m-3]": 0.0,
             "Typical plated lithium concentration [mol.m-3]": 1000.0,
             "Lithium plating transfer coefficient": 0.65,

@@ -6,7 +6,7 @@ import pytest
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 
-from .conftest import Peer, read, reversible_plating
+from .conftest import Peer, read
 from .test_dfn import RADIAL, THROUGH, pulses, rmse_mv
 
 REACHED_MV = 0.3
@@ -134,13 +134,10 @@ def test_asymmetric_kinetics_is_asymmetric_butler_volmer(pulsed):
     assert rmse_mv(run.voltage_v, solution["Voltage [V]"](pulsed.time)) < REACHED_MV
 
 
-def test_lithium_plating_is_reversible_plating(pulsed):
+def test_lithium_plating_is_reversible_plating(pulsed, reversible_plating):
     charged = Peer(pulsed.content, pulsed.cell, pulsed.time, -np.abs(pulsed.current), 0.5)
-    rate = 1e-9
-    solution = theirs(
-        charged,
-        **reversible_plating(rate),
-    )
+    rate, options = reversible_plating
+    solution = theirs(charged, **options)
     run = ours(charged, "lithium_plating", rate_m_s=rate)
     assert rmse_mv(run.voltage_v, solution["Voltage [V]"](charged.time)) < REACHED_MV
     plated = solution["X-averaged negative lithium plating concentration [mol.m-3]"](charged.time)

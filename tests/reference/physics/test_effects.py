@@ -11,7 +11,7 @@ import pytest
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
 
-from .conftest import Peer, reversible_plating
+from .conftest import Peer
 
 DOUBLE_LAYER_F_M2 = 5.0
 
@@ -214,12 +214,10 @@ def test_windows_after_a_loss_are_the_peers_electrode_balance(peer, name, loss):
     assert windows == pytest.approx([float(found[k]) for k in ("x_0", "x_100", "y_100", "y_0")], abs=3e-4)
 
 
-def test_lithium_plating_is_reversible_plating(peer):
+def test_lithium_plating_is_reversible_plating(peer, reversible_plating):
     charge = Peer(peer.content, peer.cell, peer.time, -np.abs(peer.current), 0.5)
-    rate = 1e-9
-    theirs = charge.solve(
-        **reversible_plating(rate),
-    )
+    rate, options = reversible_plating
+    theirs = charge.solve(**options)
     without = charge.voltage(options={"surface form": "algebraic"})
     change = ours(charge, "lithium_plating", rate_m_s=rate)
     agrees(change, theirs["Voltage [V]"](charge.time) - without, 0.05, 2e-4)
