@@ -19,7 +19,7 @@ def gauss_sizes(mean_m: float, sd_m: float) -> Any:
     """
     import pybamm
 
-    class GaussSizes(pybamm.SubMesh1D):  # type: ignore[misc]
+    class GaussSizes(pybamm.SubMesh1D):
         """Radii and weights of Gauss and Hermite in the logarithm, as nodes and widths of a mesh."""
 
         def __init__(self, lims: Any, npts: Any) -> None:
