@@ -56,19 +56,29 @@ RATE_SD, SALT_SD = 0.8, 0.35
 """Deviations of logarithms. Wider ones let a drive at one temperature trade kinetics for a slow electrolyte, and an LG
 18650HG2 then runs out of salt under its US06."""
 RATE_ENERGY, RATE_ENERGY_SD = 55e3, 12e3
-"""J/mol: what lithium pays to leave its solvent. Values of 18 to 35 are of rates that hold contacts and films too."""
+"""J/mol: what lithium pays to leave its solvent, the mean of the sources. Lower values (24 and 40 in O'Regan et al.
+2022) are of rates that hold contacts and films too."""
 CONTACT_V = 0.03
 """Of the drop at 1C: what contacts, and films, are expected to take at most."""
 FULLEST = 0.95
 """Stoichiometry of an electrode that is as full as a charged cell's may be: beyond, its kinetics stand still."""
 RATES = "rates of commercial cells of one chemistry scatter by a factor of three either way"
 TORTUOSITY = "scatter of tortuosities, Landesfeind et al. 2016, doi:10.1149/2.1141607jes"
-ENERGIES = "30 to 81 kJ/mol in Ecker et al. 2015, doi:10.1149/2.0551509jes; 12 to 25 in O'Regan et al. 2022"
-KINETIC_ENERGIES = "50 to 68 kJ/mol, Jow et al. 2018, doi:10.1149/2.1221802jes; 44 to 53, Ecker et al. 2015"
-SALT_ENERGIES = (
-    "17.1 kJ/mol in Ecker et al. 2015; 12 to 25 over concentration in Landesfeind & Gasteiger 2019"
+ENERGIES = (
+    "graphite 30.3, NCO 80.6 kJ/mol, Ecker et al. 2015, doi:10.1149/2.0551509jes; graphite-SiOx 17.4, NMC811 12.0, "
+    "O'Regan et al. 2022, doi:10.1016/j.electacta.2022.140700"
 )
-FILMS = "25 to 60 kJ/mol for films on graphite, Waldmann et al. 2014, doi:10.1016/j.jpowsour.2014.03.112"
+KINETIC_ENERGIES = (
+    "graphite 68, NCA 50 kJ/mol, Jow, Marx & Allen 2011, ECS Trans. 33 (23) 1; graphite 53.4, NCO 43.6, Ecker et al. "
+    "2015"
+)
+SALT_ENERGIES = (
+    "17.1 kJ/mol in Ecker et al. 2015; 13 to 23 from 0.5 to 2 mol/l in Landesfeind & Gasteiger 2019"
+)
+FILMS = (
+    "between contacts, which know no temperature, and the films on graphite, 59 to 64 kJ/mol in J. Power Sources 153 "
+    "(2006) 391, doi:10.1016/j.jpowsour.2005.05.034"
+)
 COURSES = "a decade and more over the window of graphite and NMC, Ecker et al. 2015, figure 9"
 RATE_COURSES = (
     "exchange currents of both electrodes leave the square root by factors, Ecker et al. 2015, figure 11"

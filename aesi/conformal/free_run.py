@@ -69,15 +69,15 @@ class FreeRunBands:
         gap: Sequence[Array | None] | None = None,
         seen: Seen | None = None,
     ) -> FreeRunBands:
-        """Calibrate on honest prediction errors: of records, or pieces, that the model was not fitted to.
+        """Calibrate on out-of-sample prediction errors: of records, or pieces, that the model was not fitted to.
 
         errors_by_horizon : horizon in s (WHOLE_DRIVE: from the start of the record) -> one (n_i,) array a
         continuous record, V, measured minus predicted at that sample from a measurement `horizon` earlier;
         NaN where there is no such prediction.  dt_s : s.
         current_a, soc : one (n_i,) array a record, A and 1.
-        inside : one (n_i,) array a record, where the model that was asked had been trained on such inputs;
-        None for everywhere.
-        excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it cannot tell.
+        inside : one (n_i,) array a record, True inside the trained range of the model that predicted; None for
+        everywhere.
+        excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it keeps no leverage.
         gap : one (n_i,) array a record, `Seen.gap` of that model.  seen : of the model that the bands are for.
 
         Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.

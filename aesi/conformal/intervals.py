@@ -1,4 +1,4 @@
-"""The record of a replay: a lower and an upper bound a step."""
+"""Prediction intervals along a record: a lower and an upper bound a sample."""
 
 from __future__ import annotations
 

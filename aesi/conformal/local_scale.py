@@ -2,12 +2,12 @@
 
     s = a + b (LOW_SOC - soc)+ + u |I| + v |mean of I over the last minute| + w x + y g,     all weights >= 0    (1)
 
-The error of a cell model grows with the current and towards the steep end of its discharge, and that of any
-regression with the excess x of its leverage, how far a sample lies from the fitted rows, and of any model with the
-distance g of the state of charge from theirs (seen.py). Few terms on
-purpose: a flexible function of the state of charge overfits the calibration drive and fails on the next one.
-s is the 1 - alpha quantile of |error|, by linear quantile regression; a term whose weight would be negative is
-left out, so that s does not turn negative where it extrapolates, and a floor keeps it positive.
+The error of a cell model grows with the current and towards the steep end of its discharge; with x, by which the
+leverage of a sample exceeds that of the fitted rows (`aesi.sparse.leverage`); and with g, which grows with the distance
+of the state of charge from theirs (seen.py). There are few terms because a flexible function of the state of charge
+overfits the calibration drive and fails on the next one. s is the 1 - alpha quantile of |error|, by linear quantile
+regression; a term whose weight would be negative is left out, so that s stays positive where it extrapolates, and a
+floor keeps it away from zero.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ LOW_SOC = 0.25
 """Below it open-circuit potentials turn steep. A convention, like MEMORY_S; `aesi bench bands` shows what the bands
 are worth."""
 MEMORY_S = 60.0
-"""Of the mean current: about as long as the electrolyte's salt takes to follow."""
+"""Time constant of the mean current: about that of salt diffusion in the electrolyte."""
 RELATIVE_FLOOR = 0.1
-"""s stays above this share of the mean |error|: a scale near zero would claim a perfect model."""
+"""Least s, as a share of the mean |error|. A convention."""
 MOST_ROWS = 6000
 """Rows the regression looks at, evenly spread: neighbouring errors of a free run say nearly the same."""
 

@@ -30,7 +30,7 @@ def validation_scores(
 ) -> Scores:
     """Coverage, width and interval score on the validation records, all samples together.
 
-    residuals, valid_residuals : one (n_i,) array a continuous record, V, honest.  current_a, valid_current_a :
+    residuals, valid_residuals : one (n_i,) array a continuous record, V, out of sample.  current_a, valid_current_a :
     one (n_i,) array a record, A, both or neither.  max_residuals : calibration is thinned to evenly spaced
     pieces of about this many samples in all. Raises as `Method.fit` does.
     """

@@ -86,6 +86,20 @@ SETS = (
         ),
     ),
     DataSet(
+        "about_energy_nmc_2c",
+        "12.5 Ah NMC111/graphite pouch cell, 25 degC",
+        "2C discharge",
+        "About:Energy, github.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation, commit 8efd45a",
+        "CC BY-SA 4.0",
+        (
+            _about_energy(
+                "2C.csv",
+                "data/validation/NMC_25degC_2C.csv",
+                "19d38ed508a42a74398c1276933335f97022f98ff9fa33bf39a59309fbc9f563",
+            ),
+        ),
+    ),
+    DataSet(
         "lg_18650hg2",
         "LG 18650HG2, 3.0 Ah, NMC/graphite-SiO",
         "C/20, 1C capacity, US06, LA92 and mixed cycles at 10 Hz, -20 to 40 degC; case temperature",

@@ -1,4 +1,4 @@
-"""Fewer or evenly spaced rows, with the charge kept and nothing said to be a sample that is an average.
+"""Resampling: fewer or evenly spaced rows, with the charge kept, and averages told apart from samples.
 
 A logger writes a row at the end of an interval: row k's current held over (t[k-1], t[k]]. The average of the
 current over any interval then follows from the charge, which is piecewise linear in time, and the charge

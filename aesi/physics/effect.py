@@ -97,6 +97,11 @@ class Effect:
         """
         return ActiveEffect(self, tuple(checked(self.parameters, values).items()))
 
+    def activate_only(self, **values: float) -> ActiveEffect:
+        """This effect with the given parameters, and the others at their neutral values, where they have one."""
+        still = {name: p.neutral for name, p in self.parameters.items() if p.neutral is not None}
+        return self.activate(**{**still, **values})
+
     @property
     def summary(self) -> str:
         """First sentence of the file."""

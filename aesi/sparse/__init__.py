@@ -1,7 +1,7 @@
 """Ensemble sparse learning of the voltage error: library, STRidge, ensembles, free run, search problem."""
 
 from aesi.sparse.model import SparseModel
-from aesi.sparse.search.evaluate import Candidate, FitnessWeights, HonestResiduals, evaluate, fitness
+from aesi.sparse.search.evaluate import Candidate, FitnessWeights, OutOfFoldResiduals, evaluate, fitness
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.problem import Options, Problem
 from aesi.sparse.stridge import STRidge
@@ -12,9 +12,9 @@ __all__ = [
     "Candidate",
     "FitnessWeights",
     "Genome",
-    "HonestResiduals",
     "Library",
     "Options",
+    "OutOfFoldResiduals",
     "Problem",
     "STRidge",
     "SparseModel",

@@ -1,21 +1,21 @@
-"""A correction fades where nothing supports it: never worse than the physics by much.
+"""A correction is shrunk towards the physics: as a whole by its slope on left-out drives, and far from its fitted rows.
 
     e'(x) = a w(x) e(x),     1 / w = 1 + KAPPA max(h(x) / h_u - 1, 0)**2 + r(x)                                  (1)
     a = b - SE s_b,     b = sum_d <e_d, w e'_d> / sum_d (|w e'_d|**2 + DOUBT |e_d|**2)    within [0, 1]             (2)
 
 e is what the terms say, h the leverage of x in their fit (leverage.py), r its remoteness from what they were fitted to
 (trained_region.py). The amplitude a is the slope of the error on the correction over drives d that the terms had not
-seen, less its standard error s_b by the jackknife over these drives. A correction that left-out drives do
-not bear out is no correction, and neither is one of which they see next to nothing (DOUBT), because each drive lies
-outside of what the others visit. As the terms' coefficients are shrunk by a ridge for the noise they were fitted to,
-(2) shrinks their sum for what differs from drive to drive. Efron & Morris, J. Am. Stat. Assoc. 68 (1973) 117.
+seen, less its standard error s_b by the jackknife over these drives. DOUBT is a ridge on that slope: where each drive
+lies outside of what the others visit, w e' is all but zero on every one of them, and the slope would rest on nothing.
+The ridge on the coefficients shrinks them for the noise within drives, (2) shrinks their sum for what differs between
+drives. Efron & Morris, J. Am. Stat. Assoc. 68 (1973) 117.
 
 It is for models whose terms are free of the error: in one that feeds back, an amplitude would change its dynamics.
 
 SE is the rule of one standard error. Over the development splits of the NMC drive and the LG M50T in
 `aesi bench splits` (reduction of the squared error, mean; against the recalibrated physics, worst): 63.7 and -3.5 %
-with it, 64.0 and -9.3 % with half of it. KAPPA: 64.0 and -9.3 % with 0.1, 61.7 and -6.9 % with 1. DOUBT was chosen
-there as well.
+with it, 64.0 and -9.3 % with half of it. KAPPA: 64.0 and -9.3 % with 0.1, 61.7 and -6.9 % with 1. DOUBT
+was chosen there as well, but no figure of another value was kept.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The models that cost nothing, beside which every figure stands: physics without a correction, and persistence."""
+"""Baselines that nothing is fitted for, shown beside every figure: physics without a correction, and persistence."""
 
 from __future__ import annotations
 

@@ -19,7 +19,6 @@ from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.checks import check_record, check_same_cell
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
-from aesi.tracer.decide.archive import Archive, context_of
 from aesi.tracer.decide.evidence import Evidence, gathered
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
 from aesi.tracer.decide.verdict import Thresholds, Verdict
@@ -31,6 +30,7 @@ from aesi.tracer.report.outcome import FileOutcome, State, States, outcomes, tes
 from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.yardstick import Yardstick, measure
+from aesi.tracer.search.archive import Archive, context_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a person sees: one moving line on a terminal, plain lines elsewhere. All of it on stderr."""
+"""Messages and progress on stderr: on a terminal one line that is overwritten, plain lines elsewhere."""
 
 from __future__ import annotations
 

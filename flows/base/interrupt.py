@@ -1,7 +1,7 @@
 """Ctrl-C ends a command within two seconds, whatever is running.
 
-What is worth keeping is on disk at every moment, and a run that was cut off is closed by whoever comes next; so
-after a moment for a tidy end, in which Prefect and MLflow may not have finished, the process and its children go.
+What is worth keeping is on disk at every moment, and the next command closes a run that was cut off. So Prefect and
+MLflow get TIDY_S seconds to end by themselves, and then the process and its children are ended.
 """
 
 from __future__ import annotations

@@ -24,12 +24,14 @@ class Watch:
     """What is compared of a benchmark.
 
     case : fields that tell its lines apart.  higher, lower : figures that should not fall, or rise, by more than
-    the given share of what they were.
+    the given share of what they were.  together : the lines of a run are one picture: all are kept beside the one that
+    sums them up, and only the newest run's count.
     """
 
     case: tuple[str, ...] = ()
     higher: Mapping[str, float] = field(default_factory=dict)
     lower: Mapping[str, float] = field(default_factory=dict)
+    together: bool = False
 
 
 TIMING = 0.4
@@ -42,7 +44,10 @@ RATE = 0.03
 WATCHED = {
     "espm": Watch(("case",), higher={"ratio": TIMING}, lower={"rmse_mv": RESULT}),
     "dfn": Watch(
-        ("load", "who", "across", "in_particle"), higher={"ratio": TIMING}, lower={"rmse_mv": RESULT}
+        ("load", "record", "who", "across", "in_particle"),
+        higher={"ratio": TIMING},
+        lower={"rmse_mv": RESULT},
+        together=True,
     ),
     "ensemble": Watch(("terms", "lambda1", "rows", "candidates", "resamples"), higher={"ratio": TIMING}),
     "design": Watch(("setting", "cells", "candidates"), higher={"aesi_i_mean_pct": RATE}),
@@ -89,25 +94,36 @@ def write_history(path: Path, entries: Sequence[Entry]) -> None:
 
 
 def worth_keeping(lines: Iterable[Line]) -> tuple[Line, ...]:
-    """The lines, or where one of them sums up the others (`summary`), that one."""
+    """The lines; of a benchmark where one of them sums up the others (`summary`), that one alone."""
     found = tuple(lines)
-    return tuple(line for line in found if line.get("summary")) or found
+    summed = {line["bench"] for line in found if line.get("summary") and not _watch(line).together}
+    return tuple(line for line in found if line.get("summary") or line["bench"] not in summed)
 
 
 def latest(entries: Sequence[Entry]) -> dict[tuple[Any, ...], tuple[Entry, Line]]:
-    """The newest line of every case, with its entry."""
-    return {case_of(line): (entry, line) for entry in entries for line in entry.lines}
+    """The newest line of every case, with its entry; of lines that belong together, those of the newest run."""
+    newest = {line["bench"]: entry for entry in entries for line in entry.lines}
+    return {
+        case_of(line): (entry, line)
+        for entry in entries
+        for line in entry.lines
+        if not _watch(line).together or entry is newest[line["bench"]]
+    }
+
+
+def _watch(line: Mapping[str, Any]) -> Watch:
+    return WATCHED.get(line["bench"], Watch())
 
 
 def case_of(line: Mapping[str, Any]) -> tuple[Any, ...]:
     """What a line is about: its benchmark and the fields that tell its lines apart."""
-    watch = WATCHED.get(line["bench"], Watch())
+    watch = _watch(line)
     return (line["bench"], *(_plain(line.get(name)) for name in watch.case))
 
 
 def figures(line: Mapping[str, Any]) -> dict[str, float]:
     """The watched figures of a line."""
-    watch = WATCHED.get(line["bench"], Watch())
+    watch = _watch(line)
     names = (*watch.higher, *watch.lower)
     return {name: line[name] for name in names if isinstance(line.get(name), int | float)}
 

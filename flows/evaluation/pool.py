@@ -1,4 +1,4 @@
-"""What evaluates candidates, wherever it runs; and that whatever goes wrong inside one costs that one alone."""
+"""What a pool of evaluating processes offers, and how an exception inside a candidate fails that candidate alone."""
 
 from __future__ import annotations
 

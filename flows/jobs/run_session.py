@@ -1,4 +1,4 @@
-"""A tracked run from its start to its end, whichever end that is."""
+"""A tracked run from its start to its end: finished, failed, interrupted, or killed and closed later."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The evolutionary search over candidates: NSGA-II by Optuna, what it came to, one study of an experiment."""
+"""The evolutionary search over candidates: NSGA-II by Optuna, its result, and the study of an experiment."""

@@ -1,4 +1,4 @@
-"""A study as people see it: in Optuna's storage, with names a person reads, while the search goes on.
+"""The study as Optuna's dashboard shows it: in Optuna's storage, under readable names, while the search goes on.
 
 The search itself keeps its study in memory, because it is rebuilt from what is known of its candidates whenever it
 starts. This copy outlives the process: a journal file in the workspace, or the database of `runner.storage`. It

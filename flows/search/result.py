@@ -1,4 +1,4 @@
-"""What a search came to: its trials, the front, and the pick under given weights."""
+"""The result of a search: its trials, the Pareto front, and the pick under given weights."""
 
 from __future__ import annotations
 

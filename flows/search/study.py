@@ -28,7 +28,7 @@ OnScored = Callable[[int, Genome, ScoredCandidate | Failed], None]
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The search when it is over.
+    """The result of the search stage.
 
     key : content key of the chosen candidate.  scored : number -> outcome, of all candidates.
     """
@@ -40,7 +40,7 @@ class Found:
     scored: dict[int, ScoredCandidate | Failed]
 
     def candidates(self) -> tuple[Candidate, ...]:
-        """All that came to something."""
+        """All candidates that did not fail."""
         return tuple(one.candidate for one in self.scored.values() if not isinstance(one, Failed))
 
     def rows(self) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""What is known of a run while it is not finished: its record on disk, and who is alive.
+"""Unfinished runs: the record of each on disk, and whether a process still works on it.
 
 .aesi/state/<run id>.json holds experiment, config digest and status; .aesi/state/<run id>.lock is held by the
 process that works on the run, and the kernel frees it with that process.

@@ -108,13 +108,18 @@ def test_it_is_pure(effect, model):
 @each
 def test_it_vanishes_at_its_neutral_values(effect, model):
     skip_what_the_model_holds(effect, model)
-    neutral = {name: p.neutral for name, p in effect.parameters.items() if p.neutral is not None}
-    if not neutral:
+    if all(p.neutral is None for p in effect.parameters.values()):
         pytest.skip("has no point at which it vanishes")
-    assert (
-        np.abs(run(effect.activate(**neutral), model=model).voltage_v - BASES[model].voltage_v).max()
-        < NEUTRAL_V
-    )
+    moved = run(effect.activate_only(), model=model).voltage_v - BASES[model].voltage_v
+    assert np.abs(moved).max() < NEUTRAL_V
+
+
+@each
+def test_one_parameter_alone_leaves_the_others_where_they_do_nothing(effect):
+    for name, parameter in effect.parameters.items():
+        values = effect.activate_only(**{name: parameter.default}).parameters
+        assert values.pop(name) == parameter.default
+        assert all(effect.parameters[n].neutral in (None, v) for n, v in values.items())
 
 
 @each

@@ -23,7 +23,7 @@ from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.constants import MV_PER_V
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
-from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors, Unseen
+from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
 from aesi.records import Failed, Split
 from aesi.sparse import Genome, Options, Problem, evaluate
 from aesi.sparse.search.fold_models import fold_models, with_leverage
@@ -41,8 +41,8 @@ RIDGE, THRESHOLD = 10.0, 1e-3
 class _Errors:
     """Of one cell: what to calibrate on, and what came of the test records."""
 
-    calibration: HonestErrors
-    test: HonestErrors
+    calibration: OutOfSampleErrors
+    test: OutOfSampleErrors
 
 
 HalfWidths = dict[float, list[Array]]
@@ -136,10 +136,12 @@ def _errors(split: Split) -> _Errors | None:
     pairs += fold_models(problem, chosen)
     tested: list[Unseen] = [(model, record, WHOLE) for record in problem.split.test]
     train = problem.split.train
-    return _Errors(HonestErrors.of(pairs, train, HORIZONS_S), HonestErrors.of(tested, train, HORIZONS_S))
+    return _Errors(
+        OutOfSampleErrors.of(pairs, train, HORIZONS_S), OutOfSampleErrors.of(tested, train, HORIZONS_S)
+    )
 
 
-def _judged(test: HonestErrors, widths: HalfWidths, horizon: float) -> tuple[float, ...]:
+def _judged(test: OutOfSampleErrors, widths: HalfWidths, horizon: float) -> tuple[float, ...]:
     """Coverage, mean width, interval score, worst bin, and the score over that of the best constant width."""
     left, half = np.concatenate(test.by_horizon[horizon]), np.concatenate(widths[horizon])
     seen = np.isfinite(left)

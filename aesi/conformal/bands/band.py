@@ -22,9 +22,8 @@ class RawBand:
 class Band(ABC):
     """A fitted rule from the past to a raw band.
 
-    `batch` and `row` must agree: row k of `batch(residuals, current)` is
-    `row(residuals[:k], current[k - 3 : k + 1])`, the residuals as far back as the last missing one and as the
-    window reaches.
+    `batch` and `row` agree: row k of `batch(residuals, current)` is `row(past, current[k - 3 : k + 1])`, `past` the
+    residuals before k since the last missing one, at most the window.
     """
 
     kind: ClassVar[str]

@@ -53,7 +53,7 @@ class Method(ABC):
         rng: np.random.Generator | None = None,
         current_a: Sequence[Array] | None = None,
     ) -> Calibrated:
-        """Calibrate on honest residuals: held out or out of bag, never those of the fit.
+        """Calibrate on out-of-sample residuals: held out or out of bag, never those of the fit.
 
         residuals : one (n_i,) array a continuous record, V, all at one sampling rate; NaN is missing.
         alpha : share of misses allowed, in (0, 1).  window : samples of history.

@@ -25,11 +25,11 @@ from aesi.errors import FitError
 from aesi.numerics.typing import Array, BoolArray
 
 N_BLOCKS = 25
-"""Contiguous runs that the rows are cut into: long against the correlation of neighbours, and enough of them."""
+"""Contiguous runs that the rows are cut into, each long against the correlation of neighbours. A convention."""
 N_FOLDS = 5
 """Every fifth run is held out in turn, as is usual in cross-validation."""
 ENOUGH_ROWS = 20_000
-"""Above it a fifth of the rows scales the band to within half a per cent of coverage."""
+"""From here on one fold scales the band; a coverage of 90 % over its 4,000 rows has a standard error of 0.5 %."""
 
 
 @dataclass(frozen=True, kw_only=True)

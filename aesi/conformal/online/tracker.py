@@ -23,7 +23,7 @@ from numba import njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
 SHARED = 0.4
-"""Part of the rate with which a miss in one group moves all: a cell that drifts does so at every current."""
+"""Share of a step that the other groups take too, as drift of a cell shows at every current. A convention."""
 AIM = 0.95
 """Share of alpha that is aimed at. On 1,000 draws of 3,000 normal residuals an aim of alpha covers less than 1 -
 alpha on 42 %, one of 0.95 alpha on none (docs/theory/conformal.md)."""

@@ -3,8 +3,8 @@
 The LG M50 was taken apart and measured twice: Chen et al. 2020 (doi:10.1149/1945-7111/ab9050) and O'Regan et al. 2022
 (doi:10.1016/j.electacta.2022.140700). At 25 degC, half charge and 1 mol/l, PyBaMM's sets of the two differ by the
 natural logarithms in `DIFFERENCES`; where both are a draw about the truth, the standard deviation of one is the
-difference over the root of two. Of each electrode pair the closer one is taken, for both: the other's diffusivity
-differs 18-fold and its kinetics four-fold, and a cell file so far off says nothing that an effect could be told from.
+difference over the root of two. Of the two electrodes the smaller difference is used for both: the other one is 18-fold
+in diffusivity and four-fold in the rate constant, and no effect can be identified against a cell file that far off.
 Potentials and balance are as declared.
 
     python -m aesi.data.blind.spread

@@ -1,5 +1,4 @@
-"""What a measurement must be before anyone computes with it. Nothing is repaired here:
-each check passes, or raises a DataError that names file, column and first row.
+"""Checks of a measurement. Nothing is repaired: each passes, or raises a DataError naming file, column and first row.
 
 The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 V, -60 to 150 degC. Gaps are in
 `aesi.data.channels.gaps`; what only the columns together tell (a unit, a sign) in `aesi.data.channels.implausible`.

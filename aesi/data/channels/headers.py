@@ -1,4 +1,4 @@
-"""What a column's name suggests: for the sentences that propose an option, never for reading."""
+"""Guesses from the names of columns, for the options that error messages propose; no file is read by them."""
 
 from __future__ import annotations
 

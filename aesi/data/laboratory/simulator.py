@@ -1,6 +1,6 @@
 """One run of PyBaMM's SPMe or DFN on a BPX cell, with changes, under a current profile.
 
-What keeps it honest: the solver is stopped at every edge of the current and kept from long steps, so that no
+Against silent errors the solver is stopped at every edge of the current and kept from long steps, so that no
 pulse is stepped over; the charge of the model is compared with the integral of the current; a run that ends
 early is an error; radial points are dense at the surface of the particles, where the default's 20 even ones
 move the voltage by millivolts.

@@ -2,8 +2,8 @@
 
     T = T_declared + dT;   D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
-Leaves out gradients within the cell. Holds where the cell file declares activation energies; refused where
-it does not. A measured temperature is shifted too.
+Leaves out gradients within the cell. Holds where the cell file declares activation energies, and is refused where it
+declares none. A measured temperature is shifted too.
 
 Source: Arrhenius' law as BPX defines it, bpxstandard.com.
 """

@@ -6,8 +6,8 @@ A thicker coating holds more (as active_material_loss with a loss of 1 - f, lost
 balance and surface) and has a longer way through solid and electrolyte. The stoichiometries of the full cell stay;
 empty is at the declared rest voltage again.
 
-Leaves out the swelling of a running cell. Holds at any rate; below 1C the
-way through the electrolyte costs too little to tell it from active material.
+Leaves out the swelling of a running cell. Holds at any rate; below 1C the way through the electrolyte costs too little
+to tell it from active material.
 
 Source: definition; teardown thicknesses, Chen et al., J. Electrochem. Soc. 167 (2020) 080534,
 doi:10.1149/1945-7111/ab9050.

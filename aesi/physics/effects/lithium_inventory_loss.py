@@ -2,11 +2,10 @@
 
     q_n x_n + q_p x_p = Q_Li - loss Q,   U_p(x_p) - U_n(x_n) = V_full, V_empty       q capacity of an electrode, Ah
 
-Stoichiometry windows follow from the declared rest voltages of full and empty; a simulation starts from the
-rest voltage that soc0 declares.
+Stoichiometry windows follow from the declared rest voltages of full and empty; a simulation starts from the rest
+voltage that soc0 declares.
 
-Leaves out the film that consumed the lithium (film_growth). Holds for a cell that still reaches both
-voltages.
+Leaves out the film that consumed the lithium (film_growth). Holds for a cell that still reaches both voltages.
 
 Source: Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.011.
 """

@@ -6,8 +6,8 @@
 Shares the electrode's current with intercalation: on charge near phi = 0 some of it plates, and strips on the next
 discharge or at rest, which shows as a plateau.
 
-Leaves out lithium that dies and the film it leaves (film_growth, lithium_inventory_loss). Holds for little lithium,
-that does not cover the particles.
+Leaves out lithium that becomes inactive and the film it leaves (film_growth, lithium_inventory_loss). Holds for little
+lithium, which does not cover the particles.
 
 Source: O'Kane et al., J. Electrochem. Soc. 167 (2020) 090540, doi:10.1149/1945-7111/ab90ac.
 """

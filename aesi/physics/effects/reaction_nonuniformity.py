@@ -3,8 +3,8 @@
     Phi = U(x_r) + eta(i_r, x_r, c_r) + ohmic_r(i) + chi ln(c_r / c_mean),   sum i_r = I        r = 1..4 regions
     ohmic_r : mean drop in solid and electrolyte between region r, the collector and the separator
 
-Each region has a particle of its own and reacts with the electrolyte there. Its strength is 1: a share of it, or more
-than all of it, is no physics, so there is no parameter. `model="dfn"` resolves it, and replaces it where it matters.
+Each region has a particle of its own and reacts with the electrolyte there. The declared cell determines
+how uneven it is, so there is no parameter. `model="dfn"` resolves it fully, and takes its place where it matters.
 
 Leaves out what happens within a quarter of an electrode. Holds for thick electrodes, high rates, poor electrolyte, and
 flat open-circuit potentials.

@@ -42,7 +42,7 @@ class ScoredCandidate:
 
 
 def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> ScoredCandidate | Failed:
-    """Evaluate a genome, calibrate its intervals on honest residuals, and judge them on validation data."""
+    """Evaluate a genome, calibrate its intervals on out-of-fold residuals, and judge them on validation data."""
     started = time.perf_counter()
     outcome = evaluate(problem, genome, weights(config))
     if isinstance(outcome, Failed):
@@ -91,18 +91,18 @@ _Driven = tuple[Array, Array]
 def _roles(problem: Problem, candidate: Candidate, model: SparseModel) -> tuple[list[_Driven], list[_Driven]]:
     """Residuals to calibrate on and to judge on: the validation records, or where there are none the middle
     training record, by models and a calibration that have not seen it."""
-    honest = [
+    out_of_fold = [
         (each.stable_v if model is candidate.stability else each.one_step_v, record.current_a[1:])
         for each, record in zip(candidate.residuals, problem.split.train, strict=True)
     ]
     if problem.split.valid:
-        return honest, [_residual(model, record) for record in problem.split.valid]
-    if len(honest) == 1:
-        residual, current = honest[0]
+        return out_of_fold, [_residual(model, record) for record in problem.split.valid]
+    if len(out_of_fold) == 1:
+        residual, current = out_of_fold[0]
         cut = len(residual) // 2
-        honest = [(residual[:cut], current[:cut]), (residual[cut:], current[cut:])]
-    middle = len(honest) // 2
-    return honest[:middle] + honest[middle + 1 :], [honest[middle]]
+        out_of_fold = [(residual[:cut], current[:cut]), (residual[cut:], current[cut:])]
+    middle = len(out_of_fold) // 2
+    return out_of_fold[:middle] + out_of_fold[middle + 1 :], [out_of_fold[middle]]
 
 
 def _residual(model: SparseModel, record: ErrorSeries) -> _Driven:

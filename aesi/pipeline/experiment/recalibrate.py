@@ -190,7 +190,8 @@ class _Fit:
                 values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
         shift = values.pop(SOC0, {}).get("shift", 0.0)
         volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
-        cell = model_with(self.declared, _activated(values)).cell
+        effects = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
+        cell = model_with(self.declared, effects).cell
         ohm = self.declared.contact_resistance_ohm + volts_at_1c / self.declared.nominal_capacity_ah
         cell = replace(cell, contact_resistance_ohm=ohm)
         return PhysicsStart(self.declared, cell, self.effects, shift, tuple(z.tolist()), self.model)
@@ -237,17 +238,3 @@ class _Fit:
     def _ohm(self) -> float:
         """One deviation of the contact resistance."""
         return KNOBS[RESISTOR[0]].deviation / self.declared.nominal_capacity_ah
-
-
-def _activated(values: Mapping[str, Mapping[str, float]]) -> tuple[ActiveEffect, ...]:
-    return tuple(_active(owner, given) for owner, given in values.items())
-
-
-def _active(owner: str, given: Mapping[str, float]) -> ActiveEffect:
-    """The effect with the given values, and all others where they change nothing."""
-    effect = CATALOGUE[owner]
-    neutral = {
-        name: parameter.default if parameter.neutral is None else parameter.neutral
-        for name, parameter in effect.parameters.items()
-    }
-    return effect.activate(**{**neutral, **given})

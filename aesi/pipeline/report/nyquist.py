@@ -36,8 +36,9 @@ def nyquist(spectra: Sequence[SpectrumError]) -> Figure:
             x=MILLI * spectrum.z_ohm.real, y=-MILLI * spectrum.z_ohm.imag, mode="lines", name=f"{name}, model",
             line={"color": colour}, legendgroup=name, text=text,
         )  # fmt: skip
-    figure.update_xaxes(title="real part, mOhm")
-    figure.update_yaxes(title="negative imaginary part, mOhm", scaleanchor="x")
+    figure.update_xaxes(title="real part, mOhm", constrain="domain")
+    figure.update_yaxes(title="negative imaginary part, mOhm", scaleanchor="x", constrain="domain")
+    figure.update_layout(margin={"t": 40}, height=560)
     return figure
 
 
@@ -54,7 +55,8 @@ def write_nyquist(path: Path, cell: str, spectra: Sequence[SpectrumError]) -> Pa
     parts = [f"<h1>Impedance of {escape(cell)}</h1>"]
     for label, group in groups.items():
         parts.append(f"<h2>{label} degC: points measured, lines the model</h2>")
-        parts.append(nyquist(group).to_html(full_html=False, include_plotlyjs=False))
+        figure = nyquist(group)
+        parts.append(figure.to_html(full_html=False, include_plotlyjs=False, config={"responsive": True}))
     page = "\n".join(parts)
     path.write_text(
         f"<!doctype html><html><head><meta charset='utf-8'><title>{escape(cell)}</title>"

@@ -13,7 +13,7 @@ from aesi.pipeline.report.sizes import refit_does_as_well, with_size
 from aesi.pipeline.report.views import DiscoveryView, Row, RunView
 
 LARGE_SHARE = 0.5
-"""An explainable rest above this share of the remaining error is worth a sentence."""
+"""Of the remaining error: where a sparse correction could still explain more, a sentence says so. A convention."""
 NEARLY = 0.98
 """A one-step error above this share of persistence's is called no better than it."""
 CERTAIN = 0.99

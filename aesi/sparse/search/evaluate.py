@@ -33,7 +33,7 @@ class FitnessWeights:
 
 
 @dataclass(frozen=True, eq=False)
-class HonestResiduals:
+class OutOfFoldResiduals:
     """Out-of-fold prediction errors, for the calibration of intervals: each by models that were not fitted to its row.
 
     one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
@@ -47,7 +47,7 @@ class HonestResiduals:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """What became of a genome.
+    """A genome, fitted and judged.
 
     loss_oob, loss_valid : mean squared error over that of the bare physics model on the same samples, in the
     problem's regime (1 is no better than none). loss_oob is the mean over the members, see out_of_bag.py.
@@ -74,7 +74,7 @@ class Candidate:
     one_step_valid_rmse_v: float
     bagging: SparseModel
     stability: SparseModel
-    residuals: tuple[HonestResiduals, ...]
+    residuals: tuple[OutOfFoldResiduals, ...]
     fold_sums: Array
     valid_losses: tuple[float, float]
 
@@ -151,7 +151,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         one_step_valid_rmse_v=valid.one_step_rmse_v,
         bagging=bagging,
         stability=stability,
-        residuals=_honest(problem, runs),
+        residuals=_out_of_fold(problem, runs),
         fold_sums=runs.sums[:2],
         valid_losses=valid_losses,
     )
@@ -163,10 +163,10 @@ def fitness(losses: tuple[float, float, float], library_size: int, weights: Fitn
     return 1.0 - (weights.oob * oob + weights.valid * valid + weights.sparse * sparse / library_size)
 
 
-def _honest(problem: Problem, runs: FoldRuns) -> tuple[HonestResiduals, ...]:
+def _out_of_fold(problem: Problem, runs: FoldRuns) -> tuple[OutOfFoldResiduals, ...]:
     left = problem.scaling.error_volts_per_unit * (problem.target[:, None] - runs.one_step[:, :2])
     return tuple(
-        HonestResiduals(record.name, left[a:b, 0], left[a:b, 1])
+        OutOfFoldResiduals(record.name, left[a:b, 0], left[a:b, 1])
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)
     )
 

@@ -1,7 +1,6 @@
 """The models behind free-run residuals: each fitted on all training rows but one long piece, and that piece.
 
-The search may judge candidates on shorter pieces (`Options.fold`); a free run shows what it drifts by only over
-a long one.
+The search may judge candidates on shorter pieces (`Options.fold`); the drift of a free run shows only over a long one.
 """
 
 from __future__ import annotations
@@ -24,7 +23,8 @@ from aesi.sparse.stridge import STRidge
 from aesi.sparse.trained_region import TrainedRegion
 
 N_PIECES = 12
-"""Long enough to drift, short enough that the models without them are nearly the one that is judged."""
+"""Pieces of all training data: long enough for drift to show, and short enough that a fit without one is nearly the
+fit to all. A convention."""
 
 
 def fold_models(

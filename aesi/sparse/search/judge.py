@@ -64,7 +64,8 @@ def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, ro
 class FoldRuns:
     """(n, 3) scaled predictions, by regime: of the fold's fit, its refit of the stable terms, and AESI I.
 
-    from_none : the free run that no measured error starts (`free_run` where the error feeds back).
+    from_none : a free run by the inputs alone, without a measured error at its start (`free_run` where the error feeds
+    back).
     amplitudes : of the three (fade.py).  sums : (3, n_folds, 3) over each fold, of e**2, e p and p**2 with p the
     prediction from none before its amplitude, in free run; scaled.
     """
@@ -180,7 +181,7 @@ def _relative_loss(truth: Sequence[Array], predictions: Sequence[Array], balance
 
 
 def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[SparseModel]) -> tuple[Judged, ...]:
-    """A verdict a model: on validation records, or where there are none on the left-out pieces.
+    """How each model did on the validation records, or where there are none on the left-out pieces.
 
     models : AESI I and II, or a single one; on pieces the fold's fit and its refit stand for them.
     """

@@ -1,8 +1,8 @@
-"""What a search is worth on a drive that chose nothing: selection repeated without each drive in turn.
+"""Nested cross-validation of a search: the whole selection repeated without each drive in turn.
 
-For each left-out drive the candidate, and its amplitude, are chosen by the other drives; what that leaves of the drive
-is what a search tells of the next one. The terms' coefficients come from fits without the drive as well. What a search
-reports of its own pick is better than that: the pick is the luckiest of many.
+For each left-out drive the candidate and its amplitude are chosen by the other drives, with coefficients from fits
+without it; the error on that drive then estimates the error on a drive that nobody has seen. The validation loss that a
+search reports of its own pick is optimistic, since the pick is the best of many (selection bias).
 Varma & Simon, BMC Bioinformatics 7 (2006) 91, doi:10.1186/1471-2105-7-91.
 """
 

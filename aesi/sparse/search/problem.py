@@ -4,13 +4,13 @@ All candidates of a search are judged on the same resamples (common random numbe
 can be computed once for the whole library and sliced. Three kinds of row weights are fitted:
 
 - moving-block bootstrap resamples, for the ensemble and its out-of-bag loss;
-- folds: all rows but one contiguous piece, for honest residuals, and for the validation loss where there
+- folds: all rows but one contiguous piece, for out-of-fold residuals, and for the validation loss where there
   are no validation records;
 - all rows, for the refit after stability selection.
 
-Out-of-bag and validation losses are taken in free run inside pieces of `horizon` rows, each started from its
-measured error (`regime="one_step"` for the loss as the paper prints it). One-step losses
-cannot tell a good simulator from one that repeats the last measured error.
+Out-of-bag and validation losses are taken in free run inside pieces of `horizon` rows, each started from its measured
+error (`regime="one_step"` for the loss as the paper prints it). One-step losses cannot tell a good simulator from one
+that repeats the last measured error.
 """
 
 from __future__ import annotations

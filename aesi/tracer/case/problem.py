@@ -102,14 +102,12 @@ class InverseProblem:
         other words there (windows by voltages), and a fit must not see a step."""
         return (
             *self.fixed,
-            *(self._activated(owner, given) for owner, given in values.items() if owner != STATE_OF_CHARGE),
+            *(
+                self.effects[owner].activate_only(**given)
+                for owner, given in values.items()
+                if owner != STATE_OF_CHARGE
+            ),
         )
-
-    def _activated(self, owner: str, values: Mapping[str, float]) -> ActiveEffect:
-        """An effect at these values, its other parameters where they do nothing."""
-        effect = self.effects[owner]
-        still = {name: p.neutral for name, p in effect.parameters.items() if p.neutral is not None}
-        return effect.activate(**{**still, **values})
 
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
         """(n,) V over the fit parts of all records, or of one; None where the model fails."""

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.numerics.typing import Array, BoolArray
+from aesi.data.thinning import Spacing, averaged_over, condensed, current_steps, is_steady
+from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import Basis, initial_state
 from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
-from aesi.tracer.case.thinning import averaged_over, condensed
 
 THIN_STEP_S = 1.0
 """Fits see at most one sample a second: nothing in the catalogue is faster than that and yet
@@ -26,12 +26,7 @@ FIT_SAMPLES = 12_000
 """Of all records together: above it windows are doubled, since the time of a fit grows with its rows."""
 STEADY_SAMPLES = 600
 """Rows that a record of steady currents is spread over."""
-STEADY_C_RATE = 0.01
-"""A change of the current by more than this is a step; a record with fewer steps than STEADY_SHARE of its rows is one
-of steady currents."""
-STEADY_SHARE = 0.01
-UNEVEN_SHARE = 0.01
-"""Of the samples: averages over equal numbers of rows need equal times between them."""
+STEADY_SPACING = Spacing(first_s=0.5, growth=0.25)
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
 SMALLEST_NOISE_V = 5e-5
@@ -130,14 +125,11 @@ def prepare(
     model has.  shared : True where `soc0` was given for several records.
     Raises DataError where the record is too short or its initial state cannot be known.
     """
-    gaps = np.diff(data.time_s)
     hold: Hold = data.hold or assumed_hold(data.time_s)
     duration = float(data.time_s[-1] - data.time_s[0])
-    steps = _current_steps(cell, data)
-    typical = float(np.median(gaps))
-    uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
-    if uneven or float(np.mean(steps)) < STEADY_SHARE:
-        thin, rows = condensed(data, steps, duration / STEADY_SAMPLES)
+    steps = current_steps(data, cell.nominal_capacity_ah)
+    if is_steady(data, steps):
+        thin, rows = condensed(data, steps, duration / STEADY_SAMPLES, STEADY_SPACING)
     else:
         thin, rows = averaged_over(data, step_s), None
     thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
@@ -178,11 +170,6 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
         f"{data.name}: simulated at its measured temperature, {low:.1f} to {high:.1f} degC; effects that would infer "
         "it (self_heating, ambient_temperature) do not compete for this record.",
     )
-
-
-def _current_steps(cell: Cell, data: Measurement) -> BoolArray:
-    """(n - 1,) True where the current of a row is another than that of the row before."""
-    return np.abs(np.diff(data.current_a)) > STEADY_C_RATE * cell.nominal_capacity_ah
 
 
 def prepare_test(

@@ -1,1 +1,1 @@
-"""From scores to a verdict: forward search, admission, look-alikes, adequacy, carry-over."""
+"""From a search to a verdict: the model of the cell, look-alikes, adequacy, confidence, carry-over."""

@@ -8,21 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem, Trust
-from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.one_cause import in_one
-from aesi.tracer.decide.search import (
-    Path,
-    Report,
-    base_of,
-    refitted,
-    searched,
-    unseen_rmse_v,
-    with_wrong_parameters,
-)
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
@@ -36,6 +26,11 @@ from aesi.tracer.decide.verdict import (
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import base_of
+from aesi.tracer.search.forward import refitted, searched
+from aesi.tracer.search.path import Path, Report, unseen_rmse_v
+from aesi.tracer.search.wrong_parameters import with_wrong_parameters
 
 AS_DECLARED_NATS = 5.0
 """Own parameters as declared are believed where freeing them says no more than this."""
@@ -135,8 +130,8 @@ def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tupl
 
 def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:
     """Does the model say as much with its parameters all but as declared? Then no effect can stand in for them."""
-    based = base_of(exact, archive)
-    return based is not None and based[2].score.total > tight.chosen.score.total - AS_DECLARED_NATS
+    base = base_of(exact, blocks_of(exact), archive)
+    return base is not None and base.score.total > tight.chosen.score.total - AS_DECLARED_NATS
 
 
 def _sharpened(
@@ -172,15 +167,16 @@ def _recalibrated(
 ) -> tuple[InverseProblem, FittedHypothesis] | None:
     """The declared model with its own parameters open as far as that carries over: of the fits that do no worse than
     the declared ones on what they saw, the one that leaves least on parts left out; None where there is none."""
-    based = base_of(replace(problem, trust="loose"), archive)
-    loose = [] if based is None else [(based[0], based[2])]
+    loose = replace(problem, trust="loose")
+    base = base_of(loose, blocks_of(loose), archive)
+    open_wide = [] if base is None else [(loose, base)]
     declared = ModelState(problem)
     errors = [
         (record.thin.voltage_v - declared.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
         for k, record in enumerate(problem.records)
     ]
     most = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
-    tried = [one for one in (*loose, (tight.problem, tight.base)) if one[1].rmse_v <= most]
+    tried = [one for one in (*open_wide, (tight.problem, tight.base)) if one[1].rmse_v <= most]
     return min(tried, key=lambda one: left_out_errors(one[0], tight.blocks, one[1]).pooled_v, default=None)
 
 

@@ -13,18 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
+from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
-from aesi.tracer.decide.archive import Archive
 from aesi.tracer.decide.evidence import Evidence
-from aesi.tracer.decide.search import (
-    HOPELESS_SHARE,
-    REFIT_STEPS,
-    Path,
-    base_of,
-    beyond_noise,
-    fitted_hypothesis,
-)
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import REFIT_STEPS, base_of, fitted_hypothesis
+from aesi.tracer.search.forward import HOPELESS_SHARE
+from aesi.tracer.search.path import Path, beyond_noise
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
@@ -49,22 +45,24 @@ def with_model(
     reduction = reduction_of(problem)
     differ = "" if reduction is None else f"; {reduction.sentence}"
 
-    def searched(name: ModelName) -> tuple[InverseProblem, Evidence]:
-        one = with_fine_numerics(replace(problem, model=name))
-        return one, search(one, kept(one))
+    def fine(name: ModelName) -> InverseProblem:
+        return with_fine_numerics(replace(problem, model=name))
 
     def told(evidence: Evidence, name: ModelName, why: str = "") -> tuple[Evidence, ModelChoice]:
         words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
         return evidence, ModelChoice(name, words, reduction)
 
     if wanted is not None:
-        return told(searched(wanted)[1], wanted, ", as asked")
-    single, first = searched("espm")
+        one = fine(wanted)
+        return told(search(one, kept(one)), wanted, ", as asked")
+    single = fine("espm")
+    first = search(single, kept(single))
     if reduction is None or not reduction.notable:
         return told(first, "espm")
-    if first.verdict.word == "unknown" and not _takes_off(problem, first.paths["tight"], kept):
+    full = fine("dfn")
+    if first.verdict.word == "unknown" and not _takes_off(full, first.paths["tight"], kept):
         return told(first, "espm", ", what it leaves is not taken off by the other one")
-    full, second = searched("dfn")
+    second = search(full, kept(full))
     if _believed(first, second) and _says_more(single, full, kept):
         ahead = first.path.chosen.score.total - second.path.chosen.score.total
         return told(
@@ -73,9 +71,8 @@ def with_model(
     return told(second, "dfn")
 
 
-def _takes_off(problem: InverseProblem, path: Path, kept: Kept) -> bool:
+def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
     """Does the porous electrode leave notably less of unseen data with what the single particle ended with?"""
-    full = with_fine_numerics(replace(problem, model="dfn"))
     chosen = path.chosen
     fit = fitted_hypothesis(
         full, path.blocks, chosen.hypothesis, chosen.placed, chosen.score.delta_v, REFIT_STEPS, kept(full)
@@ -97,7 +94,7 @@ def _believed(single: Evidence, full: Evidence) -> bool:
 
 def _says_more(single: InverseProblem, full: InverseProblem, kept: Kept) -> bool:
     """Does the single particle as declared, but for its own parameters, say more than the porous electrode?"""
-    bases = [base_of(one, kept(one)) for one in (single, full)]
-    if bases[0] is None:
+    alone, fuller = (base_of(one, blocks_of(one), kept(one)) for one in (single, full))
+    if alone is None:
         return False
-    return bases[1] is None or bases[0][2].score.total > bases[1][2].score.total
+    return fuller is None or alone.score.total > fuller.score.total

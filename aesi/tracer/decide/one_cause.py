@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from aesi.physics.effect import Effect
-from aesi.tracer.decide.archive import Archive
-from aesi.tracer.decide.search import ALIKE_NATS, BASE_STEPS, Path, Step, fitted_hypothesis
 from aesi.tracer.decide.verdict import GROUP_SIZE
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import ALIKE_NATS, BASE_STEPS, fitted_hypothesis
+from aesi.tracer.search.path import Path, Step
 
 
 def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:

@@ -11,9 +11,9 @@ from typing import Literal
 
 import numpy as np
 
-from aesi.tracer.decide.search import Path, unseen_rmse_v
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V
+from aesi.tracer.search.path import Path, unseen_rmse_v
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from aesi.tracer.decide.search import NINETY, Path
 from aesi.tracer.decide.verdict import Verdict
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
+from aesi.tracer.search.path import Path
+from aesi.tracer.search.wrong_parameters import NINETY
 
 
 @dataclass(frozen=True)

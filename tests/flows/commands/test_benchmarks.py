@@ -137,6 +137,19 @@ def test_a_line_that_sums_up_stands_for_the_others():
     rows = [{"bench": "blind", "case": "a"}, {"bench": "blind", "summary": True}]
     assert worth_keeping(rows) == (rows[1],)
     assert worth_keeping(rows[:1]) == (rows[0],)
+    assert worth_keeping([{"bench": "espm"}, *rows]) == ({"bench": "espm"}, rows[1])
+
+
+def test_the_lines_of_one_picture_are_kept_and_shown_together():
+    old, new = (
+        Entry("2026", "0", "here", None, worth_keeping(rows))
+        for rows in (
+            [{"bench": "dfn", "who": "ours", "across": 6}, {"bench": "dfn", "summary": True, "ratio": 90.0}],
+            [{"bench": "dfn", "who": "ours", "across": 7}, {"bench": "dfn", "summary": True, "ratio": 90.0}],
+        )
+    )
+    shown = [line.get("across") for _, line in latest([old, new]).values()]
+    assert shown == [7, None]
 
 
 def test_what_is_watched_exists():

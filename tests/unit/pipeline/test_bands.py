@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE
-from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors
+from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors
 from aesi.records import ErrorSeries, FreeRun
 
 N, DT = 400, 1.0
@@ -35,14 +35,14 @@ def drive() -> ErrorSeries:
 
 def test_a_piece_at_either_end_was_extrapolated(drive) -> None:
     pieces = [slice(a, a + 100) for a in (0, 100, 200, 300)]
-    errors = HonestErrors.of([(Held(), drive, piece) for piece in pieces], (drive,), (10.0,))
+    errors = OutOfSampleErrors.of([(Held(), drive, piece) for piece in pieces], (drive,), (10.0,))
     inside = [rows[piece] for rows, piece in zip(errors.inside, pieces, strict=True)]
     assert [bool(rows.any()) for rows in inside] == [False, True, True, False]
     assert inside[1].mean() > 0.95
 
 
 def test_only_what_a_model_has_not_seen_counts(drive) -> None:
-    errors = HonestErrors.of([(Held(), drive, slice(100, 200))], (drive,), (10.0,))
+    errors = OutOfSampleErrors.of([(Held(), drive, slice(100, 200))], (drive,), (10.0,))
     for (left,) in errors.by_horizon.values():
         np.testing.assert_array_equal(np.flatnonzero(np.isfinite(left)), np.arange(100, 200))
     # The measurement 10 s before the piece is there, and a free run enters it with what it has drifted by.
@@ -62,13 +62,13 @@ def test_another_record_is_inside_where_the_training_went(drive) -> None:
         drive.model_v,
         drive.input_names,
     )
-    errors = HonestErrors.of([(Held(), other, WHOLE), (Held(), beyond, WHOLE)], (drive,), ())
+    errors = OutOfSampleErrors.of([(Held(), other, WHOLE), (Held(), beyond, WHOLE)], (drive,), ())
     assert errors.inside[0].all()
     assert 0 < errors.inside[1].mean() < 0.7
 
 
 def test_errors_are_those_of_the_horizon(drive) -> None:
-    errors = HonestErrors.of([(Held(), drive, WHOLE)], (drive.take(slice(0, N), "other"),), (10.0,))
+    errors = OutOfSampleErrors.of([(Held(), drive, WHOLE)], (drive.take(slice(0, N), "other"),), (10.0,))
     (ahead,) = errors.by_horizon[10.0]
     assert np.isnan(ahead[:10]).all()
     np.testing.assert_allclose(ahead[10:], 1e-4)
@@ -76,14 +76,14 @@ def test_errors_are_those_of_the_horizon(drive) -> None:
 
 
 def test_a_model_that_holds_nothing_at_an_edge_reaches_nowhere(drive) -> None:
-    errors = HonestErrors.of([(Held(), drive, WHOLE)], (drive,), (10.0,))
+    errors = OutOfSampleErrors.of([(Held(), drive, WHOLE)], (drive,), (10.0,))
     assert errors.reach.keys() == errors.by_horizon.keys()
     assert not any(each[0].any() for each in errors.reach.values())
 
 
 def test_a_left_out_piece_is_as_far_from_the_charges_of_the_others_as_they_lie(drive) -> None:
     half = slice(N // 2, N)
-    errors = HonestErrors.of([(Held(), drive, half), (Held(), drive, slice(1, 1))], (drive,), (10.0,))
+    errors = OutOfSampleErrors.of([(Held(), drive, half), (Held(), drive, slice(1, 1))], (drive,), (10.0,))
     left, nothing = errors.gap
     assert left[: N // 2].max() < 1e-6
     assert (np.diff(left[half][10:]) >= 0).all()

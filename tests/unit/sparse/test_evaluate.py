@@ -72,13 +72,13 @@ def test_free_runs_of_the_search_equal_those_of_the_model(feedback_problem):
     assert callable(sparse_model)
 
 
-def test_residuals_are_honest_and_complete(problem, split):
+def test_residuals_are_out_of_fold_and_complete(problem, split):
     candidate = evaluate(problem, whole(problem, 1e-2, 1e-2, feedback=False))
-    assert [honest.record for honest in candidate.residuals] == ["record", "second"]
-    for honest, record in zip(candidate.residuals, split.train, strict=True):
-        assert len(honest.one_step_v) == len(record) - 1
+    assert [out_of_fold.record for out_of_fold in candidate.residuals] == ["record", "second"]
+    for out_of_fold, record in zip(candidate.residuals, split.train, strict=True):
+        assert len(out_of_fold.one_step_v) == len(record) - 1
         # What is left is the noise of 0.5 mV.
-        assert np.std(honest.one_step_v) == pytest.approx(5e-4, rel=0.2)
+        assert np.std(out_of_fold.one_step_v) == pytest.approx(5e-4, rel=0.2)
 
 
 def test_without_validation_records_aesi_i_was_always_chosen(problem):

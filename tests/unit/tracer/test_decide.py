@@ -8,14 +8,14 @@ import pytest
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
-from aesi.tracer.decide.archive import Archive, context_of, identity
 from aesi.tracer.decide.carry_over import left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
-from aesi.tracer.decide.search import searched
 from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
+from aesi.tracer.search.archive import Archive, context_of, identity
+from aesi.tracer.search.forward import searched
 
 NEVER = Archive(None, "")
 

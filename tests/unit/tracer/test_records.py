@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aesi.data.thinning import averaged_over
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
 from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test
-from aesi.tracer.case.thinning import averaged_over
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from aesi.data.thinning import condensed, current_steps
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
+from aesi.tracer.case.records import STEADY_SPACING
 from aesi.tracer.case.stepping import STEPS_A_SAMPLE, stepping
-from aesi.tracer.case.thinning import condensed
 
 
 @pytest.fixture
@@ -17,7 +18,7 @@ def pulses(cell):
     current = np.where(time % 3600 < 10, 60.0, 0.0)
     current[0] = 0.0
     data = Measurement(time, current, np.full(len(time), 3.7), name="pulses")
-    return condensed(data, np.abs(np.diff(current)) > 0.3, 300.0)[0]
+    return condensed(data, current_steps(data, cell.nominal_capacity_ah), 300.0, STEADY_SPACING)[0]
 
 
 def test_a_drive_at_a_sample_a_second_is_stepped_as_declared(make):

@@ -24,7 +24,7 @@ WHOLE = slice(1, None)
 
 
 @dataclass(frozen=True, eq=False)
-class HonestErrors:
+class OutOfSampleErrors:
     """What predictions left of the error on samples their models had not seen, one (n_i,) array a record.
 
     by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
@@ -46,7 +46,7 @@ class HonestErrors:
     @classmethod
     def of(
         cls, pairs: Sequence[Unseen], train: Sequence[ErrorSeries], horizons_s: Sequence[float]
-    ) -> HonestErrors:
+    ) -> OutOfSampleErrors:
         """train : the training records of all the models of the pairs, pieces left out included."""
         runs = [model.free_run(series) for model, series, _ in pairs]
         by_horizon = {h: [error_ahead(model, series, h) for model, series, _ in pairs] for h in horizons_s}

@@ -16,7 +16,7 @@ from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
-from aesi.pipeline.experiment.intervals.bands import WHOLE, HonestErrors, Unseen
+from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
 from aesi.records import HeldOutDrive
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
@@ -70,7 +70,7 @@ def _conformalised(
         except FitError as error:
             notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
     try:
-        errors = HonestErrors.of(pairs, problem.split.train, config.conformal.horizons_s)
+        errors = OutOfSampleErrors.of(pairs, problem.split.train, config.conformal.horizons_s)
         bands = errors.bands(config.conformal.alpha)
         if any(band.extrapolated for band in bands.horizons):
             notes.append(

@@ -1,18 +1,46 @@
-"""Fewer rows for the tracer: drives are averaged, steady records keep their rows after each step of the current."""
+"""Fewer rows for fits: charge is kept, and a pulse stays a pulse at any rate of sampling.
+
+Drives are averaged over centred windows. Tests of steady currents, pulses and rests, and records with uneven times,
+keep rows that are dense after each step of the current and ever sparser with the time since it.
+"""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray
 from aesi.records import Measurement
 
-FIRST_STEP_S = 0.5
-"""Distance of the first rows after a step."""
-STEP_GROWTH = 0.25
-"""Rows of a steady record are this share of the time since the current's last step apart, and of this much more."""
+STEP_C_RATE = 0.01
+"""A change of the current by more than this is a step."""
+STEADY_SHARE = 0.01
+"""Of the rows of a record: one with fewer steps is one of steady currents."""
+UNEVEN_SHARE = 0.01
+"""Of the rows: averages over equal numbers of rows need equal times between them."""
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """How rows of a steady record thin out: `first_s` s apart after a step of the current, and further on `growth`
+    of the time since that step."""
+
+    first_s: float
+    growth: float
+
+
+def current_steps(data: Measurement, capacity_ah: float) -> BoolArray:
+    """(n - 1,) True where the current of a row is another than that of the row before."""
+    return np.abs(np.diff(data.current_a)) > STEP_C_RATE * capacity_ah
+
+
+def is_steady(data: Measurement, steps: BoolArray) -> bool:
+    """True for a record of steady currents, or of uneven times; False for a drive.  steps : see `current_steps`."""
+    gaps = np.diff(data.time_s)
+    typical = float(np.median(gaps))
+    uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
+    return uneven or float(np.mean(steps)) < STEADY_SHARE
 
 
 def averaged_over(data: Measurement, step_s: float) -> Measurement:
@@ -48,10 +76,12 @@ def averaged_over(data: Measurement, step_s: float) -> Measurement:
     )
 
 
-def condensed(data: Measurement, steps: BoolArray, longest_s: float) -> tuple[Measurement, Array]:
+def condensed(
+    data: Measurement, steps: BoolArray, longest_s: float, spacing: Spacing
+) -> tuple[Measurement, Array]:
     """A record of steady currents and rests with few rows where little happens, and how many each stands for.
 
-    steps : (n - 1,) True where the current changes.  longest_s : the most that a row may stand for.
+    steps : see `current_steps`.  longest_s : the most that a row may stand for.
     Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
     rate of sampling. Voltage, temperature and time are averages of the rows that one stands for; the current is what
     moves the charge of the record, as its logger held it ("backward").
@@ -61,8 +91,8 @@ def condensed(data: Measurement, steps: BoolArray, longest_s: float) -> tuple[Me
     first = np.concatenate([[True], steps])
     began = np.maximum.accumulate(np.where(first, np.arange(n), 0))
     since = t - t[np.maximum(began - 1, 0)]
-    even = max(longest_s / STEP_GROWTH - FIRST_STEP_S, 0.0)
-    place = np.log1p(np.minimum(since, even) / FIRST_STEP_S) / STEP_GROWTH
+    even = max(longest_s / spacing.growth - spacing.first_s, 0.0)
+    place = np.log1p(np.minimum(since, even) / spacing.first_s) / spacing.growth
     place = np.floor(place + np.maximum(since - even, 0.0) / longest_s)
     opens = first | np.concatenate([[True], np.diff(place) != 0.0])
     opens[[1, -1]] = True

@@ -1,0 +1,154 @@
+"""Forward search: the effect that says most of unseen data is added while that is admitted.
+
+A step grows every effect on the hypotheses kept so far, the rest to first order, and fits the best of them with the
+whole model. What is kept of it is frozen evidence, from which a verdict follows without another simulation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from aesi.numerics.typing import Array
+from aesi.tracer.case.blocks import Blocks, blocks_of
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.growth import Grown, Parent
+from aesi.tracer.likelihood.surrogates import admission_nats
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import BASE_STEPS, REFIT_STEPS, base_of, fitted_hypothesis
+from aesi.tracer.search.grown import promising, side_by_side
+from aesi.tracer.search.path import Path, Report, Step, beyond_noise, unseen_rmse_v
+
+FINALISTS = 6
+"""Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
+before, so what it says of a right effect can be far too little."""
+BEAM = 2
+"""Hypotheses that a further effect is tried on."""
+HOPELESS_SHARE = 0.7
+"""Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
+LEAST_V = 1.5e-4
+"""What an effect has to take off the error on unseen data, as squares: less is within what two solvers of one model
+differ by."""
+
+
+def searched(
+    problem: InverseProblem,
+    max_effects: int,
+    enough: Callable[[Blocks, FittedHypothesis], bool],
+    archive: Archive,
+    report: Report = lambda problem, one, gain: None,
+) -> Path | None:
+    """Grow from the bare model until nothing more is admitted, at most `max_effects` effects.
+
+    enough : is what a hypothesis leaves within what a right one leaves? Then nothing is added that does not say much.
+    """
+    blocks = blocks_of(problem)
+    base = base_of(problem, blocks, archive)
+    if base is None:
+        return None
+    steps: list[Step] = []
+    notes: list[str] = []
+    parents, chosen = [base], base
+    slopes: dict[str, Array] = {}
+    for _ in range(max_effects):
+        step, refused = _step(problem, blocks, parents, chosen, slopes, archive, report)
+        slopes = slopes or {g.hypothesis[-1]: g.slopes_v for g in step.grown}
+        notes += refused
+        steps.append(step)
+        if step.admitted is None:
+            break
+        left = [beyond_noise(problem, blocks, fit) for fit in (chosen, step.admitted)]
+        chosen = step.admitted
+        if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
+            break
+        others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
+        parents = [chosen, *others][:BEAM]
+    chosen = _pruned(problem, blocks, chosen, steps, archive, report)
+    return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
+
+
+def _pruned(
+    problem: InverseProblem,
+    blocks: Blocks,
+    chosen: FittedHypothesis,
+    steps: Sequence[Step],
+    archive: Archive,
+    report: Report,
+) -> FittedHypothesis:
+    """The hypothesis without effects that it does not need once the others are in."""
+    least_nats = max((step.admission_nats for step in steps), default=0.0)
+    while len(chosen.hypothesis) > 1:
+        best: FittedHypothesis | None = None
+        for name in chosen.hypothesis[:-1]:  # the last one was admitted on top of the others
+            rest = tuple(other for other in chosen.hypothesis if other != name)
+            start, size = chosen.placed, chosen.score.delta_v
+            fit = fitted_hypothesis(problem, blocks, rest, start, size, 2 * REFIT_STEPS, archive)
+            if fit is None:
+                continue
+            report(problem, fit, fit.score.total - chosen.score.total)
+            if not _admitted(blocks, fit, chosen, least_nats) and (
+                best is None or fit.score.total > best.score.total
+            ):
+                best = fit
+        if best is None:
+            break
+        chosen = best
+    return chosen
+
+
+def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | None:
+    """The chosen hypothesis of a path at another trust in the declared parameters, with nothing else tried."""
+    blocks = blocks_of(problem)
+    base = base_of(problem, blocks, archive)
+    if base is None:
+        return None
+    start, size = path.chosen.placed, path.chosen.score.delta_v
+    fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, start, size, BASE_STEPS, archive)
+    return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
+
+
+def _step(
+    problem: InverseProblem,
+    blocks: Blocks,
+    parents: Sequence[FittedHypothesis],
+    best: FittedHypothesis,
+    slopes: Mapping[str, Array],
+    archive: Archive,
+    report: Report,
+) -> tuple[Step, list[str]]:
+    wanted = [
+        (parent, name)
+        for parent in (Parent(problem, blocks, fit) for fit in parents)
+        for name in promising(parent, slopes)
+    ]
+    grown: dict[frozenset[str], Grown] = {}
+    refused = []
+    for (parent, name), one in zip(wanted, side_by_side(wanted, archive), strict=True):
+        if one is None:
+            why = problem.why_not((*parent.fit.hypothesis, name))
+            refused.append(f"{' + '.join((*parent.fit.hypothesis, name))}: not tried; {why}")
+            continue
+        report(problem, one, one.score.total - parent.fit.score.total)
+        key = frozenset(one.hypothesis)
+        if key not in grown or one.score.total > grown[key].score.total:
+            grown[key] = one
+    ranked = sorted(grown.values(), key=lambda g: -g.score.total)
+    slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in ranked}}
+    least_nats = admission_nats(Parent(problem, blocks, best), slopes)
+    fitted = []
+    for one in (g for g in ranked[:FINALISTS] if g.score.total - best.score.total > least_nats / 2):
+        fit = fitted_hypothesis(
+            problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, REFIT_STEPS, archive
+        )
+        if fit is not None:
+            report(problem, fit, fit.score.total - best.score.total)
+            fitted.append(fit)
+    fitted.sort(key=lambda f: -f.score.total)
+    admitted = next((f for f in fitted if _admitted(blocks, best, f, least_nats)), None)
+    return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
+
+
+def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
+    off = unseen_rmse_v(blocks, without) ** 2 - unseen_rmse_v(blocks, fit) ** 2
+    says = fit.score.total - without.score.total
+    return says > least_nats and off > LEAST_V**2 and not fit.at_bounds

@@ -1,0 +1,75 @@
+"""What a search leaves: its steps, all that was tried at each, and the hypothesis that was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
+from aesi.tracer.likelihood.growth import Explanation, Grown
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One step: what the parents grew, best first, what was fitted in full, and the nats that admit an effect."""
+
+    parents: tuple[FittedHypothesis, ...]
+    grown: tuple[Grown, ...]
+    fitted: tuple[FittedHypothesis, ...]
+    admitted: FittedHypothesis | None
+    admission_nats: float = 0.0
+
+    @property
+    def best_gain(self) -> float:
+        """Nats that the best effect says more than its parent, admitted or not."""
+        if not self.grown:
+            return -np.inf
+        return max(g.score.total for g in self.grown) - max(p.score.total for p in self.parents)
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """A search that is over: the base without effects, the steps, and the hypothesis that was chosen."""
+
+    problem: InverseProblem
+    blocks: Blocks
+    base: FittedHypothesis
+    steps: tuple[Step, ...]
+    chosen: FittedHypothesis
+    notes: tuple[str, ...] = ()
+
+    def explanations(self) -> list[Explanation]:
+        """All that was tried, each at its best: fits with the whole model before first-order ones."""
+        best: dict[frozenset[str], Explanation] = {frozenset(): self.base}
+        for step in self.steps:
+            tried: list[Explanation] = [*step.grown, *step.fitted]
+            for one in tried:  # a full fit takes the place of a linear one
+                best[frozenset(one.hypothesis)] = one
+        return list(best.values())
+
+    @property
+    def admission_nats(self) -> float:
+        """What an effect had to say more of unseen data at the strictest step."""
+        return max((step.admission_nats for step in self.steps), default=0.0)
+
+    def gain(self, one: Explanation) -> float:
+        """Nats that a hypothesis says more than the base."""
+        return one.score.total - self.base.score.total
+
+
+Report = Callable[[InverseProblem, Explanation, float], None]
+"""Called with each hypothesis and what it says more than its parent, nats."""
+
+
+def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
+    """Root mean square of the residual on blocks that were left out, V."""
+    return float(np.sqrt(np.mean(held_out_residual(blocks, one) ** 2)))
+
+
+def beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
+    """V**2 beyond the noise on unseen data."""
+    return max(unseen_rmse_v(blocks, fit) ** 2 - float(np.mean(problem.white_v**2)), 0.0)
