@@ -12,7 +12,7 @@ from uuid import UUID
 from aesi.errors import AesiError
 from flows.base.console import duration
 from flows.base.time_limit import Overdue, time_limit
-from flows.jobs.temporary_server import Job, first_line, no_answer, of_prefect, stop_sending
+from flows.jobs.temporary_server import KeptWork, first_line, no_answer, of_prefect, stop_sending
 
 T = TypeVar("T")
 Say = Callable[[str], None]
@@ -89,7 +89,7 @@ class PrefectStages:
         from prefect import task
         from prefect.cache_policies import NO_CACHE
 
-        job: Job[T] = Job()
+        job: KeptWork[T] = KeptWork()
         stage = task(
             name=name,
             task_run_name=name,

@@ -13,7 +13,14 @@ from flows.jobs.discovery import EXPERIMENT, case_and_folder, check, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PlainStages, server_in_reach
-from flows.jobs.temporary_server import CURRENT, Job, ServerNotStarted, first_line, of_prefect, start_server
+from flows.jobs.temporary_server import (
+    CURRENT,
+    KeptWork,
+    ServerNotStarted,
+    first_line,
+    of_prefect,
+    start_server,
+)
 
 if TYPE_CHECKING:
     from aesi.pipeline.discovery.discover import Case
@@ -97,7 +104,7 @@ def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], u
     if not os.environ.get("PREFECT_API_URL"):  # said at once: on a busy machine it takes half a minute
         Console().say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
     environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
-    job: Job[T] = Job()
+    job: KeptWork[T] = KeptWork()
     token = CURRENT.set(job)
     try:
         start_server()

@@ -76,7 +76,7 @@ def first_line(error: Exception) -> str:
 
 
 @dataclass
-class Job(Generic[T]):
+class KeptWork(Generic[T]):
     """What a piece of work came to, whatever Prefect makes of it; a try each where Prefect tries it again."""
 
     results: list[T] = field(default_factory=list)
@@ -104,7 +104,7 @@ class Job(Generic[T]):
         return otherwise()
 
 
-CURRENT: ContextVar[Job[Any] | None] = ContextVar("job", default=None)
+CURRENT: ContextVar[KeptWork[Any] | None] = ContextVar("job", default=None)
 """The job of this process that a flow is started for; a flow that a deployment started has none."""
 
 

@@ -100,7 +100,7 @@ def test_as_tasks_a_server_that_is_lost_between_two_stages_is_said_and_the_rest_
     from prefect.testing.utilities import prefect_test_harness
 
     from flows.jobs.stages import PrefectStages
-    from flows.jobs.temporary_server import Job, as_the_job
+    from flows.jobs.temporary_server import KeptWork, as_the_job
 
     counted = []
 
@@ -120,7 +120,7 @@ def test_as_tasks_a_server_that_is_lost_between_two_stages_is_said_and_the_rest_
 
         return as_the_job(work)
 
-    kept = Job()
+    kept = KeptWork()
     token = CURRENT.set(kept)
     try:
         with prefect_test_harness(server_startup_timeout=180), pytest.raises(Exception, match=r"(?i)connect"):

@@ -8,7 +8,7 @@ import pytest
 from aesi.errors import DataError
 from flows.base.time_limit import Overdue, time_limit
 from flows.jobs import start
-from flows.jobs.temporary_server import CURRENT, Job, ServerNotStarted, as_the_job, start_server
+from flows.jobs.temporary_server import CURRENT, KeptWork, ServerNotStarted, as_the_job, start_server
 
 GONE = httpx.ConnectError("All connection attempts failed")
 
@@ -75,12 +75,12 @@ def test_a_server_that_does_not_start_in_time_is_not_waited_for(workspace, monke
 
 
 def test_a_job_that_was_tried_again_counts_as_its_last_try():
-    job = Job()
+    job = KeptWork()
     with pytest.raises(OSError, match="once"):
         job.do(lambda: (_ for _ in ()).throw(OSError("once")))
     assert job.do(lambda: 3) == 3
     assert job.outcome(lambda: pytest.fail("again")) == 3
-    assert Job().outcome(lambda: "first") == "first"
+    assert KeptWork().outcome(lambda: "first") == "first"
 
 
 def test_time_is_limited_within_the_block_alone():
