@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench.detectable import SEEN_NATS, seen_nats
 from aesi.bench.limit import OutOfTime, processor_limit
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.constants import MV_PER_V
@@ -79,10 +80,8 @@ def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
     except OutOfTime:
         row |= {"verdict": "out of time", "error": f"more than {limit_s:g} s of processor time"}
     row |= _scored(case, content) if content else MISSED
-    return row | {
-        "processor_s": time.process_time() - processor,
-        "ours_s": time.perf_counter() - began,
-    }
+    row |= {"processor_s": time.process_time() - processor, "ours_s": time.perf_counter() - began}
+    return row | {"seen_nats": seen_nats(case)}
 
 
 MISSED: dict[str, Any] = {
@@ -144,6 +143,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     several = [r for r in effect if r["kind"] == "pair"]
     fitted = [{**r, "called_found": r["verdict"] == "found"} for r in effect if r["fitted"]]
     named = [r for r in effect if r["grouped"]]
+    seen = [r for r in effect if r["seen_nats"] is not None and r["seen_nats"] > SEEN_NATS]
     answered = [r for r in rows if r["verdict"] not in ("error", "out of time")]
     unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
     covered = [{"covered": one} for r in named for one in r["parameters_covered"]]
@@ -161,6 +161,9 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         **rate(effect, "exact").named("effect_exact"),
         **rate(effect, "grouped").named("effect_grouped"),
         **rate(effect, "right").named("effect_lenient"),
+        "effects_to_be_seen": len(seen),
+        **rate(seen, "exact").named("seen_exact"),
+        **rate(seen, "grouped").named("seen_grouped"),
         **rate(several, "all_named").named("pair_both_named"),
         **rate(nothing, "right").named("none_lenient"),
         **rate(nothing, "false_name").named("none_false_name"),
