@@ -16,11 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench.detectable import SEEN_NATS, seen_nats
 from aesi.bench.limit import OutOfTime, processor_limit
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.constants import MV_PER_V
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, plan, small_plan
-from aesi.errors import AesiError
+from aesi.errors import AesiError, SimulationError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
@@ -49,13 +50,20 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     cells : folder of the declared cell files.  limit_s : processor seconds of the tracer; a case that takes longer
     is a miss.
     """
-    return _judged(generate(spec, cells_in(Path(cells))), limit_s)
+    try:
+        case = generate(spec, cells_in(Path(cells)))
+    except SimulationError as error:
+        return {**_planned(spec), "verdict": NOT_MADE, "error": str(error)}
+    return _judged(case, limit_s)
 
 
-def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
-    began, processor = time.perf_counter(), time.process_time()
-    spec = case.spec
-    row: dict[str, Any] = {
+NOT_MADE = "not made"
+"""Of a case that the laboratory cannot make as planned, such as one that meets the limit of the voltage: it is counted,
+and in no rate."""
+
+
+def _planned(spec: CaseSpec) -> dict[str, Any]:
+    return {
         "case": spec.name,
         "kind": spec.kind,
         "cell": spec.cell,
@@ -65,10 +73,14 @@ def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
         "warmth": spec.warmth,
         "soc0_given": spec.soc0_given,
         "dt_s": spec.dt_s,
-        "label": case.label,
         "target_mv": spec.target_mv,
-        "unexplained_mv": case.truth["rms_mv"],
     }
+
+
+def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
+    began, processor = time.perf_counter(), time.process_time()
+    spec = case.spec
+    row = _planned(spec) | {"label": case.label, "unexplained_mv": case.truth["rms_mv"]}
     content: dict[str, Any] = {}
     try:
         with processor_limit(limit_s):
@@ -79,10 +91,8 @@ def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
     except OutOfTime:
         row |= {"verdict": "out of time", "error": f"more than {limit_s:g} s of processor time"}
     row |= _scored(case, content) if content else MISSED
-    return row | {
-        "processor_s": time.process_time() - processor,
-        "ours_s": time.perf_counter() - began,
-    }
+    row |= {"processor_s": time.process_time() - processor, "ours_s": time.perf_counter() - began}
+    return row | {"seen_nats": seen_nats(case)}
 
 
 MISSED: dict[str, Any] = {
@@ -138,12 +148,14 @@ def _parameters(case: BlindCase, content: Mapping[str, Any]) -> tuple[list[float
 
 def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Strict rates with intervals beside the lenient ones, medians, calibration, and the confusion matrix."""
+    planned, rows = rows, [r for r in rows if r["verdict"] != NOT_MADE]
     effect = [r for r in rows if r["label"] not in ("none", "unknown")]
     nothing = [r for r in rows if r["label"] == "none"]
     stranger = [r for r in rows if r["label"] == "unknown"]
     several = [r for r in effect if r["kind"] == "pair"]
     fitted = [{**r, "called_found": r["verdict"] == "found"} for r in effect if r["fitted"]]
     named = [r for r in effect if r["grouped"]]
+    seen = [r for r in effect if r["seen_nats"] is not None and r["seen_nats"] > SEEN_NATS]
     answered = [r for r in rows if r["verdict"] not in ("error", "out of time")]
     unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
     covered = [{"covered": one} for r in named for one in r["parameters_covered"]]
@@ -154,6 +166,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return {
         "summary": True,
         "cases": len(rows),
+        "not_made": len(planned) - len(rows),
         "no_answer": len(rows) - len(answered),
         **rate(rows, "exact").named("exact"),
         **rate(rows, "grouped").named("grouped"),
@@ -161,6 +174,9 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         **rate(effect, "exact").named("effect_exact"),
         **rate(effect, "grouped").named("effect_grouped"),
         **rate(effect, "right").named("effect_lenient"),
+        "effects_to_be_seen": len(seen),
+        **rate(seen, "exact").named("seen_exact"),
+        **rate(seen, "grouped").named("seen_grouped"),
         **rate(several, "all_named").named("pair_both_named"),
         **rate(nothing, "right").named("none_lenient"),
         **rate(nothing, "false_name").named("none_false_name"),

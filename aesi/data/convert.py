@@ -51,7 +51,7 @@ def record_lines(record: Measurement) -> list[str]:
     """What a record holds, a sentence each, for whoever checks a conversion."""
     step = np.diff(record.time_s)
     charge = record.current_a[1:] * step / SECONDS_PER_HOUR
-    out, into = float(np.sum(charge[charge > 0])), -float(np.sum(charge[charge < 0]))
+    out, into = float(np.sum(charge[charge > 0])), float(np.sum(-charge[charge < 0]))
     lines = [
         f"{len(record):,} rows over {(record.time_s[-1] - record.time_s[0]) / SECONDS_PER_HOUR:.4g} h, every "
         f"{np.median(step):.4g} s in the median; {_range(record.voltage_v, 'V')}.",

@@ -8,7 +8,7 @@ from pathlib import Path
 from aesi.data.channels.checks import check_finite, check_time
 from aesi.data.channels.columns import map_columns
 from aesi.data.channels.load_columns import load_columns
-from aesi.data.read import read
+from aesi.data.read import measurement_in
 from aesi.data.readers import open_table
 from aesi.data.reading import Reading
 from aesi.numerics.typing import Array
@@ -38,13 +38,9 @@ def read_current(path: str | Path, reading: Reading | None = None) -> CurrentPro
     table = open_table(path, [given for given in told.columns.values() if given])
     needed = ("time_s", "current_a")
     if "voltage_v" in map_columns(table, told.columns, told.units, needed, told.selectors).position:
-        measured = read(path, told, max_rows=None)
+        found = measurement_in(table, told, max_rows=None)
         return CurrentProfile(
-            measured.time_s,
-            measured.current_a,
-            measured.voltage_v,
-            measured.temperature_degc,
-            measured.notes,
+            found.time_s, found.current_a, found.voltage_v, found.temperature_degc, found.notes
         )
     data, context, _, notes = load_columns(table, told, needed)
     check_finite(data, context)

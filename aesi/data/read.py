@@ -12,6 +12,7 @@ from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import load_columns
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
+from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading
 from aesi.data.resample import decimate
 from aesi.records import Measurement
@@ -72,6 +73,13 @@ def read(
 ) -> Measurement:
     """`read_measurement` with all that is said of the file in one object."""
     table = open_table(path, [given for given in reading.columns.values() if given])
+    return measurement_in(table, reading, max_rows, name)
+
+
+def measurement_in(
+    table: TableFile, reading: Reading, max_rows: int | None = MAX_ROWS, name: str | None = None
+) -> Measurement:
+    """The measurement in a table that is open already."""
     data, context, mapped, notes = load_columns(table, reading, REQUIRED)
     check_finite(data, context)
     check_time(data["time_s"], context)
@@ -92,7 +100,7 @@ def read(
         voltage_v=data["voltage_v"],
         temperature_degc=data.get("temperature_degc"),
         name=name or _stem(table.path),
-        source=str(path),
+        source=str(table.path),
         notes=tuple(f"{context.file}: {note}" for note in notes),
     )
     return measurement if max_rows is None else decimate(measurement, max_rows)

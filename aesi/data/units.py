@@ -11,12 +11,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
 SI = {"time_s": "s", "current_a": "A", "voltage_v": "V", "temperature_degc": "degC"}
 FACTORS: dict[str, dict[str, float]] = {
-    "time_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": 3600.0, "d": 86400.0},
+    "time_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": SECONDS_PER_HOUR, "d": 86400.0},
     "current_a": {"A": 1.0, "mA": 1e-3, "uA": 1e-6, "kA": 1e3},
     "voltage_v": {"V": 1.0, "mV": 1e-3, "uV": 1e-6},
     "temperature_degc": {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0},
@@ -97,7 +98,7 @@ def clock_to_s(cells: Sequence[str]) -> Array:
             days, hours, minutes, rest = found.groups()
             seconds[row] = (
                 86400.0 * int(days or 0)
-                + 3600.0 * int(hours)
+                + SECONDS_PER_HOUR * int(hours)
                 + 60.0 * int(minutes)
                 + float(rest.replace(",", "."))
             )

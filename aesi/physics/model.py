@@ -37,6 +37,9 @@ class Plating:
     transfer_coefficient: float = 0.65
 
 
+NO_PLATING = Plating(0.0, 0.5)
+
+
 @dataclass(frozen=True)
 class Interface:
     """What happens at the particles of one electrode, beyond what the cell file says.

@@ -155,6 +155,11 @@ def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> li
         said.append(
             f"{record.name}: {share:.2g} % of the rows lie outside the range the correction was trained on."
         )
+    else:
+        said.append(
+            "the model carries no learnt correction: one step ahead is the same as a free run, and lower_v and upper_v "
+            "are empty."
+        )
     if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
         inside = (record.voltage_v >= prediction.lower_v) & (record.voltage_v <= prediction.upper_v)
         width = MV_PER_V * float(np.nanmean(prediction.upper_v - prediction.lower_v))

@@ -123,13 +123,11 @@ def discover(
         raise DataError("give at least one measurement to look at.")
     for data in (*measurements, *tests):
         check_voltage(cell, data)
-    records = prepare_all(cell, measurements, soc0, 0.0 if tests else holdout, given)
-    for record in records:
-        check_record(cell, record)
+    problem = inverse_problem(
+        cell, measurements, soc0, 0.0 if tests else holdout, effects, given, model or "espm"
+    )
+    records = problem.records
     tested = tuple(prepare_test(cell, data, measurements, soc0, given) for data in tests)
-    there = {active.id for active in given} - _own(effects)
-    tried = {name: effect for name, effect in effects.items() if name not in there}
-    problem = InverseProblem(cell, records, tried, fixed=tuple(given), model=model or "espm")
     declared = ModelState(problem)
     for index, record in enumerate((*records, *tested)):
         run = declared.simulated(record, index if index < len(records) else None, thin=True)
@@ -143,6 +141,27 @@ def discover(
     return _told(
         evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )
+
+
+def inverse_problem(
+    cell: Cell,
+    measurements: Sequence[Measurement],
+    soc0: float | None = None,
+    holdout: float = 0.3,
+    effects: Mapping[str, Effect] = CATALOGUE,
+    given: Sequence[ActiveEffect] = (),
+    model: ModelName = "espm",
+) -> InverseProblem:
+    """What `discover` searches; the arguments are its own.
+
+    Raises DataError where a record has too little to decide anything.
+    """
+    records = prepare_all(cell, measurements, soc0, holdout, given)
+    for record in records:
+        check_record(cell, record)
+    there = {active.id for active in given} - _own(effects)
+    tried = {name: effect for name, effect in effects.items() if name not in there}
+    return InverseProblem(cell, records, tried, fixed=tuple(given), model=model)
 
 
 def _own(effects: Mapping[str, Effect]) -> set[str]:

@@ -22,10 +22,13 @@ QUIET = {
     "MLFLOW_DISABLE_TELEMETRY": "true",
     "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
     "PREFECT_CLI_PROMPT": "false",
-    # The temporary server takes up to 24 s to start on a slow disk; Prefect gives up after 20 s by default.
+    # The temporary server takes up to 24 s to start on a slow disk; Prefect gives up after 20 s by default. How long a
+    # run waits for it is in flows/jobs/temporary_server.py.
     "PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS": "120",
+    "PREFECT_CLIENT_MAX_RETRIES": "3",  # pauses of 2, 4 and 8 s; by default a minute goes by before a loss is seen
     # Errors are told once, in one sentence, by the command line; Prefect's own log keeps them in full.
     "PREFECT_LOGGING_HANDLERS_CONSOLE_LEVEL": "CRITICAL",
+    "PREFECT_LOGGING_INTERNAL_LEVEL": "CRITICAL",  # a server that is lost is said once, not event by event
     "PREFECT_SERVER_LOGGING_LEVEL": "CRITICAL",  # what goes wrong is said by the run, in one sentence
     "PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW": "ignore",
     "PREFECT_LOGGING_EXTRA_LOGGERS": "aesi",  # what a run says shows in Prefect's log of it

@@ -6,9 +6,11 @@ Each module has `run(**options)`, which yields one JSON-ready dict a line.
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
+from inspect import signature
 from typing import Any
 
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
+from aesi.errors import InputError
 
 BENCHMARKS = OF_THE_PACKAGE | {
     "blind": "flows.benchmarks.blind",
@@ -31,5 +33,14 @@ def missing(names: Iterable[str]) -> dict[str, str]:
 
 
 def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
-    """Lines of one benchmark, as they come."""
-    yield from import_module(BENCHMARKS[name]).run(**options)
+    """Lines of one benchmark, as they come.
+
+    Raises InputError for an option that it does not have.
+    """
+    benchmark = import_module(BENCHMARKS[name]).run
+    known = signature(benchmark).parameters
+    for option in options:
+        if option not in known:
+            there = ", ".join(known) or "none"
+            raise InputError(f"--set {option}: `aesi bench {name}` has no such option; it has: {there}.")
+    yield from benchmark(**options)

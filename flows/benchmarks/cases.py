@@ -10,6 +10,7 @@ from typing import Any
 
 from aesi.bench import CaseRow
 from aesi.pipeline.experiment.sections import TrackingConfig
+from flows.evaluation.spread import in_processes, on_dask
 
 
 @dataclass(frozen=True)
@@ -64,40 +65,10 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
 
 def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
     if address is not None:
-        yield from _on_dask(cases, address)
-    elif workers == 1:
-        yield from map(cases.judge, cases.specs)
-    else:
-        yield from _in_processes(cases, workers)
-
-
-def _in_processes(cases: Cases, workers: int) -> Iterator[CaseRow]:
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-    from multiprocessing import get_context
-
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        futures = [pool.submit(cases.judge, spec) for spec in cases.specs]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-
-
-def _on_dask(cases: Cases, address: str) -> Iterator[CaseRow]:
-    from distributed import as_completed
-
-    from flows.evaluation.dask_pool import connect
-
-    client, cluster = connect(address, 1)
-    try:
-        futures = client.map(cases.judge, list(cases.specs), pure=False)
-        for future in as_completed(futures, loop=client.loop):
-            yield future.result()
-    finally:
-        client.close(timeout=5)
-        if cluster is not None:
-            cluster.close(timeout=10)
+        return on_dask(cases.judge, cases.specs, workers, address)
+    if workers == 1:
+        return map(cases.judge, cases.specs)
+    return in_processes(cases.judge, cases.specs, workers)
 
 
 def _track(tracker: Any, row: CaseRow, shown: tuple[str, ...]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -15,6 +16,7 @@ from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
 from flows.base.console import Console, duration
+from flows.evaluation.spread import in_processes, on_dask
 
 if TYPE_CHECKING:
     from flows.tracking.tracker import Tracker
@@ -110,38 +112,5 @@ def _rows(
 ) -> Iterator[dict[str, Any]]:
     """Rows as they are done."""
     if runner == "dask":
-        yield from _on_dask(jobs, out, settings, workers, address)
-        return
-    import multiprocessing
-    from concurrent.futures import ProcessPoolExecutor, as_completed
-
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(workers, len(jobs)), mp_context=context, initializer=_quietly) as pool:
-        for future in as_completed([pool.submit(run_job, job, out, settings) for job in jobs]):
-            yield future.result()
-
-
-def _on_dask(
-    jobs: Sequence[Job], out: Path, settings: Settings, workers: int, address: str | None
-) -> Iterator[dict[str, Any]]:
-    from flows.evaluation.dask_pool import connect
-
-    client, cluster = connect(address, workers)
-    from distributed import as_completed
-
-    try:
-        futures = [client.submit(run_job, job, out.resolve(), settings, pure=False) for job in jobs]
-        for future in as_completed(futures, loop=client.loop):
-            yield future.result()
-    finally:
-        client.close(timeout=5)
-        if cluster is not None:
-            cluster.close(timeout=10)
-
-
-def _quietly() -> None:
-    """A worker leaves Ctrl-C to its parent, which ends it."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    environment.prepare_process()
+        return on_dask(partial(run_job, out=out.resolve(), settings=settings), jobs, workers, address)
+    return in_processes(partial(run_job, out=out, settings=settings), jobs, min(workers, len(jobs)))

@@ -14,6 +14,7 @@ from flows.jobs.discovery import EXPERIMENT, case_and_folder, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PrefectStages
+from flows.jobs.temporary_server import as_the_job
 
 
 def _experiment_name() -> str:
@@ -47,7 +48,7 @@ def experiment(
     console = Console()
     request = RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
     limit_s = request.config().runner.stage_timeout_s
-    return run_experiment(request, PrefectStages(console.say, limit_s), console)
+    return as_the_job(lambda: run_experiment(request, PrefectStages(console.say, limit_s), console))
 
 
 @flow(name="discovery", flow_run_name=_discovery_name, validate_parameters=False, persist_result=False)
@@ -71,4 +72,5 @@ def discovery(
     if case is None:
         case, folder, tracked_as = case_and_folder(str(path), overrides or (), folder)
     assert folder is not None  # `aesi discover` with records asks for one
-    return trace(case, folder, PrefectStages(console.say), console, tracked_as)
+    stages = PrefectStages(console.say)
+    return as_the_job(lambda: trace(case, folder, stages, console, tracked_as))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
 from typing import Protocol, TypeVar
 from uuid import UUID
 
 from aesi.errors import AesiError
 from flows.base.console import duration
+from flows.base.time_limit import Overdue, time_limit
+from flows.jobs.temporary_server import KeptWork, first_line, no_answer, of_prefect, stop_sending
 
 T = TypeVar("T")
 Say = Callable[[str], None]
@@ -51,8 +50,14 @@ class PlainStages:
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
         started = time.monotonic()
-        with _limit(name, self._timeout_s):
-            result = work()
+        try:
+            with time_limit(self._timeout_s):
+                result = work()
+        except Overdue:
+            raise StageOverdue(
+                f"the stage {name!r} took longer than {duration(self._timeout_s or 0)} (runner.stage_timeout_s); "
+                "what is finished is kept: allow more, and go on with --resume."
+            ) from None
         self._say(f"{name}: done in {duration(time.monotonic() - started)}")
         return result
 
@@ -69,18 +74,22 @@ class PrefectStages:
     They close over what they need instead of taking it as parameters, because Prefect would walk through
     every array it is handed; what they compute is kept by content (`flows.base.stage_cache`,
     `flows.evaluation.outcome_store`), with and without Prefect. Bad input is not tried again. An artifact that
-    cannot be stored is said, and costs nothing else.
+    cannot be stored is said, and costs nothing else; where the server is lost, the run goes on without it.
     """
 
     def __init__(self, say: Say, timeout_s: float | None = None) -> None:
         self._say = say
         self._plain = PlainStages(say, timeout_s)
         self._bars: dict[str, UUID] = {}
+        self._lost = False
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
+        if self._lost:
+            return self._plain(name, work)
         from prefect import task
         from prefect.cache_policies import NO_CACHE
 
+        job: KeptWork[T] = KeptWork()
         stage = task(
             name=name,
             task_run_name=name,
@@ -89,12 +98,20 @@ class PrefectStages:
             retry_condition_fn=_passing,
             cache_policy=NO_CACHE,
             persist_result=False,
-        )(lambda: self._plain(name, work))
-        result: T = stage()
+        )(lambda: job.do(lambda: self._plain(name, work)))
+        try:
+            result: T = stage()
+        except Exception as error:
+            if not of_prefect(error):
+                raise
+            self._lose(error)
+            return job.outcome(lambda: self._plain(name, work))
         return result
 
     def progress(self, name: str, done: int, total: int) -> None:
         """A bar beside the task at work; one write to the server each time."""
+        if self._lost:
+            return
         from prefect.artifacts import create_progress_artifact, update_progress_artifact
 
         share = 100.0 * done / total
@@ -106,6 +123,8 @@ class PrefectStages:
 
     def publish(self, key: str, markdown: str, about: str) -> None:
         """A Markdown artifact of the flow run."""
+        if self._lost:
+            return
         from prefect.artifacts import create_markdown_artifact
 
         with self._told(key):
@@ -116,8 +135,17 @@ class PrefectStages:
         try:
             yield
         except Exception as error:
-            reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-            self._say(f"prefect: the artifact {what} is not shown ({reason}).")
+            if no_answer(error):
+                self._lose(error)
+            else:
+                self._say(f"prefect: the artifact {what} is not shown ({first_line(error)}).")
+
+    def _lose(self, error: Exception) -> None:
+        self._lost = True
+        stop_sending()
+        self._say(
+            f"prefect: its server is lost ({first_line(error)}); the run goes on, and the rest is not shown there."
+        )
 
 
 @contextmanager
@@ -132,28 +160,6 @@ def server_in_reach() -> Iterator[None]:
             f"the Prefect server {os.environ.get('PREFECT_API_URL', 'of the active profile')} does not answer; "
             "start it, or unset PREFECT_API_URL to run the stages without it."
         ) from None
-
-
-@contextmanager
-def _limit(name: str, timeout_s: float | None) -> Iterator[None]:
-    """Interrupt the block after a time; compiled code is interrupted when it returns."""
-    if timeout_s is None or threading.current_thread() is not threading.main_thread():
-        yield
-        return
-
-    def overdue(number: int, frame: FrameType | None) -> None:
-        raise StageOverdue(
-            f"the stage {name!r} took longer than {duration(timeout_s)} (runner.stage_timeout_s); what is "
-            "finished is kept: allow more, and go on with --resume."
-        )
-
-    before = signal.signal(signal.SIGALRM, overdue)
-    signal.setitimer(signal.ITIMER_REAL, timeout_s)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
 
 
 def _passing(task: object, run: object, state: object) -> bool:

@@ -13,12 +13,19 @@ from flows.jobs.discovery import EXPERIMENT, case_and_folder, check, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PlainStages, server_in_reach
+from flows.jobs.temporary_server import (
+    CURRENT,
+    KeptWork,
+    ServerNotStarted,
+    first_line,
+    of_prefect,
+    start_server,
+)
 
 if TYPE_CHECKING:
     from aesi.pipeline.discovery.discover import Case
 
 T = TypeVar("T")
-NO_SERVER = "connect to ephemeral Prefect API server"
 
 
 def start(
@@ -91,16 +98,27 @@ def discover_experiment(
 
 
 def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], use_prefect: bool) -> T:
-    """Under Prefect where it is wanted, and its own temporary server starts."""
-    if use_prefect:
-        if not os.environ.get("PREFECT_API_URL"):  # said at once: on a busy machine it takes half a minute
-            Console().say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
-        environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
-        try:
-            with server_in_reach():
-                return under_prefect()
-        except RuntimeError as error:
-            if NO_SERVER not in str(error):
-                raise
-            Console().say("Prefect's temporary server did not start in time; the stages run without it.")
-    return plainly()
+    """Under Prefect where it is wanted and answers; what the job came to does not depend on it."""
+    if not use_prefect:
+        return plainly()
+    if not os.environ.get("PREFECT_API_URL"):  # said at once: on a busy machine it takes half a minute
+        Console().say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
+    environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
+    job: KeptWork[T] = KeptWork()
+    token = CURRENT.set(job)
+    try:
+        start_server()
+        with server_in_reach():
+            return under_prefect()
+    except ServerNotStarted as reason:
+        Console().say(f"Prefect's temporary server did not start ({reason}); the stages run without it.")
+    except Exception as error:
+        if not of_prefect(error):
+            raise
+        if not job.errors:
+            Console().say(
+                f"prefect: its server is lost ({first_line(error)}); the run's results do not depend on it."
+            )
+    finally:
+        CURRENT.reset(token)
+    return job.outcome(plainly)

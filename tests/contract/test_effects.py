@@ -171,7 +171,7 @@ def test_units_are_units_and_stand_in_the_names(effect):
         said = [unit for unit in units if f"_{name}".endswith(ending_of(unit))]
         said += [unit for ending, unit in PER.items() if name.endswith(ending)]
         longest = max(said, key=lambda unit: len(ending_of(unit)), default="dimensionless")
-        assert p.unit == longest, f"{name}: end it in {ending_of(p.unit)}"
+        assert p.unit == longest, f"{name}: its unit is {p.unit}, its name says {longest}"
 
 
 def test_what_a_model_holds_of_itself_is_refused_in_one_sentence():

@@ -7,6 +7,7 @@ solves for the surface where this package averages over the electrode (20 mV is 
 import runpy
 from pathlib import Path
 
+import bpx
 import numpy as np
 import pytest
 
@@ -92,3 +93,11 @@ def test_what_a_target_cannot_hold_is_said(cell, tmp_path):
         assert done.left[0].startswith("film_growth (")
     with pytest.raises(InputError, match=r"\.py"):
         export(model, tmp_path / "a.json", "pybamm")
+
+
+@pytest.mark.parametrize("name", ["lg_18650hg2", "panasonic_ncr18650pf"])
+def test_a_calibrated_file_is_read_by_the_standard(tmp_path, name):
+    out = tmp_path / "cell.bpx.json"
+    shipped = Path(__file__).resolve().parents[2] / "experiments" / "cells" / f"{name}.bpx.json"
+    export(shipped, out, "bpx")
+    bpx.parse_bpx_file(str(out))

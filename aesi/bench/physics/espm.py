@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -73,9 +73,9 @@ def random_load(samples: int, capacity_ah: float, rng: np.random.Generator) -> t
 
 
 def _timed(cell: Cell, time: Array, current: Array) -> tuple[float, Array]:
-    start = perf_counter()
+    start = process_time()
     run = simulate(cell, time, current, soc0=SOC0)
-    return perf_counter() - start, run.voltage_v
+    return process_time() - start, run.voltage_v
 
 
 def _rmse_mv(a: Array, b: Array) -> float:

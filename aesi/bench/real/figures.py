@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.bench import CaseRow
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.pipeline.report import style
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ def residual_figure(row: CaseRow) -> Figure:
         260,
     )
     kept = row["residual"]
-    hours = np.array(kept["time_s"]) / 3600.0
+    hours = np.array(kept["time_s"]) / SECONDS_PER_HOUR
     for state, words in STATES.items():
         fig.add_scatter(
             x=hours.tolist(),

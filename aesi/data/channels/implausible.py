@@ -25,6 +25,11 @@ LOWEST_RESISTANCE_OHM = 30e-6
 """Cells of 1,000 Ah have some 150 microohm."""
 HIGHEST_CHARGE_RESISTANCE_OHM_AH = 10.0
 """Capacity times resistance is 0.05 to 0.8 ohm Ah for those 46 records: a thousand times more is time in ms."""
+LEAST_CHARGE_RESISTANCE_AH_A = 3e-3
+"""Charge that moved over the current that the resistance would need for the slide of the voltage beyond it: 0.076 and
+more for the 14 of those records whose steps tell a resistance; with time in hours it is 3,600 times less."""
+CLEAR_SLIDE_V = 0.15
+"""Of the voltage without its drop at the resistance, between its 2 % and 98 % quantiles; 0.22 V and more there."""
 CONTRADICTING_SHARE = 0.04
 """Between the 1.4 % and the 6 % above; fewer than CONTRADICTING_STEPS say nothing."""
 CONTRADICTING_STEPS = 5
@@ -81,7 +86,23 @@ def check_scale(columns: Columns, context: Context) -> None:
             f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA, or the time in ms "
             f"({moved:.4g} Ah would have moved); declare it: --unit current_a=mA, or --unit time_s=ms."
         )
+    if resistance is not None:
+        _check_slide(columns, context, moved, resistance)
     _check_pace(columns, context)
+
+
+def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance_ohm: float) -> None:
+    """Refuse a cell that would have emptied by a charge that is nothing for its resistance."""
+    undropped = columns["voltage_v"] + resistance_ohm * columns["current_a"]
+    low, high = np.quantile(undropped, [0.02, 0.98])
+    slide = float(high - low)
+    if slide > CLEAR_SLIDE_V and moved_ah * resistance_ohm < LEAST_CHARGE_RESISTANCE_AH_A * slide:
+        last = len(undropped) - 1
+        raise DataError(
+            f"{context.at('time_s', last)}: the voltage slides by {slide:.2f} V while {1e3 * moved_ah:.3g} mAh move in "
+            f"{columns['time_s'][last] - columns['time_s'][0]:.3g} s, of a cell that shows {resistance_ohm * 1e3:.3g} "
+            "mohm at the steps of its current; the time is in another unit, declare it: --unit time_s=h, or min."
+        )
 
 
 def check_signed(columns: Columns, context: Context, header: Sequence[str]) -> None:

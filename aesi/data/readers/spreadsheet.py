@@ -12,6 +12,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.readers.frame import FrameTable
 from aesi.data.readers.heading import LINES_LOOKED_AT, Heading, find_heading
 from aesi.errors import DataError
@@ -79,7 +80,7 @@ def _plain(cell: Any) -> Any:
     """Clock times as h:m:s and dates as ISO 8601; all else as it is."""
     if isinstance(cell, datetime.timedelta):
         seconds = cell.total_seconds()
-        hours, rest = divmod(seconds, 3600.0)
+        hours, rest = divmod(seconds, SECONDS_PER_HOUR)
         minutes, seconds = divmod(rest, 60.0)
         return f"{int(hours)}:{int(minutes):02d}:{seconds:09.6f}"
     if isinstance(cell, datetime.datetime | datetime.time):

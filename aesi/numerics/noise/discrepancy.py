@@ -94,33 +94,3 @@ def whiten(
     table = np.ascontiguousarray(columns, dtype=float)
     out = _filter(table, time_s, opens, amplitude, white, np.array(correlation_lengths_s))
     return out[0], out[1]
-
-
-def draw(
-    time_s: Array,
-    starts: IntArray,
-    amplitude: Array,
-    white: Array,
-    rng: np.random.Generator,
-    correlation_lengths_s: tuple[float, ...] = CORRELATION_LENGTHS_S,
-) -> Array:
-    """(n,) one draw of (1)."""
-    from scipy.signal import lfilter
-
-    out = white * rng.normal(size=len(time_s))
-    share = 1.0 / len(correlation_lengths_s)
-    ends = [*starts[1:], len(time_s)]
-    for first, end in zip(starts, ends, strict=True):
-        gap = np.diff(time_s[first:end])
-        for tau in correlation_lengths_s:
-            noise = np.sqrt(share) * rng.normal(size=end - first)
-            phi = np.exp(-gap / tau)
-            if len(gap) and np.ptp(gap) < 1e-6 * gap[0]:
-                noise[1:] *= np.sqrt(1.0 - phi[0] ** 2)
-                x = lfilter([1.0], [1.0, -phi[0]], noise)
-            else:
-                x = noise
-                for i, keep in enumerate(phi):
-                    x[i + 1] = keep * x[i] + np.sqrt(1.0 - keep**2) * x[i + 1]
-            out[first:end] += amplitude[first:end] * x
-    return out

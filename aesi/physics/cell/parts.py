@@ -91,9 +91,9 @@ class Electrolyte:
 class CellParameters:
     """Everything a simulation needs to know about a cell; `aesi.Cell` adds how it is read and written.
 
-    Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no
-    thermal data), contact resistance in ohm in series with the whole cell; it is that
-    of metal, the same at any temperature. That of films on the particles, ohm at the reference temperature, falls as
+    Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no thermal data),
+    contact resistance in ohm in series with the whole cell; it is that of metal, the same at any temperature. That of
+    films on the particles, ohm at the reference temperature, falls as
     exp(E/R (1/T - 1/T_ref)) with its activation energy in J/mol.  fitted_with : the model whose parameters these are,
     "espm" or "dfn", where they were fitted.  capacity_shares : (record, share of this capacity that the cell had then)
     of the records that they were fitted to.

@@ -18,9 +18,7 @@ from aesi.physics.espm.tables import (
     rate_tables,
     solid_diffusion,
 )
-from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
-
-NO_PLATING = Plating(0.0, 0.5)
+from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
 
 
 @lru_cache(maxsize=64)

@@ -166,7 +166,7 @@ class DfnTrial(NamedTuple):
 
 
 class NewtonScratch(NamedTuple):
-    """Scratch of Newton's method: by unit pot, slope, by_salt, d_y; by place the others; d_phi of both collectors."""
+    """Scratch of Newton's method: by unit pot, slope, by_salt, d_y and the start value y_in; by place the others."""
 
     pot: Array
     slope: Array
@@ -178,7 +178,8 @@ class NewtonScratch(NamedTuple):
     d_psi: Array
     d_given: Array
     d_salt: Array
-    d_phi: Array
+    y_in: Array
+    psi_in: Array
     matrix: Array
     rhs: Array
 

@@ -58,7 +58,7 @@ def run_porous(  # type: ignore[no-untyped-def]
     """
     half = s.at.shape[0] // 2
     total, before, change, faster = t.total, t.before, t.change, t.faster
-    start_at_rest(p, s, state, t, half, theta0)
+    start_at_rest(p, s, e, state, t, half, theta0, temperature[0])
     t_k, t_weights, t_rates = temperature[0], -1.0, temperature[0]
     set_rates(e, t, t_k)
     watts, last_dt = 0.0, 0.0
@@ -176,9 +176,12 @@ def run_porous(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def start_at_rest(p, s, state, t, half, theta0):  # type: ignore[no-untyped-def]
+def start_at_rest(p, s, e, state, t, half, theta0, t_k):  # type: ignore[no-untyped-def]
     """Rest: uniform particles, uniform salt, no reaction."""
     state.c.fill(s.c0)
+    for r in range(2 * half):
+        side = 0 if r < half else 1
+        state.psi[r] = equilibrium(e.ocp, e.entropic, side, t_k - e.reference_k, theta0[side])[0]
     if s.strength > 0.0:
         salt_forcing(s, state.c, state.forcing)
     for u in range(p.place.shape[0]):

@@ -122,7 +122,8 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
     )  # fmt: skip
     newton = NewtonScratch(
         pot=of(units), slope=of(units), by_salt=of(units), slack=of(places), shift=of(places), conductance=of(places),
-        d_y=of(units), d_psi=of(places), d_given=of(places), d_salt=of(places), d_phi=of(2),
+        d_y=of(units), d_psi=of(places), d_given=of(places), d_salt=of(places),
+        y_in=of(units), psi_in=of(places),
         matrix=of(places, places), rhs=of(places, 3),
     )  # fmt: skip
     weights = Weights(

@@ -22,10 +22,9 @@ from aesi.physics.espm.tables import (
     rate_tables,
     solid_diffusion,
 )
-from aesi.physics.model import EspmModel, Plating, activation_energies, heat_numbers
+from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
 from aesi.records import Hold
 
-NO_PLATING = Plating(0.0, 0.5)
 VOLTAGE_ROWS = 7
 """Rows of the output that the plain path has too."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from aesi.data.read import Reading, read
@@ -12,9 +12,9 @@ from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
-from aesi.pipeline.experiment.sources import cell_path, locator, virtual_experiment
+from aesi.pipeline.experiment.sources import cell_path, discovery_records
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import Hold, Measurement
+from aesi.records import Hold
 
 MOST_ROWS = 80_000
 """A hypothesis is simulated hundreds of times: more rows than these take hours, and tell hardly more."""
@@ -61,37 +61,17 @@ def case_of_files(
 def case_of_experiment(config: ExperimentConfig) -> Case:
     """The case that an experiment with a `discover` section describes."""
     wanted = config.discover or DiscoverConfig()
-    if config.data.kind == "virtual":
-        fit, test, soc0 = _virtual(config)
-    else:
-        fit = _read(config, wanted.fit, wanted.fit_until_s)
-        test = _read(config, wanted.test, dict.fromkeys(wanted.test, wanted.until_s))
-        soc0 = None
+    cell = cell_path(config)
+    fit, test = discovery_records(config, wanted, cell)
     if not fit:
         raise ConfigError("discover.fit names no record; give at least one to look at.")
     return Case(
-        cell_path(config),
+        cell,
         fit,
         test,
-        soc0 if config.cell.soc0 is None else config.cell.soc0,
+        config.cell.soc0,
         wanted.holdout,
         wanted.max_effects,
         config.seed,
         model=config.cell.model,
     )
-
-
-def _read(
-    config: ExperimentConfig, names: Sequence[str], until_s: Mapping[str, float | None]
-) -> tuple[Measurement, ...]:
-    where = locator(config)
-    data = config.data
-    return tuple(read(where(name), data.reading.but(stop_s=until_s.get(name))) for name in names)
-
-
-def _virtual(
-    config: ExperimentConfig,
-) -> tuple[tuple[Measurement, ...], tuple[Measurement, ...], float | None]:
-    """The training record is looked at, the test records judge; they start from their rest voltages."""
-    experiment = virtual_experiment(config, cell_path(config))
-    return experiment.train, experiment.test, None

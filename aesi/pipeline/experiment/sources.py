@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,6 +12,7 @@ from aesi.data.read import read
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError
 from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.sections import DiscoverConfig
 from aesi.records import ROLES, Measurement, Role
 
 if TYPE_CHECKING:
@@ -31,13 +32,33 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     if config.data.kind == "virtual":
         return _virtual(config, cell)
     data = config.data
-    where = locator(config)
+    where = _locator(config)
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
         name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
     }
     return Sources(records, roles)
+
+
+def discovery_records(
+    config: ExperimentConfig, wanted: DiscoverConfig, cell: Path
+) -> tuple[tuple[Measurement, ...], tuple[Measurement, ...]]:
+    """The records that a discovery looks at, and those that judge it; of a virtual cell its training and test records.
+
+    cell : the BPX file from which virtual records are made.
+    """
+    if config.data.kind == "virtual":
+        experiment = virtual_experiment(config, cell)
+        return experiment.train, experiment.test
+    where = _locator(config)
+
+    def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
+        return tuple(read(where(name), config.data.reading.but(stop_s=stop_s.get(name))) for name in names)
+
+    return until(wanted.fit, wanted.fit_until_s), until(
+        wanted.test, dict.fromkeys(wanted.test, wanted.until_s)
+    )
 
 
 def virtual_experiment(config: ExperimentConfig, cell: Path) -> VirtualExperiment:
@@ -70,7 +91,7 @@ def cell_path(config: ExperimentConfig) -> Path:
     return locate(config.data.set, "cell.bpx.json")
 
 
-def locator(config: ExperimentConfig) -> Callable[[str], Path]:
+def _locator(config: ExperimentConfig) -> Callable[[str], Path]:
     """Finds the file of a record by its name in the experiment."""
     if config.data.kind == "files":
         return config.path

@@ -45,11 +45,21 @@ def run_finding(view: RunView) -> str:
 
 
 def corrected_finding(view: RunView) -> str:
-    """What the correction brings beyond the physics that it was learned on, in words; empty where that is declared."""
+    """What the correction brings beyond the physics that it was learned on, in words; where that is as declared, only
+    that a mere refit of its parameters would have done better."""
     corrected, model = view.model(view.corrected), view.model(view.chosen)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (corrected, model))
-    if view.corrected in (view.physics, view.chosen) or before is None or after is None:
+    if before is None or after is None:
         return ""
+    if view.corrected in (view.physics, view.chosen):
+        beyond = _figure(model, "free_run", "test_mser_recalibrated_pct")
+        if view.corrected == view.chosen or beyond is None or beyond >= 0.0:
+            return ""
+        refitted = after / np.sqrt(1.0 - beyond / 100.0)
+        return (
+            f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
+            f"{refitted:.1f} mV there: recalibrate it first (cell.start: recalibrated)."
+        )
     if after < before:
         return f"The {view.corrected} alone errs by {before:.1f} mV there; the correction takes it to {after:.1f} mV."
     return (

@@ -110,7 +110,7 @@ def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
     if view.files:
         figures["files"] = hypotheses.files_figure(view.files, states)
     if any(max(row["before"], row["after"]) > TELLING_SHARE for row in view.dependence):
-        figures["dependence"] = hypotheses.dependence_bars(view.dependence)
+        figures["dependence"] = hypotheses.dependence_bars(view.dependence, bool(view.effects))
     return figures
 
 

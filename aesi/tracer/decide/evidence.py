@@ -27,7 +27,7 @@ from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of
+from aesi.tracer.search.fitted import ALIKE_NATS, base_of
 from aesi.tracer.search.forward import refitted, searched
 from aesi.tracer.search.path import Path, Report, unseen_rmse_v
 from aesi.tracer.search.wrong_parameters import with_wrong_parameters
@@ -121,11 +121,17 @@ def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks
 
 def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tuple[Path, Verdict]:
     """Which of two searches is to be believed: one that explains the data before one that does not, then the one that
-    says more; a named effect with all else as declared, where that says as much as own parameters that all moved."""
+    says more; where both say as much, the one with the larger marginal likelihood, of an effect less the logarithm of
+    how many might have been named: an effect with all else as declared, or own parameters that all moved a little."""
     if (first.word == "unknown") != (second.word == "unknown"):
         return (tight, second) if first.word == "unknown" else (exact, first)
-    ahead = exact.chosen.score.total - tight.chosen.score.total
-    return (exact, first) if ahead > -AS_MUCH_NATS else (tight, second)
+    one, other = exact.chosen.score, tight.chosen.score
+    ahead = one.total - other.total
+    if abs(ahead) < ALIKE_NATS:
+        names = [len(path.chosen.hypothesis) for path in (exact, tight)]
+        ahead = one.evidence - other.evidence
+        ahead -= (names[0] - names[1]) * np.log(len(exact.problem.competing()))
+    return (exact, first) if ahead > 0.0 else (tight, second)
 
 
 def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:

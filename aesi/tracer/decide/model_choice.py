@@ -18,7 +18,7 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.evidence import Evidence
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import REFIT_STEPS, base_of, fitted_hypothesis
+from aesi.tracer.search.fitted import base_of, fitted_hypothesis
 from aesi.tracer.search.forward import HOPELESS_SHARE
 from aesi.tracer.search.path import Path, beyond_noise
 
@@ -75,7 +75,7 @@ def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
     """Does the porous electrode leave notably less of unseen data with what the single particle ended with?"""
     chosen = path.chosen
     fit = fitted_hypothesis(
-        full, path.blocks, chosen.hypothesis, chosen.placed, chosen.score.delta_v, REFIT_STEPS, kept(full)
+        full, path.blocks, chosen.hypothesis, chosen.placed, chosen.score.delta_v, kept(full)
     )
     if fit is None:
         return False
@@ -85,11 +85,12 @@ def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
 
 
 def _believed(single: Evidence, full: Evidence) -> bool:
-    """Does the single particle explain the data, and say more of them where both do?"""
+    """Does the single particle explain the data, and with less, or say more of them where both do?"""
     if single.verdict.word == "unknown":
         return False
-    says_more = single.path.chosen.score.total > full.path.chosen.score.total
-    return says_more or full.verdict.word == "unknown"
+    chosen, other = single.path.chosen, full.path.chosen
+    says_more = chosen.score.total > other.score.total
+    return says_more or len(chosen.hypothesis) < len(other.hypothesis) or full.verdict.word == "unknown"
 
 
 def _says_more(single: InverseProblem, full: InverseProblem, kept: Kept) -> bool:

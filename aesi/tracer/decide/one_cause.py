@@ -13,7 +13,7 @@ from dataclasses import replace
 from aesi.physics.effect import Effect
 from aesi.tracer.decide.verdict import GROUP_SIZE
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import ALIKE_NATS, BASE_STEPS, fitted_hypothesis
+from aesi.tracer.search.fitted import ALIKE_NATS, fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
 
 
@@ -27,7 +27,7 @@ def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
     causes = [e.id for e in effects.values() if e.kind == "parameter" and not _tolerated(e)]
     fits = [
         fitted_hypothesis(
-            path.problem, path.blocks, (cause,), path.base.placed, chosen.score.delta_v, BASE_STEPS, archive
+            path.problem, path.blocks, (cause,), path.base.placed, chosen.score.delta_v, archive
         )
         for cause in causes
     ]

@@ -34,6 +34,7 @@ class FittedHypothesis:
     """A hypothesis where the data put it.
 
     free : what moves.  point : the linear form there.  score : on unseen data.  simulations : spent.
+    as_declared : about the declared values of its own parameters, not where the data put them.
     """
 
     hypothesis: tuple[str, ...]
@@ -41,6 +42,7 @@ class FittedHypothesis:
     point: Linearised
     score: PredictiveScore
     simulations: int = 0
+    as_declared: bool = False
 
     @property
     def values(self) -> dict[str, dict[str, float]]:

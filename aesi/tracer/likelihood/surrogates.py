@@ -13,13 +13,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from aesi.numerics.noise.discrepancy import draw
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.gaussian import PARTITIONS_OF_CONDITIONS
 from aesi.tracer.likelihood.growth import Parent
-from aesi.tracer.likelihood.model_error import amplitude_v, whitened
+from aesi.tracer.likelihood.model_error import whitened
 
 DRAWS = 400
 """The 99 % quantile of so many is known to a tenth of its value."""
@@ -41,8 +40,7 @@ def largest_gains(
 ) -> Array:
     """(draws,) nats, the largest gain over the effects on each surrogate."""
     problem, blocks, delta_v = parent.problem, parent.blocks, parent.fit.score.delta_v
-    surrogates = np.column_stack([_drawn(problem, blocks, delta_v, rng) for _ in range(draws)])
-    white = whitened(problem, blocks, surrogates, delta_v)[0]
+    white = _drawn(problem, draws, rng)
     known = parent.white[delta_v][0]
     without = _said(blocks, known, white)
     best = np.full(draws, -np.inf)
@@ -52,13 +50,13 @@ def largest_gains(
     return best
 
 
-def _drawn(problem: InverseProblem, blocks: Blocks, delta_v: float, rng: np.random.Generator) -> Array:
-    """(n,) V, one draw of the model error and the noise."""
-    amplitude = amplitude_v(problem.steepness, delta_v, problem.trust)
+def _drawn(problem: InverseProblem, draws: int, rng: np.random.Generator) -> Array:
+    """(n, draws) draws of the model error and the noise, whitened: what has the covariance that is whitened is white;
+    rows that are one sample together share its draw."""
     if not problem.coarse:
-        return draw(problem.time_s, blocks.starts[:-1], amplitude, problem.white_v, rng)
+        return rng.normal(size=(len(problem.time_s), draws))
     sample = np.floor(np.cumsum(problem.independent) - problem.independent).astype(int)
-    return amplitude * rng.normal(size=sample[-1] + 1)[sample]
+    return np.sqrt(problem.independent)[:, None] * rng.normal(size=(sample[-1] + 1, draws))[sample]
 
 
 def _said(blocks: Blocks, sensitivities: Array, white: Array) -> Array:

@@ -71,7 +71,9 @@ def _remark(path: Path, one: Explanation) -> str:
     rest = path.chosen.score.total
     if isinstance(one, FittedHypothesis) and one.at_bounds:
         return f"ends on a bound: {', '.join(one.at_bounds)}"
-    return f"says {one.score.total - rest:.1f} nats more of unseen data than what was chosen"
+    gained = one.score.total - rest
+    chosen = "what was chosen" if path.chosen.hypothesis else "the declared model"
+    return f"{abs(gained):.1f} nats {'better' if gained > 0.0 else 'worse'} on unseen data than {chosen}"
 
 
 def estimates(one: Explanation, effect: str) -> dict[str, Estimate]:

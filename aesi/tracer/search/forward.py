@@ -11,24 +11,30 @@ from collections.abc import Callable, Mapping, Sequence
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import BASE_STEPS, REFIT_STEPS, base_of, fitted_hypothesis
+from aesi.tracer.search.fitted import (
+    ALIKE_NATS,
+    as_declared,
+    base_of,
+    fitted_hypothesis,
+)
 from aesi.tracer.search.grown import promising, side_by_side
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, unseen_rmse_v
 
 FINALISTS = 6
 """Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
-before, so what it says of a right effect can be far too little."""
+before, so that what it says of a right effect can be too little."""
+FINALIST_SHARE = 0.5
+"""Of what the best of them says more when it is grown. On six blind cases of seeds 0 and 12 those that said less ended
+at 2 to 27 % of the best one's full fit."""
 BEAM = 2
 """Hypotheses that a further effect is tried on."""
 HOPELESS_SHARE = 0.7
 """Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
-LEAST_V = 1.5e-4
-"""What an effect has to take off the error on unseen data, as squares: less is within what two solvers of one model
-differ by."""
 
 
 def searched(
@@ -82,7 +88,7 @@ def _pruned(
         for name in chosen.hypothesis[:-1]:  # the last one was admitted on top of the others
             rest = tuple(other for other in chosen.hypothesis if other != name)
             start, size = chosen.placed, chosen.score.delta_v
-            fit = fitted_hypothesis(problem, blocks, rest, start, size, 2 * REFIT_STEPS, archive)
+            fit = fitted_hypothesis(problem, blocks, rest, start, size, archive)
             if fit is None:
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
@@ -103,7 +109,7 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
     if base is None:
         return None
     start, size = path.chosen.placed, path.chosen.score.delta_v
-    fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, start, size, BASE_STEPS, archive)
+    fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, start, size, archive)
     return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
 
 
@@ -116,36 +122,64 @@ def _step(
     archive: Archive,
     report: Report,
 ) -> tuple[Step, list[str]]:
-    wanted = [
-        (parent, name)
-        for parent in (Parent(problem, blocks, fit) for fit in parents)
-        for name in promising(parent, slopes)
-    ]
-    grown: dict[frozenset[str], Grown] = {}
-    refused = []
-    for (parent, name), one in zip(wanted, side_by_side(wanted, archive), strict=True):
-        if one is None:
-            why = problem.why_not((*parent.fit.hypothesis, name))
-            refused.append(f"{' + '.join((*parent.fit.hypothesis, name))}: not tried; {why}")
-            continue
-        report(problem, one, one.score.total - parent.fit.score.total)
-        key = frozenset(one.hypothesis)
-        if key not in grown or one.score.total > grown[key].score.total:
-            grown[key] = one
-    ranked = sorted(grown.values(), key=lambda g: -g.score.total)
-    slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in ranked}}
+    grown, refused = _grown([Parent(problem, blocks, fit) for fit in parents], slopes, archive)
+    slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
+    declared = as_declared(problem, blocks, best)
+    if declared is not None:
+        again, more = _grown([Parent(problem, blocks, declared)], slopes, archive)
+        grown, refused = [*grown, *again], [*refused, *more]
+    for one in grown:
+        report(problem, one, one.score.total - best.score.total)
+    ranked = _ranked(grown)
     least_nats = admission_nats(Parent(problem, blocks, best), slopes)
     fitted = []
-    for one in (g for g in ranked[:FINALISTS] if g.score.total - best.score.total > least_nats / 2):
-        fit = fitted_hypothesis(
-            problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, REFIT_STEPS, archive
-        )
+    for one in _finalists(ranked, best):
+        fit = fitted_hypothesis(problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, archive)
         if fit is not None:
             report(problem, fit, fit.score.total - best.score.total)
             fitted.append(fit)
     fitted.sort(key=lambda f: -f.score.total)
-    admitted = next((f for f in fitted if _admitted(blocks, best, f, least_nats)), None)
+    admitted = most_plausible([f for f in fitted if _admitted(blocks, best, f, least_nats)])
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
+
+
+def _grown(
+    parents: Sequence[Parent], slopes: Mapping[str, Array], archive: Archive
+) -> tuple[list[Grown], list[str]]:
+    """All that is worth growing on these parents, and why some of it could not be simulated."""
+    wanted = [(parent, name) for parent in parents for name in promising(parent, slopes)]
+    grown, refused = [], []
+    for (parent, name), one in zip(wanted, side_by_side(wanted, archive), strict=True):
+        if one is None:
+            names = (*parent.fit.hypothesis, name)
+            refused.append(f"{' + '.join(names)}: not tried; {parent.problem.why_not(names)}")
+        else:
+            grown.append(one)
+    return grown, refused
+
+
+def _ranked(grown: Sequence[Grown]) -> list[Grown]:
+    """Each hypothesis once, where it says most; the best first."""
+    best: dict[frozenset[str], Grown] = {}
+    for one in sorted(grown, key=lambda g: -g.score.total):
+        best.setdefault(frozenset(one.hypothesis), one)
+    return list(best.values())
+
+
+def _finalists(ranked: Sequence[Grown], best: FittedHypothesis) -> list[Grown]:
+    """What is worth a fit with the whole model."""
+    gains = [one.score.total - best.score.total for one in ranked[:FINALISTS]]
+    least = max(FINALIST_SHARE * max(gains, default=0.0), 0.0)
+    return [one for one, gain in zip(ranked, gains, strict=False) if gain > least]
+
+
+def most_plausible(admitted: Sequence[FittedHypothesis]) -> FittedHypothesis | None:
+    """Of those that say as much as the best one of unseen data, which do not tell them apart, the one with the largest
+    marginal likelihood: that with fewer and more usual values."""
+    if not admitted:
+        return None
+    most = max(fit.score.total for fit in admitted)
+    return max((f for f in admitted if f.score.total > most - ALIKE_NATS), key=lambda f: f.score.evidence)
 
 
 def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:

@@ -46,7 +46,8 @@ def side_by_side(wanted: Sequence[tuple[Parent, str]], archive: Archive) -> Iter
     outcome does not depend on how many threads there are."""
 
     def one(parent: Parent, name: str) -> Grown | None:
-        key = fit_name(parent.problem, "grown", (*parent.fit.hypothesis, name))
+        kind = "grown as declared" if parent.fit.as_declared else "grown"
+        key = fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
         known = archive.get(key, len(parent.problem.effects[name].parameters))
         found = grow(parent, name, _growth_size(parent), known)
         if found is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import ALIKE_NATS, REFIT_STEPS, fitted_hypothesis
+from aesi.tracer.search.fitted import ALIKE_NATS, fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
 
 NINETY = 1.645
@@ -27,9 +27,7 @@ def with_wrong_parameters(path: Path, archive: Archive) -> Path:
     while beyond := _beyond_spread(path.problem, chosen):
         start, size = chosen.placed, chosen.score.delta_v
         fits = [
-            fitted_hypothesis(
-                path.problem, path.blocks, (*chosen.hypothesis, owner), start, size, 2 * REFIT_STEPS, archive
-            )
+            fitted_hypothesis(path.problem, path.blocks, (*chosen.hypothesis, owner), start, size, archive)
             for owner in beyond
         ]
         said = chosen.score.total - ALIKE_NATS

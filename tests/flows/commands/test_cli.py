@@ -144,6 +144,13 @@ def test_bench_prints_json_lines(call, monkeypatch):
     assert json.loads(out) == {"bench": "espm", "ours_s": 1.0, "n": 3}
 
 
+def test_bench_names_its_options_where_one_is_not_there(call):
+    code, _, err = call("bench", "blind", "--set", "colour=red")
+    assert code == 2
+    assert "--set colour" in err
+    assert "workers" in err
+
+
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     st.lists(

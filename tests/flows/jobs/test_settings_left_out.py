@@ -101,16 +101,23 @@ def keys(model=ExperimentConfig, content=FULL, prefix=""):
 OPTIONAL = [key for key in keys() if key not in NEEDED]
 
 
-def without(key, cell):
+SECTIONS = ["data", "data.virtual", "cell", "library", "search", "conformal", "tracking", "runner"]
+
+
+def section_of(content, path):
+    for part in path:
+        content = content[part]
+    return content
+
+
+def without(keys, cell):
     content = yaml.safe_load(yaml.safe_dump(FULL))
     content["cell"]["bpx"] = str(cell)
-    if key in SLOW_WITHOUT:
+    if SLOW_WITHOUT & set(keys):
         content["search"]["resamples"] = 2
-    *path, last = key.split(".")
-    section = content
-    for part in path:
-        section = section[part]
-    del section[last]
+    for key in keys:
+        *path, last = key.split(".")
+        del section_of(content, path)[last]
     return content
 
 
@@ -125,10 +132,18 @@ def runs_to_its_end(content, tracked):
 
 
 def test_a_run_without_search_block_ended_in_a_division_by_zero(tracked, cell):
-    runs_to_its_end(without("search.block", cell), tracked)
+    runs_to_its_end(without(["search.block"], cell), tracked)
+
+
+@pytest.mark.parametrize("section", SECTIONS)
+def test_a_section_may_hold_no_more_than_what_it_needs(section, tracked, cell):
+    """The keys of a section at once, which is what a short file leaves out; those that take minutes are kept."""
+    here = [key for key in OPTIONAL if key.rpartition(".")[0] == section]
+    quick = [key for key in here if key not in SLOW_WITHOUT and key != "search.population"]
+    runs_to_its_end(without(quick, cell), tracked)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", [key for key in OPTIONAL if key != "search.block"])
 def test_any_optional_key_may_be_left_out(key, tracked, cell):
-    runs_to_its_end(without(key, cell), tracked)
+    runs_to_its_end(without([key], cell), tracked)

@@ -9,6 +9,7 @@ import pytest
 from aesi.errors import DataError
 from flows.base.console import Console
 from flows.jobs.stages import PlainStages, ServerAway, StageOverdue, server_in_reach
+from flows.jobs.temporary_server import CURRENT
 
 
 def test_a_stage_says_when_it_is_done(said):
@@ -90,3 +91,42 @@ def test_as_tasks_a_passing_failure_is_tried_again_and_bad_input_is_not(said):
     with prefect_test_harness(server_startup_timeout=180):
         assert job() == "data"
     assert tries == {"network": 2, "input": 1}
+
+
+@pytest.mark.slow
+def test_as_tasks_a_server_that_is_lost_between_two_stages_is_said_and_the_rest_goes_on(said, monkeypatch):
+    from prefect import flow
+    from prefect.server.api.server import SubprocessASGIServer
+    from prefect.testing.utilities import prefect_test_harness
+
+    from flows.jobs.stages import PrefectStages
+    from flows.jobs.temporary_server import KeptWork, as_the_job
+
+    counted = []
+
+    def lose():
+        server = SubprocessASGIServer()  # the harness's
+        server.server_process.kill()
+        server.server_process.wait()
+        return counted.append("lost") or 1
+
+    @flow
+    def job():
+        def work():
+            run = PrefectStages(said.append)
+            total = run("first", lose) + run("second", lambda: counted.append("second") or 2)
+            run.publish("page", "# Text", "of nothing")
+            return total
+
+        return as_the_job(work)
+
+    kept = KeptWork()
+    token = CURRENT.set(kept)
+    try:
+        with prefect_test_harness(server_startup_timeout=180), pytest.raises(Exception, match=r"(?i)connect"):
+            job()
+    finally:
+        CURRENT.reset(token)
+    assert kept.results == [3]
+    assert counted == ["lost", "second"]
+    assert sum("its server is lost" in line for line in said) == 1

@@ -6,15 +6,10 @@ from pathlib import Path
 import pytest
 
 from flows.tracking.delivery import deliver
-from flows.tracking.store import KIND, Store
+from flows.tracking.store import KIND
 from flows.tracking.view import NOTE, RUN_COLUMNS, VIEW, experiment_tags
 
 CONTENT = {"bagging": {"T1(I)": 0.25}}
-
-
-@pytest.fixture
-def store(tracked):
-    return Store()
 
 
 @pytest.fixture

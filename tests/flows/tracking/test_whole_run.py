@@ -5,15 +5,10 @@ import sqlite3
 import pytest
 
 from flows.tracking import delivery
-from flows.tracking.store import KIND, NUMBER, Store
+from flows.tracking.store import KIND, NUMBER
 
 TABLES = ("runs", "tags", "params", "metrics", "latest_metrics")
 OWN = ("run_uuid", "artifact_uri")
-
-
-@pytest.fixture
-def store(tracked):
-    return Store()
 
 
 @pytest.fixture

@@ -104,3 +104,24 @@ def peer():
 def plain_v(peer):
     """PyBaMM's SPMe of that cell, (n,) V."""
     return peer.voltage()
+
+
+@pytest.fixture(scope="session")
+def reversible_plating():
+    """Rate constant (m/s), and PyBaMM's options and parameters of plating and stripping at it."""
+    import pybamm
+
+    rate, faraday = 1e-9, pybamm.constants.F
+    return rate, {
+        "options": {"lithium plating": "reversible", "surface form": "algebraic"},
+        "update": {
+            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_e,
+            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_li,
+            "Initial plated lithium concentration [mol.m-3]": 0.0,
+            "Typical plated lithium concentration [mol.m-3]": 1000.0,
+            "Lithium plating transfer coefficient": 0.65,
+            "Lithium metal partial molar volume [m3.mol-1]": 1.3e-5,
+            "Initial SEI thickness [m]": 5e-9,
+            "SEI partial molar volume [m3.mol-1]": 9.585e-5,
+        },
+    }

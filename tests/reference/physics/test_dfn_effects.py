@@ -134,25 +134,10 @@ def test_asymmetric_kinetics_is_asymmetric_butler_volmer(pulsed):
     assert rmse_mv(run.voltage_v, solution["Voltage [V]"](pulsed.time)) < REACHED_MV
 
 
-def test_lithium_plating_is_reversible_plating(pulsed):
-    import pybamm
-
+def test_lithium_plating_is_reversible_plating(pulsed, reversible_plating):
     charged = Peer(pulsed.content, pulsed.cell, pulsed.time, -np.abs(pulsed.current), 0.5)
-    rate, faraday = 1e-9, pybamm.constants.F
-    solution = theirs(
-        charged,
-        options={"lithium plating": "reversible", "surface form": "algebraic"},
-        update={
-            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_e,
-            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_li,
-            "Initial plated lithium concentration [mol.m-3]": 0.0,
-            "Typical plated lithium concentration [mol.m-3]": 1000.0,
-            "Lithium plating transfer coefficient": 0.65,
-            "Lithium metal partial molar volume [m3.mol-1]": 1.3e-5,
-            "Initial SEI thickness [m]": 5e-9,
-            "SEI partial molar volume [m3.mol-1]": 9.585e-5,
-        },
-    )
+    rate, options = reversible_plating
+    solution = theirs(charged, **options)
     run = ours(charged, "lithium_plating", rate_m_s=rate)
     assert rmse_mv(run.voltage_v, solution["Voltage [V]"](charged.time)) < REACHED_MV
     plated = solution["X-averaged negative lithium plating concentration [mol.m-3]"](charged.time)

@@ -214,24 +214,10 @@ def test_windows_after_a_loss_are_the_peers_electrode_balance(peer, name, loss):
     assert windows == pytest.approx([float(found[k]) for k in ("x_0", "x_100", "y_100", "y_0")], abs=3e-4)
 
 
-def test_lithium_plating_is_reversible_plating(peer):
-    import pybamm
-
+def test_lithium_plating_is_reversible_plating(peer, reversible_plating):
     charge = Peer(peer.content, peer.cell, peer.time, -np.abs(peer.current), 0.5)
-    rate, faraday = 1e-9, pybamm.constants.F
-    theirs = charge.solve(
-        options={"lithium plating": "reversible", "surface form": "algebraic"},
-        update={
-            "Exchange-current density for plating [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_e,
-            "Exchange-current density for stripping [A.m-2]": lambda c_e, c_li, T: faraday * rate * c_li,
-            "Initial plated lithium concentration [mol.m-3]": 0.0,
-            "Typical plated lithium concentration [mol.m-3]": 1000.0,
-            "Lithium plating transfer coefficient": 0.65,
-            "Lithium metal partial molar volume [m3.mol-1]": 1.3e-5,
-            "Initial SEI thickness [m]": 5e-9,
-            "SEI partial molar volume [m3.mol-1]": 9.585e-5,
-        },
-    )
+    rate, options = reversible_plating
+    theirs = charge.solve(**options)
     without = charge.voltage(options={"surface form": "algebraic"})
     change = ours(charge, "lithium_plating", rate_m_s=rate)
     agrees(change, theirs["Voltage [V]"](charge.time) - without, 0.05, 2e-4)

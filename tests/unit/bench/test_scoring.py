@@ -1,11 +1,16 @@
 """Judging an answer by hand-worked cases, rates with their intervals, and the limit on processor time."""
 
 import time
+from pathlib import Path
 
 import pytest
 
+from aesi.bench import blind
 from aesi.bench.limit import OutOfTime, processor_limit
 from aesi.bench.scoring import calibration, judge, proportion, rate
+from aesi.errors import SimulationError
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
 
 def answer(verdict, *effects, groups=()):
@@ -101,3 +106,15 @@ def test_work_without_end_is_stopped():
         time.sleep(0.5)  # waiting costs no processor time
     with processor_limit(None):
         pass
+
+
+def test_a_case_that_the_laboratory_cannot_make_is_counted_and_stops_nothing(monkeypatch):
+    def refused(spec, cells):
+        raise SimulationError("drive: stopped at its maximum voltage")
+
+    monkeypatch.setattr(blind, "generate", refused)
+    row = blind.judged(blind.chosen(cases=1)[0], str(CELLS))
+    assert row["verdict"] == blind.NOT_MADE
+    assert "maximum voltage" in row["error"]
+    summary = blind.summary([row])
+    assert (summary["cases"], summary["not_made"], summary["exact_cases"]) == (0, 1, 0)

@@ -58,6 +58,7 @@ def test_warming_in_the_cold_is_no_charge(tmp_path):
     ("current", "factor", "words"),
     [
         (CYCLE, 1 / 3600, "--unit time_s=h"),
+        (DRIVE, 1 / 3600, "--unit time_s=h"),
         (DRIVE, 1e3, "--unit time_s=ms"),
     ],
 )

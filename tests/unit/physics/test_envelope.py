@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aesi.errors import SimulationError
+from aesi.errors import InputError, SimulationError
 from aesi.physics import Cell, simulate
+from aesi.physics.effects import CATALOGUE
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 RATED_C = {
@@ -20,12 +21,11 @@ RATED_C = {
     "nmc_30ah": 3.0,
 }
 """Continuous discharge in the data sheets (the pouch cell has none: what its drive cycles ask for)."""
-OF_THE_POROUS_ELECTRODE = ("lg_m50_chen2020", "nmc_30ah")
-"""Files whose parameters are its own. Those fitted with the single particle have potentials that rise over parts of
-their windows, where the places of a porous electrode have more than one state, and it may find none."""
 CAUSES = ("more charge than the cell has", "solid diffusion cannot follow", "the electrolyte ran out of salt")
 
 NO_REACTION = "no reaction was found"
+REFUSED = {("dfn", "reaction_nonuniformity")}
+"""What a model has of itself."""
 
 
 @cache
@@ -42,7 +42,6 @@ def cell_of(name: str) -> Cell:
     soc0=st.floats(0.0, 1.0),
 )
 def test_over_the_envelope_a_simulation_ends_at_its_cut_off_or_says_why_not(model, name, degc, share, soc0):
-    assume(model == "espm" or name in OF_THE_POROUS_ELECTRODE)
     cell = cell_of(name)
     rate = share * RATED_C[name] if share > 0 else share
     current = rate * cell.nominal_capacity_ah
@@ -68,6 +67,43 @@ def test_over_the_envelope_a_simulation_ends_at_its_cut_off_or_says_why_not(mode
         assert ("cut-off" in said) == (ends <= fails)
     if current > 0 and ends == len(time) and fails == len(time):
         assert run.series["soc"][-1] < 0.02  # a rest voltage below the cut-off is beyond what is asked
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=CATALOGUE)
+@settings(max_examples=4, deadline=None)
+@given(
+    name=st.sampled_from(sorted(RATED_C)),
+    degc=st.floats(-10.0, 40.0),
+    share=st.sampled_from([-1.0, -0.3, 0.3, 1.0]),
+    soc0=st.floats(0.05, 0.95),
+)
+def test_with_any_effect_a_cell_is_followed_until_it_runs_out_or_one_sentence_says_why_not(
+    model, effect, name, degc, share, soc0
+):
+    cell = cell_of(name)
+    current = (share * RATED_C[name] if share > 0 else share) * cell.nominal_capacity_ah
+    room_ah = cell.capacity_ah * (soc0 if current > 0 else 1.0 - soc0)
+    time = np.linspace(0.0, max(1.15 * room_ah / abs(current) * 3600.0, 5.0), 200)
+
+    def run(**options):
+        return simulate(
+            cell, time, np.full(200, current), soc0, [effect.activate()], degc, model=model, **options
+        )
+
+    if (model, effect.id) in REFUSED:
+        with pytest.raises(InputError, match="of itself"):
+            run()
+        return
+    followed = run(on_depletion="clip")
+    assert np.isfinite(followed.voltage_v).all()
+    if not (followed.series["depleted"] > 0).any():
+        assert run().voltage_v == pytest.approx(followed.voltage_v)
+        return
+    with pytest.raises(SimulationError) as caught:
+        run()
+    assert any(cause in str(caught.value) for cause in (*CAUSES, NO_REACTION))
+    assert "\n" not in str(caught.value)
 
 
 def test_where_a_porous_electrode_runs_dry_its_solution_goes_on_to_the_cut_off():

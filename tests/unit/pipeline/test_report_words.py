@@ -32,6 +32,9 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     better = replace(learned, models=(*view.models, {**row, "free_run": {"test_rmse_mv": 9.0}}))
     assert "takes it to 4.1 mV" in words.corrected_finding(better)
     assert words.corrected_finding(view) == ""
+    figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
+    refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))
+    assert "errs by 2.0 mV there: recalibrate it first" in words.corrected_finding(refit_does)
 
 
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])

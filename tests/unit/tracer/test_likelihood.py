@@ -1,4 +1,4 @@
-"""The likelihood against brute force: dense covariances, refits without a block, draws of its own noise."""
+"""The likelihood against brute force: dense covariances, refits without a block, draws of its noise."""
 
 import numpy as np
 import pytest

@@ -66,15 +66,18 @@ def files_figure(files: Sequence[Row], labels: Mapping[str, str]) -> Figure:
     return fig
 
 
-def dependence_bars(rows: Sequence[Row]) -> Figure:
-    """What the residual depends on, before and after."""
+def dependence_bars(rows: Sequence[Row], found: bool) -> Figure:
+    """What the residual depends on as declared and, where something was found, with it."""
     caption = "Share of the residual's variance on the fit part that each variable explains by itself."
     fig = style.figure(
         "What the residual depends on", caption, max(220, 110 + 34 * len(rows)), barmode="group"
     )
     rows = sorted(rows, key=lambda row: -row["before"])
     names = [row["variable"] for row in rows][::-1]
-    for state, label in (("after", "at the end"), ("before", "as declared")):
+    states = {"after": "with the finding", "before": "as declared"}
+    if not found:
+        del states["after"]
+    for state, label in states.items():
         fig.add_bar(
             x=[100 * row[state] for row in rows][::-1],
             y=names,

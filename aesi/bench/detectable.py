@@ -1,0 +1,50 @@
+"""Can the effects of a labelled case be seen at all? What no finder with this likelihood could name is told apart.
+
+A case asks for a change of the voltage of some size, but initial state of charge and own parameters may take most of
+it up. What the hypothesis with all effects of the label says of unseen data more than the best one that lacks one of
+them is what there is to be seen.
+"""
+
+from __future__ import annotations
+
+from aesi.data.blind import BlindCase
+from aesi.physics import Cell
+from aesi.physics.simulation import ModelName
+from aesi.tracer.case.blocks import blocks_of
+from aesi.tracer.case.reduction import with_fine_numerics
+from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.model_error import PRIORS
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import fitted_hypothesis
+
+SEEN_NATS = 5.0
+"""What an effect has to say to be admitted: 3.8 to 5.4 nats on 14 development cases of `aesi bench blind`, by
+surrogates."""
+MODEL_OF: dict[str, ModelName] = {"DFN": "dfn"}
+"""The model that makes the least of what the laboratory's leaves out; the single particle for all others."""
+
+
+def seen_nats(case: BlindCase) -> float | None:
+    """Nats that the label says more of unseen data than the best hypothesis without one of its effects; None for a case
+    without effects, or one that the model cannot simulate."""
+    if not case.effects:
+        return None
+    problem = inverse_problem(
+        Cell.from_bpx(case.declared),
+        case.measurements,
+        case.soc0,
+        model=MODEL_OF.get(case.spec.model, "espm"),
+    )
+    problem = with_fine_numerics(problem)
+    blocks = blocks_of(problem)
+    prior, archive = PRIORS[problem.trust], Archive(None, "")
+
+    def fit(hypothesis: tuple[str, ...]) -> FittedHypothesis | None:
+        return fitted_hypothesis(problem, blocks, hypothesis, None, prior.median_v, archive)
+
+    whole = fit(case.effects)
+    rests = [fit(tuple(e for e in case.effects if e != name)) for name in case.effects]
+    if whole is None:
+        return None
+    return whole.score.total - max((r.score.total for r in rests if r is not None), default=-float("inf"))

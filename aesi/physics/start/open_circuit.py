@@ -1,0 +1,85 @@
+"""A rest voltage of a cell as a state of charge, by its open-circuit potentials, and what it is uncertain by."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.constants import ZERO_CELSIUS_K
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+from aesi.physics.balance import aged_range
+from aesi.physics.cell import Cell
+from aesi.physics.espm.plain import shifted_ocp
+from aesi.records import Measurement
+
+GIVEN_SD = 0.0005
+"""Standard deviation of a state of charge that the user gives, and the least of any."""
+READING_V = 3e-3
+"""Standard deviation of a good open-circuit potential: half of what a calibration leaves of a C/20 discharge."""
+CHARGED_V = 0.03
+"""How far a full cell's voltage falls at rest: 6 to 30 mV in the charged records of four measured cells."""
+BEYOND_V = 0.05
+"""A voltage this far beyond the declared full or empty still belongs to a full or an empty cell of this kind."""
+GRID = 4001
+"""States of charge at which potentials are looked up."""
+
+
+class OpenCircuit:
+    """The open-circuit voltage of a cell (effects folded in) at the temperature of a record's first row."""
+
+    def __init__(self, cell: Cell, record: Measurement) -> None:
+        self.cell, self.record = cell, record
+        self.soc = np.linspace(*aged_range(cell), GRID)
+        self.ocv = np.maximum.accumulate(_ocv(cell, self.soc, self.kelvin()))
+
+    def kelvin(self) -> float:
+        """K, at the first row."""
+        measured = self.record.temperature_degc
+        if measured is not None:
+            return float(measured[0]) + ZERO_CELSIUS_K
+        return self.cell.initial_temperature_k
+
+    def soc_at(self, voltage_v: float) -> float:
+        """State of charge of an open-circuit voltage, held at the ends of the range."""
+        return float(np.interp(voltage_v, self.ocv, self.soc))
+
+    def voltage_at(self, soc: float) -> float:
+        """V, the open-circuit voltage."""
+        return float(np.interp(soc, self.soc, self.ocv))
+
+    def full_sd(self, voltage_v: float) -> float:
+        """Standard deviation of the state of charge of a full cell that rests at `voltage_v`."""
+        return max(0.5 * (1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), READING_V)[1])
+
+    def charged(self, voltage_v: float, drop_v: float = 0.0) -> bool:
+        """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""
+        as_read = voltage_v - max(drop_v, 0.0)
+        highest = max(float(self.ocv[-1]), self.cell.upper_voltage_v)
+        return voltage_v >= self.cell.upper_voltage_v - CHARGED_V and as_read <= highest + BEYOND_V
+
+    def reading(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
+        """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans."""
+        if not self.admits(voltage_v, spread_v):
+            low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
+            raise DataError(
+                f"{self.record.name}: a rest voltage of {voltage_v:.4f} V lies outside [{low:.3f}, {high:.3f}] V, what "
+                f"the open-circuit potentials and stoichiometry limits of {self.cell.name} allow; check that the "
+                "record belongs to this cell, or give --soc0."
+            )
+        ends = np.interp([voltage_v - spread_v, voltage_v + spread_v], self.ocv, self.soc)
+        sd = max(0.5 * float(ends[1] - ends[0]), GIVEN_SD)
+        return self.soc_at(voltage_v), sd
+
+    def admits(self, voltage_v: float, spread_v: float) -> bool:
+        """Is there a state of this cell that rests within two of the given deviations of the voltage?"""
+        low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
+        beyond = max(BEYOND_V, 2.0 * spread_v)
+        return bool(low - beyond <= voltage_v <= high + beyond)
+
+
+def _ocv(cell: Cell, soc: Array, kelvin: float) -> Array:
+    rise = kelvin - cell.reference_temperature_k
+    n, p = cell.negative, cell.positive
+    theta_n = n.theta_min + soc * (n.theta_max - n.theta_min)
+    theta_p = p.theta_max - soc * (p.theta_max - p.theta_min)
+    return shifted_ocp(p, rise)(theta_p) - shifted_ocp(n, rise)(theta_n)

@@ -1,0 +1,26 @@
+"""What is known of a record's first row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Basis = Literal["given", "full charge", "rest", "load"]
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """soc : state of charge at rest before the first row, by the declared windows.  sd : its standard deviation.
+
+    basis : what it rests on.  sentence : the same for a reader, with the figures.  contradicted : True where a given
+    state of charge is far from that of the voltage.  rest_voltage_v : at which the cell rests there, as read.
+    doubt : how far the reading of the voltage is from what was given.
+    """
+
+    soc: float
+    sd: float
+    basis: Basis
+    sentence: str
+    contradicted: bool = False
+    rest_voltage_v: float | None = None
+    doubt: float = 0.0

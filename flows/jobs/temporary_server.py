@@ -1,0 +1,114 @@
+"""What may go wrong with Prefect beside a run, and what it costs: its pages, never the run.
+
+Prefect starts a server of its own where none is configured. On a busy machine that takes minutes, and Prefect counts
+its own pauses, not the clock; a second thread that asks for the server while the first still waits is told an address
+where nothing listens yet (`httpx.ConnectError`). So it is started here, alone, before Prefect needs it.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+from aesi.errors import AesiError
+from flows.base.time_limit import Overdue, time_limit
+
+T = TypeVar("T")
+START_S = 60.0
+"""Wall time for the server to answer: 24 s were the longest seen on a machine that does nothing else, and after ten
+minutes of a machine with four times as much to do as it has cores it had not."""
+
+
+class ServerNotStarted(AesiError):
+    """Prefect's temporary server does not answer in time."""
+
+
+def start_server(limit_s: float = START_S) -> None:
+    """Start Prefect's temporary server where no server is configured. Raises ServerNotStarted."""
+    from prefect.server.api.server import SubprocessASGIServer
+    from prefect.settings import PREFECT_API_URL
+
+    if PREFECT_API_URL.value():
+        return
+    server = SubprocessASGIServer()
+    try:
+        with time_limit(limit_s):
+            server.start()
+    except Exception as error:
+        server.stop()
+        late = isinstance(error, Overdue)
+        reason = f"it does not answer after {limit_s:g} s" if late else first_line(error)
+        raise ServerNotStarted(reason) from error
+
+
+def of_prefect(error: Exception) -> bool:
+    """Whether it was Prefect's server that did not answer, or not as it should, and not the work that it shows."""
+    import httpx
+    from prefect.exceptions import PrefectException
+
+    return isinstance(error, httpx.HTTPError | PrefectException)
+
+
+def no_answer(error: Exception) -> bool:
+    """Whether nothing came back at all."""
+    import httpx
+
+    return isinstance(error, httpx.TransportError)
+
+
+def stop_sending() -> None:
+    """Send no more of the run's log to a server that is lost: each batch would be an error on the console."""
+    from prefect.logging.handlers import APILogHandler
+
+    for name in list(logging.root.manager.loggerDict):
+        logger = logging.getLogger(name)
+        for handler in logger.handlers[:]:
+            if isinstance(handler, APILogHandler):
+                logger.removeHandler(handler)
+
+
+def first_line(error: Exception) -> str:
+    """What an exception says, in one line of at most 200 characters; its type where it says nothing."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
+
+
+@dataclass
+class KeptWork(Generic[T]):
+    """What a piece of work came to, whatever Prefect makes of it; a try each where Prefect tries it again."""
+
+    results: list[T] = field(default_factory=list)
+    errors: list[BaseException] = field(default_factory=list)
+
+    def do(self, work: Callable[[], T]) -> T:
+        """The work, with what comes of it kept."""
+        try:
+            result = work()
+        except BaseException as error:
+            self.errors.append(error)
+            raise
+        self.results.append(result)
+        return result
+
+    def outcome(self, otherwise: Callable[[], T]) -> T:
+        """What came of the work, as it would have come without Prefect; `otherwise`, where it has not begun.
+
+        Raises what the work raised where it was not tried again with success.
+        """
+        if self.results:
+            return self.results[-1]
+        if self.errors:
+            raise self.errors[-1]
+        return otherwise()
+
+
+CURRENT: ContextVar[KeptWork[Any] | None] = ContextVar("job", default=None)
+"""The job of this process that a flow is started for; a flow that a deployment started has none."""
+
+
+def as_the_job(work: Callable[[], T]) -> T:
+    """The work of a flow, kept for the process that started it."""
+    job = CURRENT.get()
+    return work() if job is None else job.do(work)

@@ -1,0 +1,80 @@
+"""Where a search looks for the next effect, and which of several that say as much it takes."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from aesi.physics.effects import CATALOGUE
+from aesi.tracer.case.blocks import blocks_of
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
+from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.likelihood.growth import Parent, grow
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import ALIKE_NATS, MOVED_SDS, as_declared, base_of, fitted_hypothesis
+from aesi.tracer.search.forward import most_plausible
+
+ADDED_OHM = 2e-3
+SIZE_V = 2e-4
+
+
+@pytest.fixture(scope="module")
+def resisting(cell, few):
+    """The problem of a cell with a resistance that it does not declare, and what may be tried."""
+
+    def problem(make):
+        data = make((CATALOGUE["series_resistance"].activate(resistance_ohm=ADDED_OHM),))
+        names = (*few, "electrolyte_transport", "charge_transfer_kinetics")
+        return inverse_problem(cell, [data], 0.9, effects={name: CATALOGUE[name] for name in names})
+
+    return problem
+
+
+def own_coordinates(fit):
+    return [x for f, x in zip(fit.free, fit.point.x, strict=True) if f.own and f.owner != STATE_OF_CHARGE]
+
+
+def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_had_made_up_for_it(
+    resisting, make
+):
+    problem = resisting(make)
+    blocks, archive = blocks_of(problem), Archive(None, "")
+    base = base_of(problem, blocks, archive)
+    assert max(np.abs(own_coordinates(base))) > MOVED_SDS  # a resistance that is not there, as slow kinetics
+    there = as_declared(problem, blocks, base)
+    assert own_coordinates(there) == [0.0] * len(own_coordinates(base))
+    whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, SIZE_V, archive)
+    gains = [
+        grow(Parent(problem, blocks, one), "series_resistance", SIZE_V).score.total for one in (base, there)
+    ]
+    off = [abs(gain - whole.score.total) for gain in gains]
+    assert off[1] < min(off[0], 3.0)
+
+
+def test_a_hypothesis_that_moved_nothing_far_is_grown_where_it_is(cell, few, make):
+    problem = inverse_problem(cell, [make()], 0.9, effects=few)
+    blocks = blocks_of(problem)
+    assert as_declared(problem, blocks, base_of(problem, blocks, Archive(None, ""))) is None
+
+
+def said(total, evidence):
+    return SimpleNamespace(score=SimpleNamespace(total=total, evidence=evidence))
+
+
+def test_of_effects_that_say_as_much_the_one_of_the_most_usual_values_is_taken():
+    best, alike, worse = (
+        said(10.0, 1.0),
+        said(10.0 - 0.9 * ALIKE_NATS, 5.0),
+        said(10.0 - 2 * ALIKE_NATS, 99.0),
+    )
+    assert most_plausible([best, alike, worse]) is alike
+    assert most_plausible([best, worse]) is best
+    assert most_plausible([]) is None
+
+
+def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
+    kinetics = of_effect("charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters)
+    loose = [p.spread.loose for p in CATALOGUE["charge_transfer_kinetics"].parameters.values()]
+    assert [one.sd for one in kinetics] == loose
+    lost = of_effect("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters)
+    assert lost[0].sd > CATALOGUE["lithium_inventory_loss"].parameters["loss"].spread.loose  # cells age
