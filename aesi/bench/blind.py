@@ -50,10 +50,12 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     cells : folder of the declared cell files.  limit_s : processor seconds of the tracer; a case that takes longer
     is a miss.
     """
+    began = time.perf_counter()
     try:
         case = generate(spec, cells_in(Path(cells)))
     except SimulationError as error:
-        return {**_planned(spec), "verdict": NOT_MADE, "error": str(error)}
+        took = {"ours_s": time.perf_counter() - began}
+        return {**_planned(spec), "verdict": NOT_MADE, "error": str(error), **took}
     return _judged(case, limit_s)
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from aesi.errors import InputError
 from aesi.physics import Cell
-from aesi.physics.cell.parts import FITTED_WITH, UNITY
+from aesi.physics.cell.parts import UNITY
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
@@ -129,11 +129,7 @@ def _options_of(cell: Cell, active: ActiveEffect) -> _Pybamm | None:
 
 
 def _bpx(cell: Cell) -> str:
-    """The file; without words in the section User-defined, which the standard reads as formulas and refuses."""
-    content = cell.to_bpx()
-    own = content["Parameterisation"].get("User-defined", {})
-    own.pop(FITTED_WITH, None)
-    return json.dumps(content, indent=1) + "\n"
+    return json.dumps(cell.to_bpx(), indent=1) + "\n"
 
 
 def _said(effect: ActiveEffect) -> str:

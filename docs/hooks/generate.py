@@ -235,8 +235,10 @@ def _from_root(name: str) -> str:
 IN_COLUMNS = {
     "blind": (
         ("cases", "cases"),
+        ("not_made", "beside them, that the laboratory could not make"),
         ("no_answer", "without an answer (out of time, or refused)"),
         ("effect_exact", "effects named exactly"),
+        ("seen_exact", "the same, of those that say enough of unseen data to be named at all"),
         ("effect_grouped", "effects named within a group of three"),
         ("effect_lenient", "the same, listed alternatives counted as right"),
         ("pair_both_named", "pairs, both named"),

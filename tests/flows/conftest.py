@@ -30,6 +30,7 @@ def home(folder):
     """The folder as the workspace, for fixtures that outlive a test."""
     before = os.environ.get("AESI_HOME")
     os.environ["AESI_HOME"] = str(folder)
+    os.environ.pop("MLFLOW_TRACKING_URI", None)  # which MLflow sets itself when a model is logged
     environment.prepare_process()
     try:
         yield

@@ -71,7 +71,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         film_resistance_ohm=float(user.get(FILM_RESISTANCE, 0.0)),
         film_ea_j_mol=float(user.get(FILM_ENERGY, 0.0)),
         capacity_shares=tuple((str(k), float(v)) for k, v in (user.get(CAPACITY_SHARES) or {}).items()),
-        fitted_with=str(user.get(FITTED_WITH, "")),
+        fitted_with=next((model for model, field in FITTED_WITH.items() if user.get(field)), ""),
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),

@@ -67,7 +67,7 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
     own: dict[str, Any] = {
         CONTACT_RESISTANCE: cell.contact_resistance_ohm,
         FILM_RESISTANCE: cell.film_resistance_ohm,
-        FITTED_WITH: cell.fitted_with,
+        **{field: float(model == cell.fitted_with) for model, field in FITTED_WITH.items()},
         CAPACITY_SHARES: dict(cell.capacity_shares),
     }
     if cell.film_resistance_ohm:

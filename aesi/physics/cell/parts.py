@@ -20,7 +20,8 @@ UNITY = Constant(1.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
 HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
-FITTED_WITH = "Fitted with model"
+FITTED_WITH = {model: f"Fitted with {model}" for model in ("espm", "dfn")}
+"""Fields of `fitted_with`, one of them 1: the standard takes numbers there, and reads words as formulas."""
 CAPACITY_SHARES = "Capacity share by record"
 FILM_RESISTANCE = "Film resistance [Ohm]"
 FILM_ENERGY = "Film resistance activation energy [J.mol-1]"

@@ -80,12 +80,13 @@ class FreeParameter:
         return below or (high - x < near and abs(high) > near)
 
 
-def of_effect(effect: str, parameters: Mapping[str, Parameter]) -> list[FreeParameter]:
-    """The parameters of an effect under test: as wide as is expected of it, or else as it allows."""
-    return [_of_effect(effect, name, p) for name, p in parameters.items()]
+def of_effect(effect: str, parameters: Mapping[str, Parameter], capacity_ah: float) -> list[FreeParameter]:
+    """The parameters of an effect under test in a cell of this capacity: as wide as is expected of it, or else as it
+    allows."""
+    return [_of_effect(effect, name, p, capacity_ah) for name, p in parameters.items()]
 
 
-def _of_effect(effect: str, name: str, p: Parameter) -> FreeParameter:
+def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> FreeParameter:
     low, high = p.bounds
     inside = p.neutral is not None and low <= p.neutral <= high
     centre = float(p.neutral) if inside and p.neutral is not None else p.default
@@ -93,16 +94,20 @@ def _of_effect(effect: str, name: str, p: Parameter) -> FreeParameter:
     scale = np.log if log else float
     reach = max(scale(high) - scale(centre), scale(centre) - scale(low))
     return FreeParameter(
-        effect, name, p.unit, low, high, log, centre, _expected(p) or float(reach) / 2.0, False,
+        effect, name, p.unit, low, high, log, centre, _expected(p, capacity_ah) or float(reach) / 2.0, False,
         p.neutral is not None, p.default, p.low_is_limit,
     )  # fmt: skip
 
 
-def _expected(p: Parameter) -> float | None:
+def _expected(p: Parameter, capacity_ah: float) -> float | None:
     """Standard deviation of how far a parameter under test is from where it does nothing, None where that is not known:
-    of what every cell file declares, how far files of other cells of its make are off."""
-    declared = p.spread is not None and p.spread.tight is not None and p.neutral is not None and p.log
-    return p.spread.loose if declared and p.spread is not None else p.expected
+    of contacts, and of what every cell file declares, how far files of other cells of its make are off."""
+    if p.spread is not None and p.spread.loose is not None and p.neutral is not None:
+        if p.spread.ohmic:
+            return p.spread.loose / capacity_ah
+        if p.spread.tight is not None and p.log:
+            return p.spread.loose
+    return p.expected
 
 
 def own(effect: str, name: str, p: Parameter, sd: float) -> FreeParameter:

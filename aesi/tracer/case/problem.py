@@ -78,7 +78,7 @@ class InverseProblem:
                 if sd is not None:
                     out.append(own(effect.id, name, p, sd))
         for effect_id in hypothesis:
-            out += of_effect(effect_id, self.effects[effect_id].parameters)
+            out += of_effect(effect_id, self.effects[effect_id].parameters, self.cell.nominal_capacity_ah)
         return tuple(out)
 
     def _soc0_sd(self, record: PreparedRecord) -> float:

@@ -91,7 +91,9 @@ class _Growth:
         self.parent, self.effect, self.delta_v = parent, effect, delta_v
         self.problem, fit = parent.problem, parent.fit
         self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
-        self.added = tuple(of_effect(effect, self.problem.effects[effect].parameters))
+        self.added = tuple(
+            of_effect(effect, self.problem.effects[effect].parameters, self.problem.cell.nominal_capacity_ah)
+        )
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}

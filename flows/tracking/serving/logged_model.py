@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +16,7 @@ if TYPE_CHECKING:
     from mlflow.models import ModelSignature
 
 CODE = Path(__file__).with_name("served_model.py")
+ADDRESS = "MLFLOW_TRACKING_URI"
 DEFAULT_SOC0 = 0.5
 """Of the example in a logged model's signature, where the model knows none."""
 NEEDS = ("bpx", "numba", "numpy", "pandas", "pyarrow", "pydantic", "quantile-forest", "scikit-learn", "scipy")
@@ -25,15 +29,29 @@ def log_hybrid(uri: str, run_id: str, folder: Path, registered_as: str | None) -
     if not folder.is_dir():
         raise ValueError(f"the model folder {folder} is gone")
     client = mlflow.MlflowClient(uri, uri)
-    before = mlflow.get_tracking_uri()
-    mlflow.set_tracking_uri(uri)
-    mlflow.set_registry_uri(uri)  # registering resolves the model through the global address
-    try:
+    with _addressed(uri):
         model_id = _logged_before(client, run_id) or _log(run_id, folder)
         if registered_as and not client.search_model_versions(f"run_id = '{run_id}'"):
             _register(client, registered_as, run_id, model_id)
+
+
+@contextmanager
+def _addressed(uri: str) -> Iterator[None]:
+    """MLflow's global address, through which registering resolves a model; setting it sets the environment, too, where
+    it would be taken for the address that the next run of this process is to be tracked at."""
+    import mlflow
+
+    before, environment = mlflow.get_tracking_uri(), os.environ.get(ADDRESS)
+    mlflow.set_tracking_uri(uri)
+    mlflow.set_registry_uri(uri)
+    try:
+        yield
     finally:
         mlflow.set_tracking_uri(before)
+        if environment is None:
+            os.environ.pop(ADDRESS, None)
+        else:
+            os.environ[ADDRESS] = environment
 
 
 def _logged_before(client: MlflowClient, run_id: str) -> str | None:

@@ -176,7 +176,7 @@ def test_no_arguments_make_a_traceback(call, tracked, arguments):
         (["aesi", "dis"], "discover"),
         (["aesi", "effects", "self_h"], "self_heating"),
         (["aesi", "bench", "tra"], "tracking"),
-        (["aesi", "data", "get", "about"], "about_energy_nmc"),
+        (["aesi", "data", "get", "lg_m"], "lg_m50t_w8"),
     ],
 )
 def test_the_shell_is_offered_names(words, offered):

@@ -115,6 +115,7 @@ def test_a_case_that_the_laboratory_cannot_make_is_counted_and_stops_nothing(mon
     monkeypatch.setattr(blind, "generate", refused)
     row = blind.judged(blind.chosen(cases=1)[0], str(CELLS))
     assert row["verdict"] == blind.NOT_MADE
+    assert row["ours_s"] >= 0.0
     assert "maximum voltage" in row["error"]
     summary = blind.summary([row])
     assert (summary["cases"], summary["not_made"], summary["exact_cases"]) == (0, 1, 0)

@@ -4,6 +4,7 @@ import copy
 import json
 from pathlib import Path
 
+import bpx
 import numpy as np
 import pytest
 
@@ -81,7 +82,7 @@ def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
     content["Parameterisation"]["User-defined"] = {
         "Negative electrode reaction rate factor": {"x": [0.1, 0.9], "y": [0.5, 2.0]},
         "Positive electrode double-layer capacity [F.m-2]": 0.3,
-        "Fitted with model": "dfn",
+        "Fitted with dfn": 1.0,
         "Capacity share by record": {"march": 1.0, "july": 0.9},
     }
     cell = Cell.from_bpx(content)
@@ -175,3 +176,8 @@ def test_the_rest_voltage_leads_back_to_the_state_of_charge(lg_m50, soc):
 def test_a_rest_voltage_out_of_range_says_which_range(lg_m50):
     with pytest.raises(SimulationError, match=r"5\.0000 V lies outside"):
         initial_soc(lg_m50, 5.0)
+
+
+@pytest.mark.parametrize("path", sorted(CELLS.glob("*.bpx.json")), ids=lambda path: path.name)
+def test_the_standards_own_reader_takes_each_shipped_file(path):
+    assert bpx.parse_bpx_obj(json.loads(path.read_text(encoding="utf-8"))) is not None

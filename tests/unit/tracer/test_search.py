@@ -73,8 +73,10 @@ def test_of_effects_that_say_as_much_the_one_of_the_most_usual_values_is_taken()
 
 
 def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
-    kinetics = of_effect("charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters)
+    kinetics = of_effect("charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters, 30.0)
     loose = [p.spread.loose for p in CATALOGUE["charge_transfer_kinetics"].parameters.values()]
     assert [one.sd for one in kinetics] == loose
-    lost = of_effect("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters)
+    contact = of_effect("series_resistance", CATALOGUE["series_resistance"].parameters, 30.0)
+    assert contact[0].sd == CATALOGUE["series_resistance"].parameters["resistance_ohm"].spread.loose / 30.0
+    lost = of_effect("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters, 30.0)
     assert lost[0].sd > CATALOGUE["lithium_inventory_loss"].parameters["loss"].spread.loose  # cells age
