@@ -81,8 +81,7 @@ def _planned(spec: CaseSpec) -> dict[str, Any]:
 
 def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
     began, processor = time.perf_counter(), time.process_time()
-    spec = case.spec
-    row = _planned(spec) | {"label": case.label, "unexplained_mv": case.truth["rms_mv"]}
+    row = _planned(case.spec) | {"label": case.label, "unexplained_mv": case.truth["rms_mv"]}
     content: dict[str, Any] = {}
     try:
         with processor_limit(limit_s):

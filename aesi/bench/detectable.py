@@ -21,8 +21,6 @@ from aesi.tracer.search.fitted import fitted_hypothesis
 SEEN_NATS = 5.0
 """What an effect has to say to be admitted: 3.8 to 5.4 nats on 14 development cases of `aesi bench blind`, by
 surrogates."""
-MODEL_OF: dict[str, ModelName] = {"DFN": "dfn"}
-"""The model that makes the least of what the laboratory's leaves out; the single particle for all others."""
 
 
 def seen_nats(case: BlindCase) -> float | None:
@@ -30,13 +28,10 @@ def seen_nats(case: BlindCase) -> float | None:
     without effects, or one that the model cannot simulate."""
     if not case.effects:
         return None
-    problem = inverse_problem(
-        Cell.from_bpx(case.declared),
-        case.measurements,
-        case.soc0,
-        model=MODEL_OF.get(case.spec.model, "espm"),
+    model: ModelName = "dfn" if case.spec.model == "DFN" else "espm"
+    problem = with_fine_numerics(
+        inverse_problem(Cell.from_bpx(case.declared), case.measurements, case.soc0, model=model)
     )
-    problem = with_fine_numerics(problem)
     blocks = blocks_of(problem)
     prior, archive = PRIORS[problem.trust], Archive(None, "")
 
@@ -44,7 +39,7 @@ def seen_nats(case: BlindCase) -> float | None:
         return fitted_hypothesis(problem, blocks, hypothesis, None, prior.median_v, archive)
 
     whole = fit(case.effects)
-    rests = [fit(tuple(e for e in case.effects if e != name)) for name in case.effects]
     if whole is None:
         return None
+    rests = [fit(tuple(e for e in case.effects if e != name)) for name in case.effects]
     return whole.score.total - max((r.score.total for r in rests if r is not None), default=-float("inf"))

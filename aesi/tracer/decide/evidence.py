@@ -128,9 +128,8 @@ def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tupl
     one, other = exact.chosen.score, tight.chosen.score
     ahead = one.total - other.total
     if abs(ahead) < ALIKE_NATS:
-        names = [len(path.chosen.hypothesis) for path in (exact, tight)]
-        ahead = one.evidence - other.evidence
-        ahead -= (names[0] - names[1]) * np.log(len(exact.problem.competing()))
+        more_names = len(exact.chosen.hypothesis) - len(tight.chosen.hypothesis)
+        ahead = one.evidence - other.evidence - more_names * np.log(len(exact.problem.competing()))
     return (exact, first) if ahead > 0.0 else (tight, second)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V
+from aesi.tracer.search.fitted import ALIKE_NATS
 from aesi.tracer.search.path import Path, unseen_rmse_v
 
 Word = Literal["found", "none", "unknown"]
@@ -35,7 +36,7 @@ class Thresholds:
     noise_share: float = 0.45
     solver_v: float = 4e-4
     alike_sds: float = 1.64
-    alike_nats: float = 3.0
+    alike_nats: float = ALIKE_NATS
 
 
 @dataclass(frozen=True)

@@ -57,7 +57,7 @@ def searched(
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
     for _ in range(max_effects):
-        step, refused = _step(problem, blocks, parents, chosen, slopes, archive, report)
+        step, refused = _step(problem, blocks, parents, slopes, archive, report)
         slopes = slopes or {g.hypothesis[-1]: g.slopes_v for g in step.grown}
         notes += refused
         steps.append(step)
@@ -117,12 +117,13 @@ def _step(
     problem: InverseProblem,
     blocks: Blocks,
     parents: Sequence[FittedHypothesis],
-    best: FittedHypothesis,
     slopes: Mapping[str, Array],
     archive: Archive,
     report: Report,
 ) -> tuple[Step, list[str]]:
-    grown, refused = _grown([Parent(problem, blocks, fit) for fit in parents], slopes, archive)
+    """parents : the hypothesis that was chosen so far, then others to grow from."""
+    best, places = parents[0], [Parent(problem, blocks, fit) for fit in parents]
+    grown, refused = _grown(places, slopes, archive)
     slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
     declared = as_declared(problem, blocks, best)
     if declared is not None:
@@ -131,7 +132,7 @@ def _step(
     for one in grown:
         report(problem, one, one.score.total - best.score.total)
     ranked = _ranked(grown)
-    least_nats = admission_nats(Parent(problem, blocks, best), slopes)
+    least_nats = admission_nats(places[0], slopes)
     fitted = []
     for one in _finalists(ranked, best):
         fit = fitted_hypothesis(problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, archive)
