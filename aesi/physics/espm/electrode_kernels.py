@@ -3,11 +3,12 @@
 Each electrode holds units: a particle of one size in one region. All units of an electrode see one potential Phi
 between its collector and the electrolyte at the separator's edge:
 
-    Phi = U(theta_u) + eta(y_u) + (L/sigma S + L/kappa E) y + chi ln(c_r / c_mean),   sum y + capacitive + plating = J
+    Phi = U(theta_u) + eta(y_u) + R(theta_u) y_u + (L/sigma S + L/kappa E) y + chi ln(c_r / c_mean)
+    sum y + capacitive + plating = J
 
-with y_u the current of unit u per cell area, positive for delithiation, J = I/A in the negative electrode and -I/A
-in the positive. Newton's method on all y and Phi, of one unit on its y alone: without a double layer it is there at
-once.
+with y_u the current of unit u per cell area, positive for delithiation, R the film's resistance over the unit's
+surface, J = I/A in the negative electrode and -I/A in the positive. Newton's method on all y and Phi, of one unit on
+its y alone: without a double layer it is there at once.
 """
 
 import math
@@ -96,6 +97,7 @@ def solve_electrode(  # type: ignore[no-untyped-def]
     temperature_rise,
     chi,
     exchange_factor,
+    film_factor,
     particles,
     surfaces,
     memory,
@@ -104,10 +106,11 @@ def solve_electrode(  # type: ignore[no-untyped-def]
 
     total : A/m2 of cell, positive for delithiation.  held : whether it jumped to this where the step began; a double
     layer's current is then no continuation of the last one, and would ring.  thermal : R T / F, V.
-    chi : 2 (1 - t+) R T / F, V.  exchange_factor : of temperature.  particles, surfaces, memory : see `layout`;
-    memory.delta and memory.layer are old in, new out.
+    chi : 2 (1 - t+) R T / F, V.  exchange_factor, film_factor : of temperature, on rates and films.
+    particles, surfaces, memory : see `layout`; memory.delta and memory.layer are old in, new out.
     """
     region_of, share, exchange = particles.place[:, 1], particles.share, particles.exchange
+    reactive, film = particles.reactive, surfaces.film[side]
     ocp, entropic, rate = surfaces.ocp[side], surfaces.entropic[side], surfaces.rate[side]
     alpha, capacity, plating = surfaces.alpha[side], surfaces.capacity[side], surfaces.plating
     y, theta, theta_pred, give, ohm, salt, log_salt, region_salt = memory[:8]
@@ -135,6 +138,9 @@ def solve_electrode(  # type: ignore[no-untyped-def]
                 y[u], exchange[u] * exchange_factor * lookup(rate, t), occupancy,
                 salt[k], salt[k + 1], salt[k + 2], log_salt[first + r] , alpha, thermal,
             )  # fmt: skip
+            resistance = lookup(film, t) * film_factor / reactive[u]
+            eta += resistance * y[u]
+            d_eta += resistance
             inside = min(max(t, 0.0), 1.0)
             last = ocp.shape[0] - 1
             cell = min(int(inside * last), last - 1)

@@ -44,7 +44,7 @@ def run_general(  # type: ignore[no-untyped-def]
     time, current, temperature, given, backward, substep, most = drive
     units, rates, gains, lump, share, volume = particles[:6]
     ocp, entropic, plating_active = surfaces.ocp, surfaces.entropic, surfaces.plating[0] > 0.0
-    energies, heat, area, separator, contact, film, reference_k = cell
+    energies, heat, area, separator, contact, reference_k = cell
     mean, kappa_table = electrolyte.mean, electrolyte.kappa
     c0, top = electrolyte.c0, electrolyte.top
     n_units, n_modes = rates.shape
@@ -166,6 +166,7 @@ def run_general(  # type: ignore[no-untyped-def]
                     rise,
                     chi,
                     quicker,
+                    1.0 / arrhenius(energies[6 + side], t_k, reference_k),
                     particles,
                     surfaces,
                     memory,
@@ -188,7 +189,7 @@ def run_general(  # type: ignore[no-untyped-def]
                 for r in range(regions):
                     plated[r] = max(plated[r] - surfaces.plating_to_c * plating_current[r] * dt, 0.0)
             voltage = phi_p - phi_n - j1 * separator / kappa[2 * regions]
-            voltage -= i1 * (contact + film / arrhenius(energies[6], t_k, reference_k))
+            voltage -= i1 * contact
             if heat[0] > 0.0:
                 power = -i1 * voltage
                 for u in range(n_units):

@@ -91,7 +91,7 @@ class Units(NamedTuple):
 
     place : (units, 2) electrode and region.  rates, gains : (units, modes) 1/s and stoichiometry/(A/m2 s).
     lump : (units,) of the means.  share, volume : (units,) of the electrode's reaction and material.
-    exchange : (units,) A/m2 of cell at unit salt and occupancy.
+    exchange : (units,) A/m2 of cell at unit salt and occupancy.  reactive : (units,) surface per area of cell.
     psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
     """
 
@@ -102,6 +102,7 @@ class Units(NamedTuple):
     share: Array
     volume: Array
     exchange: Array
+    reactive: Array
     psi: Array
     strength: Array
     at: Array
@@ -134,8 +135,9 @@ class Salt(NamedTuple):
 class Surfaces(NamedTuple):
     """Constants of both electrodes' surfaces.
 
-    ocp, entropic, rate : (2, table) V, V/K and factor of the rate constant.  alpha : (2,) transfer coefficients.
-    capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and transfer coefficient.
+    ocp, entropic, rate, film : (2, table) V, V/K, factor of the rate constant, ohm m2 of surface.
+    alpha : (2,) transfer coefficients.  capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and
+    transfer coefficient.
     plating_to_c : mol/m3 per C/m2.
     solid : (2, regions, regions) ohm m2.  salt : the same times the conductivity, by region crossed.
     """
@@ -143,6 +145,7 @@ class Surfaces(NamedTuple):
     ocp: Array
     entropic: Array
     rate: Array
+    film: Array
     alpha: Array
     capacity: Array
     plating: Array
@@ -154,8 +157,8 @@ class Surfaces(NamedTuple):
 class Whole(NamedTuple):
     """Numbers of the whole cell.
 
-    energies : (7,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
-    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact, film : ohm.
+    energies : (8,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
+    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact : ohm.
     reference_k : K.
     """
 
@@ -164,7 +167,6 @@ class Whole(NamedTuple):
     area: float
     separator: float
     contact: float
-    film: float
     reference_k: float
 
 
