@@ -28,6 +28,7 @@ FIRST_LENGTH = 0.25
 """Of a step, where double layers meet a current that has turned: whole steps of 1 s between edges of 0.1 s were 0.52 mV
 RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
 ROUND_OFF = 1e-9
+"""Of a step: less than this before the sample is no step any more."""
 
 
 @compiled
