@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.physics import Cell
 from aesi.physics.cell.parts import NO_FILM, UNITY
@@ -149,7 +150,9 @@ def _write(path: Path, text: str) -> Path:
 
 
 def _script(bpx: str, more: _Pybamm) -> str:
-    return SCRIPT.format(bpx=bpx, options=repr(more.options), values=repr(more.values))
+    return SCRIPT.format(
+        bpx=bpx, options=repr(more.options), values=repr(more.values), hour_s=SECONDS_PER_HOUR
+    )
 
 
 SCRIPT = '''"""The cell of {bpx} in PyBaMM, written by `aesi export --to pybamm`.
@@ -200,7 +203,7 @@ def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lith
 
 
 if __name__ == "__main__":
-    solution = simulation().solve([0, 3600])
+    solution = simulation().solve([0, {hour_s:.0f}])
     time_s, voltage_v = solution["Time [s]"].entries, solution["Voltage [V]"].entries
     print(f"{{voltage_v[0]:.4f}} V at the start, {{voltage_v[-1]:.4f}} V after {{time_s[-1]:.0f}} s")
 '''

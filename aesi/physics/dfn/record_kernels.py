@@ -9,10 +9,15 @@ from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
 from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
-from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
+from aesi.physics.espm.transport_kernels import (
+    DIFFUSIONS,
+    TEMPERATURE_STEP_K,
+    arrhenius,
+    heated,
+    mean_heat,
+    solid_forcing,
+)
 
-TEMPERATURE_STEP_K = 0.01
-"""Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
 SHORTER, SHORTEST = 0.25, 0.25**6
 """Where no reaction is found at the end of a step, a quarter of it is tried, down to the shortest: at the edges of
 potentials, and where one rises with lithium, the end of a long step has several solutions or none in reach."""
@@ -23,8 +28,7 @@ FIRST_LENGTH = 0.25
 """Of a step, where double layers meet a current that has turned: whole steps of 1 s between edges of 0.1 s were 0.52 mV
 RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
 ROUND_OFF = 1e-9
-DIFFUSIONS = (0, 1, 4)
-"""Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
+"""Of a step: less than this before the sample is no step any more."""
 
 
 @compiled

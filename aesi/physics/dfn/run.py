@@ -11,10 +11,10 @@ from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
 from aesi.physics.espm.kernels import CACHE_SLOTS
+from aesi.physics.espm.layout import VOLTAGE_ROWS
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
 
-VOLTAGE_ROWS = 7
 LONGER_STEPS = 5.0
 """Steps here over those of the single particle, whose deviations are of first order: on half-hour pulses 5 s instead of
 0.25 s move the voltage by 0.002 mV RMS, 15 s by 0.014, 60 s by 0.2."""

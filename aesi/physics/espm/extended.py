@@ -13,7 +13,7 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.modes.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
-from aesi.physics.espm.layout import Drive, Salt, Surfaces, Units, Whole
+from aesi.physics.espm.layout import VOLTAGE_ROWS, Drive, Salt, Surfaces, Units, Whole
 from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
     conductivity_table,
@@ -25,9 +25,6 @@ from aesi.physics.espm.tables import (
 )
 from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
 from aesi.records import Hold
-
-VOLTAGE_ROWS = 7
-"""Rows of the output that the plain path has too."""
 
 
 def run_extended(

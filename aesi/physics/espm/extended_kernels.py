@@ -15,6 +15,8 @@ from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops
 from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
 from aesi.physics.espm.layout import Memory, SaltMemory
 from aesi.physics.espm.transport_kernels import (
+    DIFFUSIONS,
+    TEMPERATURE_STEP_K,
     arrhenius,
     heated,
     mean_heat,
@@ -25,10 +27,6 @@ from aesi.physics.espm.transport_kernels import (
 )
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
-TEMPERATURE_STEP_K = 0.01
-"""Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
-DIFFUSIONS = (0, 1, 4)
-"""Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
 
 
 @njit(cache=True, nogil=True, fastmath=FASTMATH)

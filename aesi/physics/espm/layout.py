@@ -10,6 +10,10 @@ from typing import NamedTuple
 
 from aesi.numerics.typing import Array, IntArray
 
+VOLTAGE_ROWS = 7
+"""Rows of the output of every path: voltage, surface stoichiometries (n, p), salt at the collectors (n, p) and mean
+stoichiometries (n, p). Further states stand below."""
+
 
 class PlainSolid(NamedTuple):
     """Constants of both particles.

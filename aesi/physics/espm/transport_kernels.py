@@ -7,6 +7,11 @@ from numba import njit
 from aesi.constants import GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights, wet
 
+TEMPERATURE_STEP_K = 0.01
+"""Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
+DIFFUSIONS = (0, 1, 4)
+"""Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
+
 
 @njit(inline="always", fastmath=FASTMATH)
 def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
