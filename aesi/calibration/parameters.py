@@ -94,6 +94,9 @@ RATE_COURSES = (
 COURSE_SD = 1.2
 """Of a logarithm: a decade over the window is two of them. With 0.8 the rates of a Panasonic NCR18650PF, fitted to its
 pulses, ended at three deviations."""
+FILM_COURSE_SD = 2.0
+"""Of the logarithm. With 1.2 the negative film of the Panasonic NCR18650PF ended at four deviations where it is empty,
+a hundred times that of the window; its pulses at -10 degC left out."""
 DOUBLE_LAYER_F_M2, LAYER_SD = 1.0, 1.2
 """Between a smooth and a rough surface. With 0.2 and 0.7 the same pulses ended at four deviations, 3.2 F/m2."""
 LAYERS = "0.1 to 0.5 F/m2 of true surface, Ong & Newman 1999, doi:10.1149/1.1392643; up to 50 of the smooth spheres'"
@@ -124,7 +127,7 @@ def free_parameters(cell: Cell, span_k: float) -> tuple[Free, ...]:
             for what, sd, source in (
                 ("diffusivity", COURSE_SD, COURSES),
                 ("rate", COURSE_SD, RATE_COURSES),
-                ("film", COURSE_SD, FILM_COURSES),
+                ("film", FILM_COURSE_SD, FILM_COURSES),
             )
             for k in range(len(PLACES))
         ),
