@@ -12,8 +12,8 @@ from numba import njit
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops, solve_electrode
-from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
-from aesi.physics.espm.layout import Memory, SaltMemory
+from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, lookup, open_circuit
+from aesi.physics.espm.layout import CACHE_SLOTS, Memory, SaltMemory
 from aesi.physics.espm.transport_kernels import (
     DIFFUSIONS,
     TEMPERATURE_STEP_K,

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from aesi.numerics.typing import Array, IntArray
 
+CACHE_SLOTS = 64
+"""Lengths of a step whose weights are kept at a time."""
 VOLTAGE_ROWS = 7
 """Rows of the output of every path: voltage, surface stoichiometries (n, p), salt at the collectors (n, p) and mean
 stoichiometries (n, p). Further states stand below."""
@@ -72,6 +74,30 @@ class PlainCell(NamedTuple):
     path: float
     solid: float
     contact: float
+
+
+class PlainMemory(NamedTuple):
+    """What the steps of the plain path change.
+
+    z_n, z_p : (modes,) of the particles.  q, forcing, before : (salt modes,).  c, rest : (nodes,) mol/m3.
+    g : (6,) salt over rest at the Gauss points.
+    keys, parts : (slots,) nanoseconds of the steps whose weights are kept, and into how many each is divided.
+    w_n, w_p : (slots, 3, modes).  w_e : (slots, 5, salt modes).
+    """
+
+    z_n: Array
+    z_p: Array
+    q: Array
+    c: Array
+    g: Array
+    forcing: Array
+    before: Array
+    rest: Array
+    keys: IntArray
+    parts: IntArray
+    w_n: Array
+    w_p: Array
+    w_e: Array
 
 
 class Drive(NamedTuple):
