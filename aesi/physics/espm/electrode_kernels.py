@@ -114,7 +114,7 @@ def solve_unit(lo, side, total, at, particles, surfaces, memory):  # type: ignor
     first = side * memory.ohm.shape[0]
     phi, least, most = 0.0, -math.inf, math.inf
     for step in range(NEWTON_STEPS):
-        evaluate(lo, lo + 1, side, total, step == 0, at, particles, surfaces, memory)
+        evaluate_electrode(lo, lo + 1, side, total, step == 0, at, particles, surfaces, memory)
         phi = memory.potential[0] + memory.ohm[0, 0] * total + at.chi * memory.log_salt[first]
         off = memory.total[first] - total
         memory.total[first] = total
@@ -135,7 +135,7 @@ def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: 
     """Newton's method on the currents of several units and on Phi, which is returned."""
     matrix, n, phi = memory.matrix, hi - lo, 0.0
     for step in range(NEWTON_STEPS):
-        evaluate(lo, hi, side, total, step == 0, at, particles, surfaces, memory)
+        evaluate_electrode(lo, hi, side, total, step == 0, at, particles, surfaces, memory)
         if step == 0:
             phi = memory.potential[0]
         worst, off = linearise(lo, hi, side, total, phi, at.chi, particles, memory)
@@ -179,7 +179,7 @@ def linearise(lo, hi, side, total, phi, chi, particles, memory):  # type: ignore
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def evaluate(lo, hi, side, total, begins, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+def evaluate_electrode(lo, hi, side, total, begins, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
     """Potential, slope and gain of each unit at its current, and the current of each region with what passes its units.
 
     gain : of the region's current over the unit's: that of the first unit there moves double layer and plating too.
@@ -193,7 +193,9 @@ def evaluate(lo, hi, side, total, begins, at, particles, surfaces, memory):  # t
     for i in range(hi - lo):
         u = lo + i
         r = particles.place[u, 1]
-        memory.potential[i], memory.slope[i] = unit_potential(u, side, total, at, particles, surfaces, memory)
+        memory.potential[i], memory.slope[i] = surface_potential(
+            u, side, total, at, particles, surfaces, memory
+        )
         memory.gain[i] = 1.0
         memory.total[first + r] += memory.y[u]
         if math.isnan(memory.new_delta[r]):
@@ -210,7 +212,7 @@ def evaluate(lo, hi, side, total, begins, at, particles, surfaces, memory):  # t
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def unit_potential(u, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+def surface_potential(u, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
     """Potential (V) of unit u against the electrolyte beside it, at its current, and the slope in the current."""
     ocp, y, give = surfaces.ocp[side], memory.y, memory.give
     t = memory.pred[u] - give[u] * (y[u] - particles.share[u] * total)

@@ -47,7 +47,7 @@ def run_general(  # type: ignore[no-untyped-def]
         cell.area,
         cell.heat,
     )
-    start_at_rest(theta0, current[0] / area, particles, electrolyte, memory, modes, dissolved)
+    rest_particles(theta0, current[0] / area, particles, electrolyte, memory, modes, dissolved)
     t_k, t_weights = temperature[0], -1.0
     watts, last_j, last_step = 0.0, current[0] / area, 0.0
     fault_at, fault, driest, voltage = -1, 0, 1.0, 0.0
@@ -100,14 +100,14 @@ def run_general(  # type: ignore[no-untyped-def]
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat)
                 watts = power
         out[0, k], out[7, k] = voltage, t_k
-        what = record(k, driest, particles, memory, modes, dissolved.c, out)
+        what = record_sample(k, driest, particles, memory, modes, dissolved.c, out)
         if fault_at < 0 and what > 0:
             fault_at, fault = k, what
     return fault_at, fault
 
 
 @compiled
-def start_at_rest(theta0, density, particles, electrolyte, memory, modes, dissolved):  # type: ignore[no-untyped-def]
+def rest_particles(theta0, density, particles, electrolyte, memory, modes, dissolved):  # type: ignore[no-untyped-def]
     """Uniform particles and salt; each unit carries its share of the cell's current density."""
     dissolved.c.fill(electrolyte.c0)
     for u in range(memory.y.shape[0]):
@@ -266,7 +266,7 @@ def reaction_heat(t_k, cell, particles, surfaces, memory):  # type: ignore[no-un
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def record(k, driest, particles, memory, modes, c, out):  # type: ignore[no-untyped-def]
+def record_sample(k, driest, particles, memory, modes, c, out):  # type: ignore[no-untyped-def]
     """Means of the electrodes, salt at the collectors, plated lithium; returns what left its range, 0 for nothing."""
     what = 0
     for row in range(1, 7):

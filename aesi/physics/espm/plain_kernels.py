@@ -45,7 +45,7 @@ def run_linear(time, current, backward, theta0, solid, salt, cell, memory, out):
             slot = key % CACHE_SLOTS
             if memory.keys[slot] != key:
                 memory.keys[slot] = key
-                renew(dt, slot, solid, salt, memory)
+                renew_plain_weights(dt, slot, solid, salt, memory)
             above_n = step_solid(memory.z_n, memory.w_n, slot, -i0, -i1)
             above_p = step_solid(memory.z_p, memory.w_p, slot, i0, i1)
             charge = 0.5 * (i0 + i1) * dt
@@ -66,7 +66,7 @@ def run_linear(time, current, backward, theta0, solid, salt, cell, memory, out):
 
 
 @compiled
-def renew(dt, slot, solid, salt, memory):  # type: ignore[no-untyped-def]
+def renew_plain_weights(dt, slot, solid, salt, memory):  # type: ignore[no-untyped-def]
     """Weights of a step of length `dt`: of the particles' modes, and of the parts that the electrolyte takes it in."""
     rates, gains = solid.rates, solid.gains
     w_n, w_p, w_e = memory.w_n, memory.w_p, memory.w_e
