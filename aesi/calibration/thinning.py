@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.data.thinning import Spacing, averaged_over, condensed, current_steps, is_steady
+from aesi.data.thinning import Spacing, averaged_over, condensed, current_steps
 from aesi.numerics.typing import BoolArray
 from aesi.records import Hold, Measurement
 
@@ -36,13 +36,13 @@ class Thinned:
 
 def thinned(data: Measurement, capacity_ah: float, window_s: float = WINDOW_S) -> Thinned:
     """The rows that a fit sees.  capacity_ah : what a step of the current is measured by."""
-    steps = current_steps(data, capacity_ah)
-    if is_steady(data, steps):
-        longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_ROWS
-        rows, _ = condensed(data, steps, longest_s, SPACING)
-        gaps = np.diff(rows.time_s)
-        followed = np.append(gaps[1:], np.inf) < SOON_S
-        trusted = np.concatenate([[True], ~(current_steps(rows, capacity_ah) & followed)])
-        return Thinned(rows, trusted, "backward", min(max(float(np.median(gaps)), 1.0), 30.0))
-    rows = averaged_over(data, window_s)
-    return Thinned(rows, np.ones(len(rows), dtype=bool), "linear", max(window_s, 1.0))
+    longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_ROWS
+    steady = condensed(data, capacity_ah, longest_s, SPACING)
+    if steady is None:
+        rows = averaged_over(data, window_s)
+        return Thinned(rows, np.ones(len(rows), dtype=bool), "linear", max(window_s, 1.0))
+    rows, _ = steady
+    gaps = np.diff(rows.time_s)
+    followed = np.append(gaps[1:], np.inf) < SOON_S
+    trusted = np.concatenate([[True], ~(current_steps(rows, capacity_ah) & followed)])
+    return Thinned(rows, trusted, "backward", min(max(float(np.median(gaps)), 1.0), 30.0))

@@ -35,8 +35,8 @@ def current_steps(data: Measurement, capacity_ah: float) -> BoolArray:
     return np.abs(np.diff(data.current_a)) > STEP_C_RATE * capacity_ah
 
 
-def is_steady(data: Measurement, steps: BoolArray) -> bool:
-    """True for a record of steady currents, or of uneven times; False for a drive.  steps : see `current_steps`."""
+def _steady(data: Measurement, steps: BoolArray) -> bool:
+    """True for a record of steady currents, or of uneven times; False for a drive."""
     gaps = np.diff(data.time_s)
     typical = float(np.median(gaps))
     uneven = float(np.mean(np.abs(gaps - typical) > 0.5 * typical)) > UNEVEN_SHARE
@@ -77,15 +77,19 @@ def averaged_over(data: Measurement, step_s: float) -> Measurement:
 
 
 def condensed(
-    data: Measurement, steps: BoolArray, longest_s: float, spacing: Spacing
-) -> tuple[Measurement, Array]:
+    data: Measurement, capacity_ah: float, longest_s: float, spacing: Spacing
+) -> tuple[Measurement, Array] | None:
     """A record of steady currents and rests with few rows where little happens, and how many each stands for.
 
-    steps : see `current_steps`.  longest_s : the most that a row may stand for.
+    None for a drive, which `averaged_over` thins.  capacity_ah : what a step of the current is measured by.
+    longest_s : the most that a row may stand for.
     Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
     rate of sampling. Voltage, temperature and time are averages of the rows that one stands for; the current is what
     moves the charge of the record, as its logger held it ("backward").
     """
+    steps = current_steps(data, capacity_ah)
+    if not _steady(data, steps):
+        return None
     t = data.time_s
     n = len(t)
     first = np.concatenate([[True], steps])

@@ -19,15 +19,11 @@ Cost = Callable[[Array], float]
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where a descent ended: x (n,), half the sum of squares there, and how many steps it took.
-
-    stalled : whether it ended because no step along the slopes it was given gained anything.
-    """
+    """Where a descent ended: x (n,), half the sum of squares there, and how many steps it took."""
 
     x: Array
     cost: float
     steps: int
-    stalled: bool = False
 
 
 def descend(
@@ -64,7 +60,7 @@ def descend(
                 break
             damping *= 8.0
         if not gained:
-            return Minimum(x, best, step + 1, stalled=True)
+            return Minimum(x, best, step + 1)
         gain, x, best = best - value, trial, value
         damping = max(damping / 5.0, 1e-6)
         if gain < tolerance:

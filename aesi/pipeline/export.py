@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.physics import Cell
-from aesi.physics.cell.parts import UNITY
+from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
@@ -76,7 +77,7 @@ def _beyond_bpx(cell: Cell) -> list[str]:
     """What a calibrated cell holds in its section User-defined that neither target takes over."""
     both = (cell.negative, cell.positive)
     own = {
-        "resistance of films": bool(cell.film_resistance_ohm),
+        "resistance of films": any(x.film_ohm_m2 != NO_FILM for x in both),
         "rates over stoichiometry": any(x.rate_factor != UNITY for x in both),
         "double layers": any(x.double_layer_f_m2 for x in both),
     }
@@ -149,7 +150,9 @@ def _write(path: Path, text: str) -> Path:
 
 
 def _script(bpx: str, more: _Pybamm) -> str:
-    return SCRIPT.format(bpx=bpx, options=repr(more.options), values=repr(more.values))
+    return SCRIPT.format(
+        bpx=bpx, options=repr(more.options), values=repr(more.values), hour_s=SECONDS_PER_HOUR
+    )
 
 
 SCRIPT = '''"""The cell of {bpx} in PyBaMM, written by `aesi export --to pybamm`.
@@ -200,7 +203,7 @@ def simulation(time_s=None, current_a=None, soc0: float = 1.0, model=pybamm.lith
 
 
 if __name__ == "__main__":
-    solution = simulation().solve([0, 3600])
+    solution = simulation().solve([0, {hour_s:.0f}])
     time_s, voltage_v = solution["Time [s]"].entries, solution["Voltage [V]"].entries
     print(f"{{voltage_v[0]:.4f}} V at the start, {{voltage_v[-1]:.4f}} V after {{time_s[-1]:.0f}} s")
 '''

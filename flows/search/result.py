@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -101,10 +100,6 @@ class SearchResult:
         score, _, trial = max(scored, key=lambda entry: entry[:2])
         return Pick(weights, trial, score)
 
-    def sensitivity(self, several: Sequence[FitnessWeights] = ()) -> tuple[Pick, ...]:
-        """The picks under other weights (default: each loss in turn counting little, or most)."""
-        return tuple(self.best(weights) for weights in several or _around(self.weights))
-
     def _nothing_feasible(self) -> str:
         reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)
         listed = "; ".join(f"{count} x {reason}" for reason, count in reasons.most_common(4))
@@ -125,16 +120,4 @@ def _read(trial: FrozenTrial) -> Trial:
         done and violation(trial) == 0,
         numbers,
         trial.user_attrs.get("reason"),
-    )
-
-
-def _around(centre: FitnessWeights) -> tuple[FitnessWeights, ...]:
-    few, most = 0.1, 0.8
-    return (
-        centre,
-        FitnessWeights(most, few, few),
-        FitnessWeights(few, most, few),
-        FitnessWeights(few, few, most),
-        FitnessWeights(0.5, 0.5, 0.0),
-        FitnessWeights(1 / 3, 1 / 3, 1 / 3),
     )

@@ -38,7 +38,7 @@ WITH_UNIT = {
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
     """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
     content = loaded.config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
-    tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}", RUN_COLUMNS))
+    tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
     tags = {NOTE: config.note, "aesi.setting": loaded.setting}
     if loaded.fallback:
         tags["aesi.fallback"] = loaded.fallback
@@ -128,7 +128,8 @@ def track_result(
             tracker.metrics(numbers)
     headline = next(row for row in summary["models"] if row["name"] == chosen)
     tags = {
-        NOTE: f"{note}\n\n{result_line(headline)} Candidate {number} of the search; the report is an artifact."
+        NOTE: f"{note}\n\n{result_line(headline)} Candidate {number} of the search; "
+        "the report is an artifact.".strip()
     }
     tracker.parameters({"chosen_candidate": number, "chosen_model": chosen}, tags)
     tracker.mark(f"candidate:{number}", {CHOSEN: "true"})

@@ -1,6 +1,7 @@
 """What every registered method promises, whatever it does inside."""
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -47,8 +48,8 @@ def test_an_interval_uses_only_what_came_before(calibrated: Calibrated) -> None:
 def test_the_stream_gives_the_intervals_of_the_replay(calibrated: Calibrated) -> None:
     record = series(700, 5)
     record[[100, 300, 301]] = np.nan
-    replay = calibrated.adaptive(0.05).intervals(record)
-    stream = calibrated.adaptive(0.05).stream()
+    replay = replace(calibrated, rate=0.05).intervals(record)
+    stream = replace(calibrated, rate=0.05).stream()
     bounds = []
     for error in record:
         bounds.append(stream.interval())
@@ -160,7 +161,7 @@ def test_fitting_twice_gives_the_same_intervals() -> None:
 
 def test_a_constant_stretch_never_gets_a_band_of_width_zero(calibrated: Calibrated) -> None:
     record = np.zeros(2000)
-    widths = calibrated.adaptive(0.05).intervals(record).width_v
+    widths = replace(calibrated, rate=0.05).intervals(record).width_v
     assert widths.min() >= calibrated.floor_v > 0
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from aesi.bench import CaseRow
 from aesi.bench.physics.espm import STEP_S, random_load
 from aesi.bench.physics.published import published
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, EspmModel
@@ -132,7 +133,7 @@ def pulse_load(current_a: float, seconds: int) -> tuple[Array, Array]:
 
 def discharge_load(rate: float, capacity_ah: float) -> tuple[Array, Array]:
     """Break points and current of 60 % of the capacity at a constant rate, and a rest."""
-    end = 0.6 * 3600.0 / rate
+    end = 0.6 * SECONDS_PER_HOUR / rate
     breaks = np.array([0.0, 10.0, 11.0, end, end + 1.0, end + 300.0])
     return breaks, rate * capacity_ah * np.array([0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -68,10 +68,6 @@ class Calibrated:
     def stream(self) -> Stream:
         """A fresh stream, at the start of a record."""
         return Stream(self)
-
-    def adaptive(self, rate: float) -> Calibrated:
-        """The same intervals with another rate of the adaptive step (0 turns it off)."""
-        return replace(self, rate=rate)
 
     def to_dict(self) -> SavedState:
         """Plain values and numpy arrays only; `aesi.conformal.calibrated_from_dict` restores the same

@@ -15,21 +15,15 @@ class BlindCell:
     charge pulses stay near the window of voltage."""
 
     file: str
-    chemistry: str
-    licence: str
     rate: float
     soc0: tuple[float, float]
 
 
 CELLS: Mapping[str, BlindCell] = {
-    "nmc": BlindCell(
-        "nmc_30ah.bpx.json", "NMC111|graphite pouch", "CC BY-SA 4.0, About:Energy", 1.0, (0.8, 0.95)
-    ),
-    "lg_m50": BlindCell(
-        "lg_m50_chen2020.bpx.json", "NMC811|graphite-SiOx", "BSD 3-Clause, PyBaMM", 0.7, (0.6, 0.75)
-    ),
-    "lfp": BlindCell("lfp_prada2013.bpx.json", "LFP|graphite", "BSD 3-Clause, PyBaMM", 1.2, (0.75, 0.9)),
-    "nca": BlindCell("nca_kim2011.bpx.json", "NCA|graphite power", "BSD 3-Clause, PyBaMM", 1.2, (0.7, 0.85)),
+    "nmc": BlindCell("nmc_30ah.bpx.json", 1.0, (0.8, 0.95)),
+    "lg_m50": BlindCell("lg_m50_chen2020.bpx.json", 0.7, (0.6, 0.75)),
+    "lfp": BlindCell("lfp_prada2013.bpx.json", 1.2, (0.75, 0.9)),
+    "nca": BlindCell("nca_kim2011.bpx.json", 1.2, (0.7, 0.85)),
 }
 
 

@@ -2,7 +2,7 @@
 
 Places are the Gauss points, those of the negative electrode first, each counted from its collector. At place r
 
-    psi_r = U(theta_u) + eta(y_u, theta_u, s_r)           for each unit u there (a particle of one size),
+    psi_r = U(theta_u) + eta(y_u, theta_u, s_r) + R(theta_u) y_u    for each unit u there (a particle of one size),
     psi_r + chi ln s_r + sum_v ohm[r, v] Y_v = Phi        with the collector's potential Phi of its electrode,
     Y_r = sum_u y_u + double layer + plating,             sum over an electrode Y_v = its current,
 
@@ -16,8 +16,8 @@ from numba import njit
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.dfn.direction_kernels import UPDATE_TOLERANCE_V, add_side_currents, newton_direction
 from aesi.physics.dfn.guarded_kernels import solve_guarded
-from aesi.physics.dfn.local_kernels import SMALLEST_SALT, compiled, unit_potential
-from aesi.physics.espm.kernels import FASTMATH
+from aesi.physics.dfn.local_kernels import SMALLEST_SALT, unit_potential
+from aesi.physics.espm.kernels import FASTMATH, compiled
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 EASY_STEPS = 6
@@ -94,6 +94,7 @@ def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, give
             e,
             side,
             t.rates[2 + side] * p.exchange[u],
+            1.0 / (t.rates[6 + side] * p.reactive[u]),
             surface,
             t.give[u],
             y[u],

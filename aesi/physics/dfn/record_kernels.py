@@ -6,13 +6,19 @@ import numpy as np
 from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
-from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
+from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
-from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
-from aesi.physics.espm.transport_kernels import arrhenius, heated, mean_heat, solid_forcing
+from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, compiled, lookup
+from aesi.physics.espm.layout import CACHE_SLOTS
+from aesi.physics.espm.transport_kernels import (
+    DIFFUSIONS,
+    TEMPERATURE_STEP_K,
+    arrhenius,
+    heated,
+    mean_heat,
+    solid_forcing,
+)
 
-TEMPERATURE_STEP_K = 0.01
-"""Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
 SHORTER, SHORTEST = 0.25, 0.25**6
 """Where no reaction is found at the end of a step, a quarter of it is tried, down to the shortest: at the edges of
 potentials, and where one rises with lithium, the end of a long step has several solutions or none in reach."""
@@ -23,8 +29,7 @@ FIRST_LENGTH = 0.25
 """Of a step, where double layers meet a current that has turned: whole steps of 1 s between edges of 0.1 s were 0.52 mV
 RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
 ROUND_OFF = 1e-9
-DIFFUSIONS = (0, 1, 4)
-"""Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
+"""Of a step: less than this before the sample is no step any more."""
 
 
 @compiled
@@ -204,7 +209,7 @@ def smallest(values):  # type: ignore[no-untyped-def]
 @njit(inline="always", fastmath=FASTMATH)
 def set_rates(e, t, t_k):  # type: ignore[no-untyped-def]
     """Arrhenius factors of everything that has an activation energy."""
-    for i in range(7):
+    for i in range(8):
         t.rates[i] = arrhenius(e.energies[i], t_k, e.reference_k)
 
 
@@ -215,7 +220,7 @@ def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untype
     for i in range(s.gap_path.shape[0]):
         if s.gap_path[i] > 0.0:
             gap += s.gap_path[i] / lookup(s.kappa, state.c[i] / s.top)
-    return phi_p - phi_n - density * (gap / t.rates[5] + (e.contact + e.film / t.rates[6]) * e.area)
+    return phi_p - phi_n - density * (gap / t.rates[5] + e.contact * e.area)
 
 
 @compiled

@@ -10,11 +10,10 @@ from aesi.numerics.modes.galerkin import gauss_lobatto
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
-from aesi.physics.espm.kernels import CACHE_SLOTS
+from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
 
-VOLTAGE_ROWS = 7
 LONGER_STEPS = 5.0
 """Steps here over those of the single particle, whose deviations are of first order: on half-hour pulses 5 s instead of
 0.25 s move the voltage by 0.002 mV RMS, 15 s by 0.014, 60 s by 0.2."""
@@ -117,7 +116,7 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
         force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
         salt_before=np.ones(places), q=of(salt_modes), c=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
         kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),
-        no_spread=of(places, places), z_end=of(modes), rates=np.ones(7),
+        no_spread=of(places, places), z_end=of(modes), rates=np.ones(8),
         total=of(2), before=of(2), change=of(2), faster=np.ones(3),
     )  # fmt: skip
     newton = NewtonScratch(

@@ -13,20 +13,29 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.modes.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
-from aesi.physics.espm.layout import Drive, Salt, Surfaces, Units, Whole
+from aesi.physics.espm.layout import (
+    CACHE_SLOTS,
+    VOLTAGE_ROWS,
+    Drive,
+    Memory,
+    Modes,
+    Salt,
+    SaltMemory,
+    Surfaces,
+    Units,
+    Whole,
+)
 from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
+    film_tables,
     ocp_table,
     rate_tables,
     solid_diffusion,
 )
 from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
 from aesi.records import Hold
-
-VOLTAGE_ROWS = 7
-"""Rows of the output that the plain path has too."""
 
 
 def run_extended(
@@ -40,11 +49,33 @@ def run_extended(
     given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
     drive = Drive(time, current, kelvin, given, hold == "backward", model.substep_s, model.most_substeps)
-    fault_at, fault = run_general(drive, theta0, *general_arguments(model), out)
+    arguments = general_arguments(model)
+    fault_at, fault = run_general(drive, theta0, *arguments, *_memory(*arguments[:2], model.regions), out)
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
+
+
+def _memory(particles: Units, salt: Salt, regions: int) -> tuple[Memory, Modes, SaltMemory]:
+    of = np.zeros
+    units, order = particles.rates.shape
+    nodes, salt_order = salt.to_nodes.shape
+    memory = Memory(
+        y=of(units), theta=of(units), pred=of(units), give=of(units), ohm=of((regions, regions)),
+        salt=np.ones(len(salt.gauss)), log_salt=of(2 * regions), region_salt=np.ones(2 * regions),
+        delta=of(2 * regions), layer=of(2 * regions), total=of(2 * regions),
+        plated=of(regions), plating=of(regions), kappa=np.ones(2 * regions + 1), deviation=of(2 * regions),
+        potential=of(units), slope=of(units), gain=of(units), matrix=of((units + 1, units + 2)),
+        new_delta=of(regions), new_layer=of(regions), fitted=of(regions),
+    )  # fmt: skip
+    modes = Modes(
+        z=of((units, order)), means=of(units),
+        nodes=of(len(particles.at)), force=of(order + 1), force_end=of(order + 1), faster=np.ones(3),
+        keys=np.full(CACHE_SLOTS, -1, dtype=np.int64),
+        w=of((CACHE_SLOTS, units, 3, order)), w_e=of((CACHE_SLOTS, 3, salt_order)),
+    )  # fmt: skip
+    return memory, modes, SaltMemory(*map(of, (salt_order, nodes, nodes, salt_order, salt_order)))
 
 
 @lru_cache(maxsize=64)
@@ -57,7 +88,6 @@ def general_arguments(model: EspmModel) -> tuple[Units, Salt, Surfaces, Whole]:
         area=cell.total_area_m2,
         separator=cell.separator.thickness_m / cell.separator.transport_efficiency,
         contact=cell.contact_resistance_ohm,
-        film=cell.film_resistance_ohm,
         reference_k=cell.reference_temperature_k,
     )
     return particle_units(model), _salt(model), _surfaces(model), whole
@@ -87,6 +117,7 @@ def particle_units(model: EspmModel) -> Units:
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
+    reactive = []
     sides = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))
     for side, (electrode, interface) in enumerate(sides):
         for region in range(model.regions):
@@ -102,6 +133,7 @@ def particle_units(model: EspmModel) -> Units:
                 share.append(part)
                 volume.append(part * radius_ratio)
                 exchange.append(area * FARADAY_C_MOL * electrode.rate_constant)
+                reactive.append(area)
     sums = [sum(v for v, unit in zip(volume, units, strict=True) if unit[0] == side) for side in range(2)]
     fractions = [v / sums[unit[0]] for v, unit in zip(volume, units, strict=True)]
     return Units(
@@ -112,6 +144,7 @@ def particle_units(model: EspmModel) -> Units:
         share=np.array(share),
         volume=np.array(fractions),
         exchange=np.array(exchange),
+        reactive=np.array(reactive),
         psi=_padded([x.psi for x in solids]),
         strength=np.array([0.0 if x.linear else 1.0 / x.d0 for x in solids]),
         at=sphere.at,
@@ -134,6 +167,7 @@ def _surfaces(model: EspmModel) -> Surfaces:
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
         rate=rate_tables(model.cell),
+        film=film_tables(model.cell),
         alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),
         capacity=np.array([interface_capacity(model, side) for side in range(2)]),
         plating=np.array([area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient]),

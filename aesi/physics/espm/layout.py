@@ -10,6 +10,12 @@ from typing import NamedTuple
 
 from aesi.numerics.typing import Array, IntArray
 
+CACHE_SLOTS = 64
+"""Lengths of a step whose weights are kept at a time."""
+VOLTAGE_ROWS = 7
+"""Rows of the output of every path: voltage, surface stoichiometries (n, p), salt at the collectors (n, p) and mean
+stoichiometries (n, p). Further states stand below."""
+
 
 class PlainSolid(NamedTuple):
     """Constants of both particles.
@@ -70,6 +76,30 @@ class PlainCell(NamedTuple):
     contact: float
 
 
+class PlainMemory(NamedTuple):
+    """What the steps of the plain path change.
+
+    z_n, z_p : (modes,) of the particles.  q, forcing, before : (salt modes,).  c, rest : (nodes,) mol/m3.
+    g : (6,) salt over rest at the Gauss points.
+    keys, parts : (slots,) nanoseconds of the steps whose weights are kept, and into how many each is divided.
+    w_n, w_p : (slots, 3, modes).  w_e : (slots, 5, salt modes).
+    """
+
+    z_n: Array
+    z_p: Array
+    q: Array
+    c: Array
+    g: Array
+    forcing: Array
+    before: Array
+    rest: Array
+    keys: IntArray
+    parts: IntArray
+    w_n: Array
+    w_p: Array
+    w_e: Array
+
+
 class Drive(NamedTuple):
     """A record as the steps see it.
 
@@ -91,7 +121,7 @@ class Units(NamedTuple):
 
     place : (units, 2) electrode and region.  rates, gains : (units, modes) 1/s and stoichiometry/(A/m2 s).
     lump : (units,) of the means.  share, volume : (units,) of the electrode's reaction and material.
-    exchange : (units,) A/m2 of cell at unit salt and occupancy.
+    exchange : (units,) A/m2 of cell at unit salt and occupancy.  reactive : (units,) surface per area of cell.
     psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
     """
 
@@ -102,6 +132,7 @@ class Units(NamedTuple):
     share: Array
     volume: Array
     exchange: Array
+    reactive: Array
     psi: Array
     strength: Array
     at: Array
@@ -134,8 +165,9 @@ class Salt(NamedTuple):
 class Surfaces(NamedTuple):
     """Constants of both electrodes' surfaces.
 
-    ocp, entropic, rate : (2, table) V, V/K and factor of the rate constant.  alpha : (2,) transfer coefficients.
-    capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and transfer coefficient.
+    ocp, entropic, rate, film : (2, table) V, V/K, factor of the rate constant, ohm m2 of surface.
+    alpha : (2,) transfer coefficients.  capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and
+    transfer coefficient.
     plating_to_c : mol/m3 per C/m2.
     solid : (2, regions, regions) ohm m2.  salt : the same times the conductivity, by region crossed.
     """
@@ -143,6 +175,7 @@ class Surfaces(NamedTuple):
     ocp: Array
     entropic: Array
     rate: Array
+    film: Array
     alpha: Array
     capacity: Array
     plating: Array
@@ -154,8 +187,8 @@ class Surfaces(NamedTuple):
 class Whole(NamedTuple):
     """Numbers of the whole cell.
 
-    energies : (7,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
-    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact, film : ohm.
+    energies : (8,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
+    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact : ohm.
     reference_k : K.
     """
 
@@ -164,7 +197,6 @@ class Whole(NamedTuple):
     area: float
     separator: float
     contact: float
-    film: float
     reference_k: float
 
 
@@ -175,7 +207,9 @@ class Memory(NamedTuple):
     one unit of deviating current takes from it.  ohm : (regions, regions) ohm m2.
     salt, log_salt, region_salt : at Gauss points over rest; by region its mean logarithm and mean, mol/m3.
     delta, layer : (2 regions,) V and A/m2 of the double layers.  total : (2 regions,) A/m2.
-    plated, plating : (regions,) mol/m3 and A/m2.  work : scratch.
+    plated, plating : (regions,) mol/m3 and A/m2.
+    kappa : (2 regions + 1,) S/m, the separator's last.  deviation : (2 regions,) A/m2 beyond its share of the current.
+    potential, slope, gain, matrix : scratch, by unit of one electrode.  new_delta, new_layer, fitted : by its regions.
     """
 
     y: Array
@@ -191,7 +225,52 @@ class Memory(NamedTuple):
     total: Array
     plated: Array
     plating: Array
-    work: Array
+    kappa: Array
+    deviation: Array
+    potential: Array
+    slope: Array
+    gain: Array
+    matrix: Array
+    new_delta: Array
+    new_layer: Array
+    fitted: Array
+
+
+class Modes(NamedTuple):
+    """What the steps of diffusion know of the particles.
+
+    z, means : (units, modes) and (units,).  nodes, force, force_end : scratch of the variable part.
+    faster : (3,) factors of temperature, negative, positive, salt.
+    keys, w, w_e : (slots,) nanoseconds of the steps whose weights are kept, (slots, units, 3, modes) those of the
+    particles, (slots, 3, salt modes) those of the salt.
+    """
+
+    z: Array
+    means: Array
+    nodes: Array
+    force: Array
+    force_end: Array
+    faster: Array
+    keys: IntArray
+    w: Array
+    w_e: Array
+
+
+class StepEnd(NamedTuple):
+    """What holds for one electrode at the end of a step.
+
+    dt : s.  held : whether the current jumped to its value where the step began; a double layer's current is then no
+    continuation of the last one, and would ring.  thermal : R T / F, V.  rise : K above the reference.
+    chi : 2 (1 - t+) R T / F, V.  quicker, film : factors of temperature on rate constants and films.
+    """
+
+    dt: float
+    held: bool
+    thermal: float
+    rise: float
+    chi: float
+    quicker: float
+    film: float
 
 
 class SaltMemory(NamedTuple):

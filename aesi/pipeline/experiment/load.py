@@ -63,7 +63,7 @@ def load(config: ExperimentConfig) -> Loaded:
     """Measurements, simulated and subtracted, by role.
 
     Raises ConfigError or DataError naming the file and what to do; with a `fallback` section, data that cannot be
-    had are replaced by it and a note says so.
+    had are replaced by it, a note says so, and what the experiment says of itself, which is of those data, is left out.
     """
     if not config.data.has_roles:
         raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")
@@ -73,7 +73,7 @@ def load(config: ExperimentConfig) -> Loaded:
         if config.fallback is None or config.data.kind != "catalogue":
             raise
         fallback = config.model_copy(
-            update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None}
+            update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None, "note": ""}
         )
         why = (
             "no copy on this machine and no network"

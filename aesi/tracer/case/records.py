@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.data.thinning import Spacing, averaged_over, condensed, current_steps, is_steady
+from aesi.data.thinning import Spacing, averaged_over, condensed
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
@@ -127,11 +127,8 @@ def prepare(
     """
     hold: Hold = data.hold or assumed_hold(data.time_s)
     duration = float(data.time_s[-1] - data.time_s[0])
-    steps = current_steps(data, cell.nominal_capacity_ah)
-    if is_steady(data, steps):
-        thin, rows = condensed(data, steps, duration / STEADY_SAMPLES, STEADY_SPACING)
-    else:
-        thin, rows = averaged_over(data, step_s), None
+    steady = condensed(data, cell.nominal_capacity_ah, duration / STEADY_SAMPLES, STEADY_SPACING)
+    thin, rows = (averaged_over(data, step_s), None) if steady is None else steady
     thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))

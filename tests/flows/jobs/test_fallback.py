@@ -36,7 +36,12 @@ def experiment(tracked, monkeypatch, cell):
         "record": "drive_cycle",
         "repeats": {"period_s": 1800, "train": [1, 3, 5], "test": [2, 4]},
     }
-    content = {"name": "small", "data": measured, "fallback": {"data": virtual, "cell": {"bpx": str(cell)}}}
+    content = {
+        "name": "small",
+        "note": "Hybrid model of a measured 12.5 Ah NMC pouch cell",
+        "data": measured,
+        "fallback": {"data": virtual, "cell": {"bpx": str(cell)}},
+    }
     path = tracked / "small.yaml"
     path.write_text(yaml.safe_dump(content | SMALL))
     return path
@@ -54,13 +59,17 @@ def test_a_run_that_fell_back_was_tracked_as_the_measured_one(experiment, capsys
     assert said.count("cannot be had") == 1
     assert "ConnectionError" not in said
     assert summary["data"] == "virtual"
-    assert '<p class="banner"' in (folder / "report.html").read_text()
+    report = (folder / "report.html").read_text()
+    assert '<p class="banner"' in report
+    assert "of a measured" not in report
     assert HybridModel.load(folder / "model").hold == "linear"
     store = Store()
     (run,) = store.runs(store.find_experiment("small"), f"tags.`{KIND}` = 'run'")
     assert run.data.params["data.kind"] == "virtual"
     assert run.data.tags["aesi.fallback"] == note
+    assert "of a measured" not in run.data.tags["mlflow.note.content"]
     assert "cannot be had" in tables_of("small")
+    assert "of a measured" not in tables_of("small")
 
 
 def test_the_setting_of_a_fallback_and_of_another_measurement_are_others(experiment, tmp_path):

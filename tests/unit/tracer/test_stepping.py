@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.data.thinning import condensed, current_steps
+from aesi.data.thinning import condensed
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
@@ -18,7 +18,8 @@ def pulses(cell):
     current = np.where(time % 3600 < 10, 60.0, 0.0)
     current[0] = 0.0
     data = Measurement(time, current, np.full(len(time), 3.7), name="pulses")
-    return condensed(data, current_steps(data, cell.nominal_capacity_ah), 300.0, STEADY_SPACING)[0]
+    rows, _ = condensed(data, cell.nominal_capacity_ah, 300.0, STEADY_SPACING)
+    return rows
 
 
 def test_a_drive_at_a_sample_a_second_is_stepped_as_declared(make):
