@@ -6,9 +6,9 @@ The error of a cell model grows with the current; with x, by which the leverage 
 rows (`aesi.sparse.leverage`); and with g, which grows with the distance of the state of charge from theirs (seen.py).
 No term is in the state of charge itself, since it overfits the calibration drives and fails on the next one: with one
 below a quarter of the charge, the bands of AESI I over the development splits of the NMC drive in `aesi bench splits`
-cover 90.6 % and 50 % of the worst drive at a Winkler score of 51.3 mV, without it 94.2 and 75 % at 47.0 mV. s is the 1 - alpha quantile of |error|, by linear quantile
-regression; a term whose weight would be negative is left out, so that s stays positive where it extrapolates, and a
-floor keeps it away from zero.
+cover 90.6 % and 50 % of the worst drive at a Winkler score of 51.3 mV, without it 94.2 and 75 % at 47.0 mV.
+s is the 1 - alpha quantile of |error|, by linear quantile regression; a term whose weight would be negative is left
+out, so that s stays positive where it extrapolates, and a floor keeps it away from zero.
 """
 
 from __future__ import annotations

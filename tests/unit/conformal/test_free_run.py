@@ -24,7 +24,7 @@ def drive(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def fitted(size: float = 1.0) -> FreeRunBands:
-    errors, currents, socs = zip(*(drive(seed) for seed in range(4)), strict=True)
+    errors, currents, _ = zip(*(drive(seed) for seed in range(4)), strict=True)
     return FreeRunBands.fit(
         {10.0: [0.5 * e for e in errors], WHOLE_DRIVE: [size * e for e in errors]}, DT, currents
     )
@@ -185,7 +185,7 @@ def test_covariates_of_another_length_are_refused() -> None:
 
 
 def test_missing_predictions_are_left_out() -> None:
-    error, current, soc = drive(1)
+    error, current, _ = drive(1)
     late = error.copy()
     late[:60] = np.nan
     bands = FreeRunBands.fit({60.0: [late]}, DT, [current])
