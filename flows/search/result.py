@@ -101,10 +101,7 @@ class SearchResult:
         return Pick(weights, trial, score)
 
     def _nothing_feasible(self) -> str:
-        reasons = Counter(
-            trial.reason or "a correlation below its constraint, or more error than the physics alone"
-            for trial in self.trials
-        )
+        reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)
         listed = "; ".join(f"{count} x {reason}" for reason, count in reasons.most_common(4))
         return (
             f"none of {len(self.trials)} candidates is feasible ({listed or 'none was evaluated'}); "

@@ -34,8 +34,7 @@ NAME = "SINDy-C"
 
 @dataclass(frozen=True)
 class Judge:
-    """Weights of the fitness and least correlations in free run, those of the search it is compared with: where one is
-    asked for on validation (-1: none), the validation error must not be larger than that of the physics alone."""
+    """Weights of the fitness and least correlations in free run, those of the search it is compared with."""
 
     weights: FitnessWeights = field(default_factory=FitnessWeights)
     pearson_train: float = 0.5
@@ -43,8 +42,6 @@ class Judge:
 
     def admits(self, one: Single) -> bool:
         """Whether a candidate keeps to the constraints."""
-        if self.pearson_valid > -1.0 and one.valid.loss > 1.0:
-            return False
         return one.pearson_train > self.pearson_train and one.valid.pearson > self.pearson_valid
 
 
