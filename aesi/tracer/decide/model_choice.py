@@ -3,8 +3,8 @@
 Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
 not where the single particle cannot explain the data and the fuller one, with the same effects, leaves as much: what is
 missing is something else then, and a search takes ten times as long.
-What was measured may still be a single particle's (a thin electrode, a file made with one): where that says more of
-the data as declared, it is kept if it explains them to the noise and says more there as well.
+What was measured may still be a single particle's (a thin electrode, a file made with one): what the two searches end
+with is weighed as any two hypotheses are.
 """
 
 from __future__ import annotations
@@ -13,12 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
-from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
-from aesi.tracer.decide.evidence import Evidence
+from aesi.tracer.decide.evidence import Evidence, believed
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of, fitted_hypothesis
+from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.forward import HOPELESS_SHARE
 from aesi.tracer.search.path import Path, beyond_noise
 
@@ -63,11 +62,8 @@ def with_model(
     if first.verdict.word == "unknown" and not _takes_off(full, first.paths["tight"], kept):
         return told(first, "espm", ", what it leaves is not taken off by the other one")
     second = search(full, kept(full))
-    if _believed(first, second) and _says_more(single, full, kept):
-        ahead = first.path.chosen.score.total - second.path.chosen.score.total
-        return told(
-            first, "espm", f", which explains these data to the noise and says {ahead:.0f} nats more of them"
-        )
+    if believed((second.path, second.verdict), (first.path, first.verdict)):
+        return told(first, "espm", ", with which less or more usual things have to be missing")
     return told(second, "dfn")
 
 
@@ -82,20 +78,3 @@ def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
     return beyond_noise(full, path.blocks, fit) < HOPELESS_SHARE * beyond_noise(
         path.problem, path.blocks, chosen
     )
-
-
-def _believed(single: Evidence, full: Evidence) -> bool:
-    """Does the single particle explain the data, and with less, or say more of them where both do?"""
-    if single.verdict.word == "unknown":
-        return False
-    chosen, other = single.path.chosen, full.path.chosen
-    says_more = chosen.score.total > other.score.total
-    return says_more or len(chosen.hypothesis) < len(other.hypothesis) or full.verdict.word == "unknown"
-
-
-def _says_more(single: InverseProblem, full: InverseProblem, kept: Kept) -> bool:
-    """Does the single particle as declared, but for its own parameters, say more than the porous electrode?"""
-    alone, fuller = (base_of(one, blocks_of(one), kept(one)) for one in (single, full))
-    if alone is None:
-        return False
-    return fuller is None or alone.score.total > fuller.score.total
