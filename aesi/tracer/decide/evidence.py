@@ -89,8 +89,8 @@ def gathered(
         if wrong is not path:
             path, verdict = wrong, judged(wrong, thresholds)
     if verdict.word == "found":
-        path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
         path, verdict = _with_one_cause(path, verdict, archive, thresholds)
+        path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
     elif verdict.word == "none" and not _as_declared(replace(problem, trust="exact"), path, archive):
         exact = path_of("exact")
         found = exact, judged(exact, thresholds)
