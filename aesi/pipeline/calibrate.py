@@ -23,6 +23,8 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement, Spectrum
 
 SCHEMA = "aesi.calibration/2"
+NAMED_OPEN = 3
+"""Parameters that the sentence on what is left open names: it is a line on a console, and the report has all."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +156,19 @@ def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, fl
         return {}
     interval = posterior.intervals[name]
     return {"posterior_low": interval.low, "posterior_high": interval.high}
+
+
+def open_line(content: dict[str, Any]) -> str:
+    """What the records leave open, in one sentence; empty where they tell every parameter."""
+    left = content["undetermined"]
+    if not left:
+        return ""
+    heaviest = list(dict.fromkeys(max(o["weights"], key=lambda name: abs(o["weights"][name])) for o in left))
+    named = ", ".join(heaviest[:NAMED_OPEN]) + (" and others" if len(heaviest) > NAMED_OPEN else "")
+    return (
+        f"these records tell {len(content['parameters']) - len(left)} of {len(content['parameters'])} combinations of "
+        f"parameters better than their priors do; the others ({named}) stay near the priors"
+    )
 
 
 def to_text(content: dict[str, Any]) -> str:

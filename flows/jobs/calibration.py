@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline.calibrate import Request, calibrate_files
+from aesi.pipeline.calibrate import Request, calibrate_files, open_line
 from aesi.pipeline.notes import together
 from aesi.records import Measurement
 from flows.base import environment
@@ -30,9 +30,11 @@ def calibrate(
         )
     for row in content["impedance"]:
         console.say(f"  {row['name']}, state of charge {row['soc']:.2f}: |Z| {row['rms_pct']:.0f} % off")
-    open_ones = [o["sentence"] for o in content["undetermined"]]
-    for text in (*open_ones, *(note for note in content["notes"] if note not in read)):
-        console.say(f"  {text}")
+    for note in content["notes"]:
+        if note not in read:
+            console.say(f"  {note}")
+    if left := open_line(content):
+        console.say(f"  {left} (each with its weights in the report)")
     if content["at_bounds"]:
         console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")
     console.say(f"Written: {out} and {out.with_suffix('.report.md')}")

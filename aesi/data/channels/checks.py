@@ -24,6 +24,8 @@ HIGHEST_CURRENT_A = 20_000.0
 """Above what any single cell takes; a smaller current in mA is told by `check_scale`."""
 ENOUGH_ROWS = 10
 """From which a voltage that never changes is one that does not answer."""
+MOST_RELAXED_V = 0.5
+"""No cell's voltage moves by more without a current: relaxation after a load is some 0.3 V at most."""
 
 
 @dataclass(frozen=True)
@@ -116,8 +118,13 @@ def check_ranges(columns: Columns, context: Context) -> None:
 
 
 def check_alive(columns: Columns, context: Context) -> None:
-    """The voltage answers: it is not one value throughout while the current varies."""
+    """The voltage answers to the current: neither is one value throughout while the other moves."""
     voltage, current = columns["voltage_v"], columns["current_a"]
+    if not current.any() and np.ptp(voltage) > MOST_RELAXED_V:
+        raise DataError(
+            f"{context.at('current_a', 0)}: the current is 0 A in all {len(current)} rows while the voltage moves by "
+            f"{np.ptp(voltage):.2f} V; check the sensor or the column."
+        )
     if np.ptp(voltage) == 0 and len(voltage) >= ENOUGH_ROWS and np.ptp(current) > 0:
         raise DataError(
             f"{context.at('voltage_v', 0)}: the voltage is {voltage[0]:.6g} V in all {len(voltage)} rows "

@@ -12,7 +12,7 @@ LIKELY = {
     "time_s": r"time|zeit|elapsed|\bt\b|^t$|duration",
     "current_a": r"current|strom|\bamps?\b|\bi\b|^<?i>?\b|ampere",
     "voltage_v": r"volt|spannung|ecell|ewe|potential|\b[uv]\b",
-    "temperature_degc": r"temp|°c|degc|celsius|\bt\d\b",
+    "temperature_degc": r"temp|°c|degc|celsius|thermo|\bt[ck]?\d\b|\bt[ _]?(cell|can|case|surf|skin|batt|core)",
     "state": r"^(state|status|step type|mode|md|command|zustand|direction)\b",
 }
 UNLIKELY = {

@@ -10,8 +10,7 @@ this without y1.
 
 from numba import njit
 
-from aesi.physics.dfn.local_kernels import compiled
-from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights
 
 
 @compiled

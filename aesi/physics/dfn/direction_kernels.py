@@ -1,7 +1,8 @@
 """Compiled Newton direction of the reaction at all places; see `reaction_kernels` for the equations."""
 
-from aesi.physics.dfn.local_kernels import compiled, salt_logarithm
+from aesi.physics.dfn.local_kernels import salt_logarithm
 from aesi.physics.espm.electrode_kernels import bounded_exp
+from aesi.physics.espm.kernels import compiled
 
 UPDATE_TOLERANCE_V = 5e-5
 """Newton's method squares what is left: after an update below this the error is about its square over 2 R T / F,

@@ -8,7 +8,8 @@ Newton's method runs on the potentials, its steps halved until they bring the so
 import math
 
 from aesi.physics.dfn.direction_kernels import UPDATE_TOLERANCE_V, add_side_currents, newton_direction
-from aesi.physics.dfn.local_kernels import SMALLEST_SALT, compiled, salt_logarithm, unit_potential
+from aesi.physics.dfn.local_kernels import SMALLEST_SALT, salt_logarithm, unit_potential
+from aesi.physics.espm.kernels import compiled
 
 LOST_V = 1e-3
 """A solution is found where the last update is below this, though Newton's steps do not end."""

@@ -16,8 +16,8 @@ from numba import njit
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.dfn.direction_kernels import UPDATE_TOLERANCE_V, add_side_currents, newton_direction
 from aesi.physics.dfn.guarded_kernels import solve_guarded
-from aesi.physics.dfn.local_kernels import SMALLEST_SALT, compiled, unit_potential
-from aesi.physics.espm.kernels import FASTMATH
+from aesi.physics.dfn.local_kernels import SMALLEST_SALT, unit_potential
+from aesi.physics.espm.kernels import FASTMATH, compiled
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 EASY_STEPS = 6

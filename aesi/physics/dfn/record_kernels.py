@@ -6,9 +6,10 @@ import numpy as np
 from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
-from aesi.physics.dfn.local_kernels import compiled, equilibrium, row_lookup
+from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
-from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup
+from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, compiled, lookup
+from aesi.physics.espm.layout import CACHE_SLOTS
 from aesi.physics.espm.transport_kernels import (
     DIFFUSIONS,
     TEMPERATURE_STEP_K,

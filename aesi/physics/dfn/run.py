@@ -10,8 +10,7 @@ from aesi.numerics.modes.galerkin import gauss_lobatto
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
-from aesi.physics.espm.kernels import CACHE_SLOTS
-from aesi.physics.espm.layout import VOLTAGE_ROWS
+from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
 

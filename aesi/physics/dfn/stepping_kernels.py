@@ -14,10 +14,9 @@ from aesi.physics.dfn.diffusion_kernels import (
     salt_at_places,
     salt_forcing,
 )
-from aesi.physics.dfn.local_kernels import compiled
 from aesi.physics.dfn.reaction_kernels import solve_reaction
 from aesi.physics.espm.electrode_kernels import end_weight
-from aesi.physics.espm.kernels import FASTMATH, lookup
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup
 from aesi.physics.espm.transport_kernels import solid_forcing
 
 SALT_TOLERANCE = 1e-3

@@ -19,6 +19,7 @@ from aesi.physics.espm.kernels import (
     BEYOND_RANGE_V,
     FASTMATH,
     SMALLEST_OCCUPANCY,
+    compiled,
     lookup,
     mean_asinh,
     open_circuit,
@@ -41,7 +42,7 @@ def bounded_exp(x):  # type: ignore[no-untyped-def]
     return math.exp(min(max(x, SMALLEST_EXPONENT), LARGEST_EXPONENT))
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def overpotential(y, exchange, occupancy, g1, g2, g3, log_salt, alpha, thermal):  # type: ignore[no-untyped-def]
     """Overpotential (V) of a current y and its slope, for j = j0 (exp(alpha f eta) - exp(-(1 - alpha) f eta)).
 
@@ -84,138 +85,179 @@ def relaxed(z):  # type: ignore[no-untyped-def]
     return z / math.expm1(min(z, LARGEST_EXPONENT)) if z > 1e-6 else 1.0 - 0.5 * z
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
-def solve_electrode(  # type: ignore[no-untyped-def]
-    lo,
-    hi,
-    side,
-    total,
-    dt,
-    held,
-    thermal,
-    temperature_rise,
-    chi,
-    exchange_factor,
-    particles,
-    surfaces,
-    memory,
-):
+@compiled
+def solve_electrode(lo, hi, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
     """Currents y[lo:hi] of the units of one electrode; returns Phi.
 
-    total : A/m2 of cell, positive for delithiation.  held : whether it jumped to this where the step began; a double
-    layer's current is then no continuation of the last one, and would ring.  thermal : R T / F, V.
-    chi : 2 (1 - t+) R T / F, V.  exchange_factor : of temperature.  particles, surfaces, memory : see `layout`;
+    total : A/m2 of cell, positive for delithiation.  at : a `StepEnd`.  particles, surfaces, memory : see `layout`;
     memory.delta and memory.layer are old in, new out.
     """
-    region_of, share, exchange = particles.place[:, 1], particles.share, particles.exchange
-    ocp, entropic, rate = surfaces.ocp[side], surfaces.entropic[side], surfaces.rate[side]
-    alpha, capacity, plating = surfaces.alpha[side], surfaces.capacity[side], surfaces.plating
-    y, theta, theta_pred, give, ohm, salt, log_salt, region_salt = memory[:8]
-    delta, dl_current, region_total, plated, plating_current, work = memory[8:]
-    regions = ohm.shape[0]
-    n = hi - lo
-    first = side * regions
-    potential, slope = work[0], work[1]
-    matrix = work[2 : 3 + n, : n + 2]
-    new_delta, gain, fitted, new_current = work[3 + n], work[4 + n], work[5 + n], work[6 + n]
-    new_current[:] = 0.0
+    memory.new_layer.fill(0.0)
+    if hi - lo == 1:
+        phi = solve_unit(lo, side, total, at, particles, surfaces, memory)
+    else:
+        phi = solve_units(lo, hi, side, total, at, particles, surfaces, memory)
+    regions = memory.ohm.shape[0]
+    for r in range(regions):
+        memory.delta[side * regions + r] = memory.new_delta[r]
+        memory.layer[side * regions + r] = memory.new_layer[r]
+    return phi
+
+
+@compiled
+def solve_unit(lo, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Newton's method on the current of an electrode's only unit, between bounds; returns Phi.
+
+    What is given grows with the current, but as a logarithm far out, where Newton's step leaps to the other side.
+    """
+    y, slope, gain = memory.y, memory.slope, memory.gain
+    first = side * memory.ohm.shape[0]
     phi, least, most = 0.0, -math.inf, math.inf
     for step in range(NEWTON_STEPS):
-        for r in range(regions):
-            region_total[first + r] = 0.0
-            new_delta[r] = np.nan
-        for i in range(n):
-            u = lo + i
-            t = theta_pred[u] - give[u] * (y[u] - share[u] * total)
-            theta[u] = t
-            r = region_of[u]
-            k = 3 * (first + r)
-            occupancy = max(t * (1.0 - t), SMALLEST_OCCUPANCY)
-            eta, d_eta = overpotential(
-                y[u], exchange[u] * exchange_factor * lookup(rate, t), occupancy,
-                salt[k], salt[k + 1], salt[k + 2], log_salt[first + r] , alpha, thermal,
-            )  # fmt: skip
-            inside = min(max(t, 0.0), 1.0)
-            last = ocp.shape[0] - 1
-            cell = min(int(inside * last), last - 1)
-            falls = (ocp[cell + 1] - ocp[cell]) * last if t == inside else -BEYOND_RANGE_V
-            u_eq = open_circuit(ocp, t) + temperature_rise * lookup(entropic, inside)
-            potential[i] = u_eq + eta
-            slope[i] = max(d_eta - give[u] * falls, SMALLEST_SLOPE)
-            gain[i] = 1.0
-            region_total[first + r] += y[u]
-            if math.isnan(new_delta[r]):
-                new_delta[r] = potential[i]
-                extra, d_extra = 0.0, 0.0
-                if capacity > 0.0 and dt > 0.0:
-                    if step == 0:
-                        z = dt / (capacity * slope[i])
-                        fitted[r] = 1.0 / max(relaxed(z), SMALLEST_SHARE) if held else end_weight(z)
-                    charging = capacity * (potential[i] - delta[first + r]) / (dt * fitted[r])
-                    if not held:
-                        charging -= (1.0 - fitted[r]) / fitted[r] * dl_current[first + r]
-                    new_current[r] = charging
-                    extra += charging
-                    d_extra += capacity / (dt * fitted[r])
-                if plating[0] > 0.0 and side == 0:
-                    up = plating[0] * plated[r] * bounded_exp((1.0 - plating[1]) * potential[i] / thermal)
-                    down = (
-                        plating[0]
-                        * region_salt[first + r]
-                        * bounded_exp(-plating[1] * potential[i] / thermal)
-                    )
-                    plating_current[r] = up - down
-                    extra += up - down
-                    d_extra += ((1.0 - plating[1]) * up + plating[1] * down) / thermal
-                region_total[first + r] += extra
-                gain[i] += d_extra * slope[i]
-        if n == 1:
-            phi = potential[0] + ohm[0, 0] * total + chi * log_salt[first]
-            off = region_total[first] - total
-            region_total[first] = total
-            if abs(off) * slope[0] < NEWTON_TOLERANCE_V * gain[0]:
-                break
-            # What is given grows with y, but as a logarithm far out, where Newton's step leaps to the other side.
-            if off > 0.0:
-                most = y[lo]
-            else:
-                least = y[lo]
-            ahead = y[lo] - off / gain[0]
-            bracketed = least < ahead < most or math.isinf(least) or math.isinf(most)
-            y[lo] = ahead if bracketed else 0.5 * (least + most)
-            continue
+        evaluate_electrode(lo, lo + 1, side, total, step == 0, at, particles, surfaces, memory)
+        phi = memory.potential[0] + memory.ohm[0, 0] * total + at.chi * memory.log_salt[first]
+        off = memory.total[first] - total
+        memory.total[first] = total
+        if abs(off) * slope[0] < NEWTON_TOLERANCE_V * gain[0]:
+            break
+        if off > 0.0:
+            most = y[lo]
+        else:
+            least = y[lo]
+        ahead = y[lo] - off / gain[0]
+        bracketed = least < ahead < most or math.isinf(least) or math.isinf(most)
+        y[lo] = ahead if bracketed else 0.5 * (least + most)
+    return phi
+
+
+@compiled
+def solve_units(lo, hi, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Newton's method on the currents of several units and on Phi, which is returned."""
+    matrix, n, phi = memory.matrix, hi - lo, 0.0
+    for step in range(NEWTON_STEPS):
+        evaluate_electrode(lo, hi, side, total, step == 0, at, particles, surfaces, memory)
         if step == 0:
-            phi = potential[0]
-        worst = 0.0
-        off = -total
-        for r in range(regions):
-            off += region_total[first + r]
-        for i in range(n):
-            r = region_of[lo + i]
-            residual = potential[i] + chi * log_salt[first + r] - phi
-            for v in range(regions):
-                residual += ohm[r, v] * region_total[first + v]
-            matrix[i, n + 1] = -residual
-            worst = max(worst, abs(residual))
-            for j in range(n):
-                q = region_of[lo + j]
-                matrix[i, j] = ohm[r, q] * gain[j]
-            matrix[i, i] += slope[i]
-            matrix[i, n] = -1.0
-        for j in range(n):
-            matrix[n, j] = gain[j]
-        matrix[n, n] = 0.0
-        matrix[n, n + 1] = -off
-        if worst < NEWTON_TOLERANCE_V and abs(off) * slope[0] < NEWTON_TOLERANCE_V:
+            phi = memory.potential[0]
+        worst, off = linearise(lo, hi, side, total, phi, at.chi, particles, memory)
+        if worst < NEWTON_TOLERANCE_V and abs(off) * memory.slope[0] < NEWTON_TOLERANCE_V:
             break
         eliminate(matrix, n + 1)
         for i in range(n):
-            y[lo + i] += matrix[i, n + 1]
+            memory.y[lo + i] += matrix[i, n + 1]
         phi += matrix[n, n + 1]
-    for r in range(regions):
-        delta[first + r] = new_delta[r]
-        dl_current[first + r] = new_current[r]
     return phi
+
+
+@compiled
+def linearise(lo, hi, side, total, phi, chi, particles, memory):  # type: ignore[no-untyped-def]
+    """memory.matrix : the equations of `solve_units` about its currents and `phi`, their right-hand side last.
+
+    Returns the largest residual of a potential (V), and what the currents sum up to beyond `total`.
+    """
+    matrix, slope, gain, ohm = memory.matrix, memory.slope, memory.gain, memory.ohm
+    regions, n = ohm.shape[0], hi - lo
+    first = side * regions
+    worst, off = 0.0, -total
+    for r in range(regions):
+        off += memory.total[first + r]
+    for i in range(n):
+        r = particles.place[lo + i, 1]
+        residual = memory.potential[i] + chi * memory.log_salt[first + r] - phi
+        for v in range(regions):
+            residual += ohm[r, v] * memory.total[first + v]
+        matrix[i, n + 1] = -residual
+        worst = max(worst, abs(residual))
+        for j in range(n):
+            matrix[i, j] = ohm[r, particles.place[lo + j, 1]] * gain[j]
+        matrix[i, i] += slope[i]
+        matrix[i, n] = -1.0
+    for j in range(n):
+        matrix[n, j] = gain[j]
+    matrix[n, n] = 0.0
+    matrix[n, n + 1] = -off
+    return worst, off
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def evaluate_electrode(lo, hi, side, total, begins, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Potential, slope and gain of each unit at its current, and the current of each region with what passes its units.
+
+    gain : of the region's current over the unit's: that of the first unit there moves double layer and plating too.
+    begins : whether Newton's method does.
+    """
+    regions = memory.ohm.shape[0]
+    first = side * regions
+    for r in range(regions):
+        memory.total[first + r] = 0.0
+        memory.new_delta[r] = np.nan
+    for i in range(hi - lo):
+        u = lo + i
+        r = particles.place[u, 1]
+        memory.potential[i], memory.slope[i] = surface_potential(
+            u, side, total, at, particles, surfaces, memory
+        )
+        memory.gain[i] = 1.0
+        memory.total[first + r] += memory.y[u]
+        if math.isnan(memory.new_delta[r]):
+            memory.new_delta[r] = memory.potential[i]
+            extra, d_extra = layer_current(
+                r, side, memory.potential[i], memory.slope[i], begins, at, surfaces, memory
+            )
+            if side == 0 and surfaces.plating[0] > 0.0:
+                metal, d_metal = metal_current(r, memory.potential[i], at.thermal, surfaces, memory)
+                extra += metal
+                d_extra += d_metal
+            memory.total[first + r] += extra
+            memory.gain[i] += d_extra * memory.slope[i]
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def surface_potential(u, side, total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Potential (V) of unit u against the electrolyte beside it, at its current, and the slope in the current."""
+    ocp, y, give = surfaces.ocp[side], memory.y, memory.give
+    t = memory.pred[u] - give[u] * (y[u] - particles.share[u] * total)
+    memory.theta[u] = t
+    region = side * memory.ohm.shape[0] + particles.place[u, 1]
+    k, salt = 3 * region, memory.salt
+    occupancy = max(t * (1.0 - t), SMALLEST_OCCUPANCY)
+    eta, d_eta = overpotential(
+        y[u], particles.exchange[u] * at.quicker * lookup(surfaces.rate[side], t), occupancy,
+        salt[k], salt[k + 1], salt[k + 2], memory.log_salt[region], surfaces.alpha[side], at.thermal,
+    )  # fmt: skip
+    inside = min(max(t, 0.0), 1.0)
+    last = ocp.shape[0] - 1
+    cell = min(int(inside * last), last - 1)
+    falls = (ocp[cell + 1] - ocp[cell]) * last if t == inside else -BEYOND_RANGE_V
+    u_eq = open_circuit(ocp, t) + at.rise * lookup(surfaces.entropic[side], inside)
+    return u_eq + eta, max(d_eta - give[u] * falls, SMALLEST_SLOPE)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def layer_current(r, side, potential, slope, begins, at, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Current (A/m2) into the double layer of region r at the end of the step, and its slope in the potential."""
+    capacity = surfaces.capacity[side]
+    if not (capacity > 0.0 and at.dt > 0.0):
+        return 0.0, 0.0
+    region = side * memory.ohm.shape[0] + r
+    if begins:
+        z = at.dt / (capacity * slope)
+        memory.fitted[r] = 1.0 / max(relaxed(z), SMALLEST_SHARE) if at.held else end_weight(z)
+    weight = memory.fitted[r]
+    charging = capacity * (potential - memory.delta[region]) / (at.dt * weight)
+    if not at.held:
+        charging -= (1.0 - weight) / weight * memory.layer[region]
+    memory.new_layer[r] = charging
+    return charging, capacity / (at.dt * weight)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def metal_current(r, potential, thermal, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Current (A/m2) that lithium metal of region r gives, and its slope in the potential."""
+    rate, alpha = surfaces.plating[0], surfaces.plating[1]
+    up = rate * memory.plated[r] * bounded_exp((1.0 - alpha) * potential / thermal)
+    down = rate * memory.region_salt[r] * bounded_exp(-alpha * potential / thermal)
+    memory.plating[r] = up - down
+    return up - down, ((1.0 - alpha) * up + alpha * down) / thermal
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -226,7 +268,7 @@ def local_conductivity(table, salt, first, unit):  # type: ignore[no-untyped-def
     return 18.0 / (5.0 / k1 + 8.0 / k2 + 5.0 / k3)
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def region_drops(solid, salt, kappa, first, ohm):  # type: ignore[no-untyped-def]
     """ohm[r, v] : drop of region r per current of region v."""
     regions = ohm.shape[0]
@@ -237,7 +279,7 @@ def region_drops(solid, salt, kappa, first, ohm):  # type: ignore[no-untyped-def
                 ohm[r, v] += salt[r, m, v] / kappa[first + m]
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def eliminate(matrix, n):  # type: ignore[no-untyped-def]
     """Solve in place: the right-hand side stands in column n and is replaced by the solution."""
     for k in range(n):

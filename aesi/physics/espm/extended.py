@@ -13,7 +13,18 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL
 from aesi.numerics.modes.galerkin import ohmic_shares, sphere_modes
 from aesi.numerics.typing import Array
-from aesi.physics.espm.layout import VOLTAGE_ROWS, Drive, Salt, Surfaces, Units, Whole
+from aesi.physics.espm.layout import (
+    CACHE_SLOTS,
+    VOLTAGE_ROWS,
+    Drive,
+    Memory,
+    Modes,
+    Salt,
+    SaltMemory,
+    Surfaces,
+    Units,
+    Whole,
+)
 from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
     conductivity_table,
@@ -37,11 +48,33 @@ def run_extended(
     given = temperature_k is not None
     kelvin = temperature_k if temperature_k is not None else np.array([model.cell.initial_temperature_k])
     drive = Drive(time, current, kelvin, given, hold == "backward", model.substep_s, model.most_substeps)
-    fault_at, fault = run_general(drive, theta0, *general_arguments(model), out)
+    arguments = general_arguments(model)
+    fault_at, fault = run_general(drive, theta0, *arguments, *_memory(*arguments[:2], model.regions), out)
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]
     return out[:VOLTAGE_ROWS], extra, fault_at, fault
+
+
+def _memory(particles: Units, salt: Salt, regions: int) -> tuple[Memory, Modes, SaltMemory]:
+    of = np.zeros
+    units, order = particles.rates.shape
+    nodes, salt_order = salt.to_nodes.shape
+    memory = Memory(
+        y=of(units), theta=of(units), pred=of(units), give=of(units), ohm=of((regions, regions)),
+        salt=np.ones(len(salt.gauss)), log_salt=of(2 * regions), region_salt=np.ones(2 * regions),
+        delta=of(2 * regions), layer=of(2 * regions), total=of(2 * regions),
+        plated=of(regions), plating=of(regions), kappa=np.ones(2 * regions + 1), deviation=of(2 * regions),
+        potential=of(units), slope=of(units), gain=of(units), matrix=of((units + 1, units + 2)),
+        new_delta=of(regions), new_layer=of(regions), fitted=of(regions),
+    )  # fmt: skip
+    modes = Modes(
+        z=of((units, order)), means=of(units),
+        nodes=of(len(particles.at)), force=of(order + 1), force_end=of(order + 1), faster=np.ones(3),
+        keys=np.full(CACHE_SLOTS, -1, dtype=np.int64),
+        w=of((CACHE_SLOTS, units, 3, order)), w_e=of((CACHE_SLOTS, 3, salt_order)),
+    )  # fmt: skip
+    return memory, modes, SaltMemory(*map(of, (salt_order, nodes, nodes, salt_order, salt_order)))
 
 
 @lru_cache(maxsize=64)

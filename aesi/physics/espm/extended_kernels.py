@@ -12,8 +12,8 @@ from numba import njit
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops, solve_electrode
-from aesi.physics.espm.kernels import CACHE_SLOTS, FASTMATH, NANOSECONDS, lookup, open_circuit
-from aesi.physics.espm.layout import Memory, SaltMemory
+from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, compiled, lookup, open_circuit
+from aesi.physics.espm.layout import CACHE_SLOTS, StepEnd
 from aesi.physics.espm.transport_kernels import (
     DIFFUSIONS,
     TEMPERATURE_STEP_K,
@@ -29,186 +29,254 @@ from aesi.physics.espm.transport_kernels import (
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def run_general(  # type: ignore[no-untyped-def]
-    drive, theta0, particles, electrolyte, surfaces, cell, out
+    drive, theta0, particles, electrolyte, surfaces, cell, memory, modes, dissolved, out
 ):
     """Step all samples; see `layout` for what the arguments hold.
 
     theta0 : (2,) stoichiometries at rest.
     out : (9, n) voltage, surface stoichiometries (n, p), c_e0, c_eL, mean stoichiometries (n, p), temperature,
-    plated lithium (mol/m3 of the negative electrode, mean).  Returns (sample, what) of the first fault, see `kernels`.
+    plated lithium (mol/m3 of the negative electrode, mean).
+    Returns (sample, what) of the first fault, see `plain_kernels`.
     """
-    time, current, temperature, given, backward, substep, most = drive
-    units, rates, gains, lump, share, volume = particles[:6]
-    ocp, entropic, plating_active = surfaces.ocp, surfaces.entropic, surfaces.plating[0] > 0.0
-    energies, heat, area, separator, contact, film, reference_k = cell
-    mean, kappa_table = electrolyte.mean, electrolyte.kappa
-    c0, top = electrolyte.c0, electrolyte.top
-    n_units, n_modes = rates.shape
-    m_e, n_e = electrolyte.to_nodes.shape
-    regions = surfaces.solid.shape[1]
-    split = np.sum(units[:, 0] == 0)
-
-    z, means = np.zeros((n_units, n_modes)), np.zeros(n_units)
-    pred, theta = np.zeros(n_units), np.zeros(n_units)
-    give, y = np.zeros(n_units), np.zeros(n_units)
-    scratch = np.zeros(particles.at.shape[0]), np.zeros(n_modes + 1), np.zeros(n_modes + 1)
-    c = np.full(m_e, c0)
-    dissolved = SaltMemory(np.zeros(n_e), c, np.zeros(m_e), np.zeros(n_e), np.zeros(n_e))
-    salt, log_salt, region_salt = (
-        np.ones(electrolyte.gauss.shape[0]),
-        np.zeros(2 * regions),
-        np.ones(2 * regions),
+    time, current, temperature, area, heat = (
+        drive.time,
+        drive.current,
+        drive.temperature,
+        cell.area,
+        cell.heat,
     )
-    kappa, ohm = np.ones(2 * regions + 1), np.zeros((regions, regions))  # the separator's stands last
-    deviation, region_total = np.zeros(2 * regions), np.zeros(2 * regions)
-    delta, dl_current = np.zeros(2 * regions), np.zeros(2 * regions)
-    plated, plating_current = np.zeros(regions), np.zeros(regions)
-    memory = Memory(
-        y, theta, pred, give, ohm, salt, log_salt, region_salt, delta, dl_current, region_total,
-        plated, plating_current, np.zeros((n_units + 8, n_units + 3)),
-    )  # fmt: skip
-    keys = np.full(CACHE_SLOTS, -1, dtype=np.int64)
-    w = np.zeros((CACHE_SLOTS, n_units, 3, n_modes))
-    w_e = np.zeros((CACHE_SLOTS, 3, n_e))
-    for u in range(n_units):
-        means[u] = theta0[units[u, 0]]
-        y[u] = share[u] * current[0] / area * (1.0 if units[u, 0] == 0 else -1.0)
-    t_k = temperature[0]
-    t_weights, faster = -1.0, np.ones(3)
-    watts, last_j = 0.0, current[0] / area
-    last_step = 0.0
-    fault_at, fault, driest = -1, 0, 1.0
+    rest_particles(theta0, current[0] / area, particles, electrolyte, memory, modes, dissolved)
+    t_k, t_weights = temperature[0], -1.0
+    watts, last_j, last_step = 0.0, current[0] / area, 0.0
+    fault_at, fault, driest, voltage = -1, 0, 1.0, 0.0
     for k in range(time.shape[0]):
         whole = time[k] - time[k - 1] if k > 0 else 0.0
-        parts = min(max(1, math.ceil(whole / substep)), most) if k > 0 else 1
-        dt = whole / parts
+        parts = min(max(1, math.ceil(whole / drive.substep)), drive.most) if k > 0 else 1
+        dt, slot = whole / parts, 0
         for part in range(parts):
             end_share = (part + 1.0) / parts
-            i1 = current[k]
-            i0 = i1
-            if k > 0 and not backward:
-                step_current = current[k] - current[k - 1]
-                i0 = current[k - 1] + step_current * part / parts
-                i1 = current[k - 1] + step_current * end_share
-            j0, j1 = i0 / area, i1 / area
+            i0, i1 = ends_of_part(current, k, part, parts, drive.backward)
+            j1 = i1 / area
             if k > 0:
-                if abs(t_k - t_weights) > TEMPERATURE_STEP_K:
-                    t_weights = t_k
-                    keys[:] = -1
-                    for i in range(3):
-                        faster[i] = arrhenius(energies[DIFFUSIONS[i]], t_k, reference_k)
-                key = np.int64(dt * NANOSECONDS + 0.5)
-                slot = key % CACHE_SLOTS
-                if keys[slot] != key:
-                    keys[slot] = key
-                    renew_weights(dt, faster, units, rates, electrolyte.rates, w[slot], w_e[slot])
-                ahead = dt / last_step if last_step > 0.0 else 0.0
-                step_electrolyte(j0, j1, deviation, ahead, faster[2], electrolyte, w_e[slot], dissolved)
+                t_weights = renew_rates(t_k, t_weights, cell, modes)
+                slot = slot_of(dt, particles, electrolyte, modes)
+                diffuse(i0 / area, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved)
                 last_step = dt
-                for u in range(n_units):
-                    side = units[u, 0]
-                    nominal = share[u] if side == 0 else -share[u]
-                    means[u], give[u] = step_particle(
-                        u,
-                        means[u],
-                        z[u],
-                        nominal * j0,
-                        nominal * j1,
-                        dt,
-                        faster[side],
-                        particles,
-                        w[slot, u],
-                        scratch,
-                    )
-            for u in range(n_units):
-                pred[u] = means[u]
-                for j in range(n_modes):
-                    pred[u] += z[u, j]
-            driest = observe_salt(c, c0, electrolyte.gauss, salt, log_salt, region_salt)
+            predict(memory, modes)
+            driest = observe_salt(
+                dissolved.c,
+                electrolyte.c0,
+                electrolyte.gauss,
+                memory.salt,
+                memory.log_salt,
+                memory.region_salt,
+            )
             start_k = t_k
-            if given and k > 0:
+            if drive.given and k > 0:
                 t_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
             elif k > 0 and heat[0] > 0.0:
                 t_k = heated(start_k, watts, dt, heat)
-            rise = t_k - reference_k
-            thermal = GAS_OVER_FARADAY * t_k
-            chi = 2.0 * electrolyte.supply * thermal
-            warmer = arrhenius(energies[5], t_k, reference_k)
-            if regions == 1:
-                c_mean = 0.0
-                for j in range(m_e):
-                    c_mean += mean[j] * c[j]
-                kappa[:] = lookup(kappa_table, c_mean / top) * warmer
-            else:
-                for r in range(2 * regions + 1):
-                    kappa[r] = local_conductivity(kappa_table, salt, 3 * r, c0 / top) * warmer
-            phi_n, phi_p = 0.0, 0.0
-            for side in range(2):
-                lo, hi = (0, split) if side == 0 else (split, n_units)
-                total = j1 if side == 0 else -j1
-                for u in range(lo, hi):  # start from the last deviations
-                    held = y[u] - share[u] * (last_j if side == 0 else -last_j)
-                    y[u] = share[u] * total + held
-                region_drops(surfaces.solid[side], surfaces.salt[side], kappa, side * regions, ohm)
-                quicker = arrhenius(energies[2 + side], t_k, reference_k)
-                phi = solve_electrode(
-                    lo,
-                    hi,
-                    side,
-                    total,
-                    dt,
-                    backward,
-                    thermal,
-                    rise,
-                    chi,
-                    quicker,
-                    particles,
-                    surfaces,
-                    memory,
-                )
-                if side == 0:
-                    phi_n = phi
-                else:
-                    phi_p = phi
-                for r in range(regions):
-                    deviation[side * regions + r] = region_total[side * regions + r] - total / regions
-                if k > 0:
-                    for u in range(lo, hi):
-                        extra = y[u] - share[u] * total
-                        if extra != 0.0:
-                            for j in range(n_modes):
-                                z[u, j] -= gains[u, j] * (w[slot, u, 1, j] + w[slot, u, 2, j]) * extra
-                            means[u] -= lump[u] * dt * extra
+            set_conductivities(
+                arrhenius(cell.energies[5], t_k, cell.reference_k), electrolyte, memory, dissolved.c
+            )
+            at = end_of_step(0, dt, drive.backward, t_k, electrolyte.supply, cell)
+            phi_n = react(0, j1, last_j, at, particles, surfaces, memory)
+            at = end_of_step(1, dt, drive.backward, t_k, electrolyte.supply, cell)
+            phi_p = react(1, -j1, -last_j, at, particles, surfaces, memory)
+            if k > 0:
+                take_deviations(j1, dt, slot, particles, memory, modes)
             last_j = j1
-            if plating_active:
-                for r in range(regions):
-                    plated[r] = max(plated[r] - surfaces.plating_to_c * plating_current[r] * dt, 0.0)
-            voltage = phi_p - phi_n - j1 * separator / kappa[2 * regions]
-            voltage -= i1 * (contact + film / arrhenius(energies[6], t_k, reference_k))
+            if surfaces.plating[0] > 0.0:
+                for r in range(memory.plated.shape[0]):
+                    gone = surfaces.plating_to_c * memory.plating[r] * dt
+                    memory.plated[r] = max(memory.plated[r] - gone, 0.0)
+            voltage = phi_p - phi_n - j1 * cell.separator / memory.kappa[memory.kappa.shape[0] - 1]
+            voltage -= i1 * (cell.contact + cell.film / arrhenius(cell.energies[6], t_k, cell.reference_k))
             if heat[0] > 0.0:
-                power = -i1 * voltage
-                for u in range(n_units):
-                    side = units[u, 0]
-                    slope = lookup(entropic[side], theta[u])
-                    u_eq = open_circuit(ocp[side], theta[u]) + rise * slope
-                    power += area * y[u] * (t_k * slope - u_eq)
-                if k > 0 and not given:
+                power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
+                if k > 0 and not drive.given:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat)
                 watts = power
-        out[0, k] = voltage
-        for row in range(1, 7):
-            out[row, k] = 0.0
-        for u in range(n_units):
-            side = units[u, 0]
-            out[1 + side, k] += share[u] * theta[u]
-            out[5 + side, k] += volume[u] * means[u]
-            if fault_at < 0 and not 0.0 <= theta[u] <= 1.0:
-                fault_at, fault = k, 1 + side
-        out[3, k], out[4, k] = c[0], c[m_e - 1]
-        out[7, k] = t_k
-        out[8, k] = np.mean(plated)
-        if fault_at < 0 and not driest > 0.0:
-            fault_at, fault = k, 3
+        out[0, k], out[7, k] = voltage, t_k
+        what = record_sample(k, driest, particles, memory, modes, dissolved.c, out)
+        if fault_at < 0 and what > 0:
+            fault_at, fault = k, what
     return fault_at, fault
+
+
+@compiled
+def rest_particles(theta0, density, particles, electrolyte, memory, modes, dissolved):  # type: ignore[no-untyped-def]
+    """Uniform particles and salt; each unit carries its share of the cell's current density."""
+    dissolved.c.fill(electrolyte.c0)
+    for u in range(memory.y.shape[0]):
+        side = particles.place[u, 0]
+        modes.means[u] = theta0[side]
+        memory.y[u] = particles.share[u] * density * (1.0 if side == 0 else -1.0)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def ends_of_part(current, k, part, parts, backward):  # type: ignore[no-untyped-def]
+    """Current at both ends of one part of the step to sample k."""
+    if k == 0 or backward:
+        return current[k], current[k]
+    step = current[k] - current[k - 1]
+    return current[k - 1] + step * part / parts, current[k - 1] + step * ((part + 1.0) / parts)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def renew_rates(t_k, t_weights, cell, modes):  # type: ignore[no-untyped-def]
+    """Factors of temperature on diffusion, where it has moved since `t_weights`; returns that of which they are now."""
+    if abs(t_k - t_weights) <= TEMPERATURE_STEP_K:
+        return t_weights
+    modes.keys.fill(-1)
+    for i in range(3):
+        modes.faster[i] = arrhenius(cell.energies[DIFFUSIONS[i]], t_k, cell.reference_k)
+    return t_k
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def slot_of(dt, particles, electrolyte, modes):  # type: ignore[no-untyped-def]
+    """Where the weights of a step of this length stand; they are made where they do not."""
+    key = np.int64(dt * NANOSECONDS + 0.5)
+    slot = key % CACHE_SLOTS
+    if modes.keys[slot] != key:
+        modes.keys[slot] = key
+        renew_weights(
+            dt,
+            modes.faster,
+            particles.place,
+            particles.rates,
+            electrolyte.rates,
+            modes.w[slot],
+            modes.w_e[slot],
+        )
+    return slot
+
+
+@compiled
+def diffuse(  # type: ignore[no-untyped-def]
+    j0, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved
+):
+    """Salt and particles over a step of the cell's current density from j0 to j1, last deviations as they were.
+
+    last_step : of the step before, 0 for the first.
+    """
+    ahead = dt / last_step if last_step > 0.0 else 0.0
+    step_electrolyte(
+        j0, j1, memory.deviation, ahead, modes.faster[2], electrolyte, modes.w_e[slot], dissolved
+    )
+    scratch = modes.nodes, modes.force, modes.force_end
+    for u in range(modes.means.shape[0]):
+        side = particles.place[u, 0]
+        nominal = particles.share[u] if side == 0 else -particles.share[u]
+        modes.means[u], memory.give[u] = step_particle(
+            u, modes.means[u], modes.z[u], nominal * j0, nominal * j1, dt, modes.faster[side], particles,
+            modes.w[slot, u], scratch,
+        )  # fmt: skip
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def predict(memory, modes):  # type: ignore[no-untyped-def]
+    """Surface stoichiometries if each unit carries its share."""
+    for u in range(modes.means.shape[0]):
+        surface = modes.means[u]
+        for j in range(modes.z.shape[1]):
+            surface += modes.z[u, j]
+        memory.pred[u] = surface
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def set_conductivities(warmer, electrolyte, memory, c):  # type: ignore[no-untyped-def]
+    """Of each region and, last, of the separator; of an undivided electrode, at the mean salt of the cell.
+
+    warmer : factor of temperature.
+    """
+    kappa, table, regions = memory.kappa, electrolyte.kappa, memory.ohm.shape[0]
+    if regions == 1:
+        c_mean = 0.0
+        for j in range(c.shape[0]):
+            c_mean += electrolyte.mean[j] * c[j]
+        kappa.fill(lookup(table, c_mean / electrolyte.top) * warmer)
+    else:
+        for r in range(2 * regions + 1):
+            unit = electrolyte.c0 / electrolyte.top
+            kappa[r] = local_conductivity(table, memory.salt, 3 * r, unit) * warmer
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def end_of_step(side, dt, held, t_k, supply, cell):  # type: ignore[no-untyped-def]
+    """The `StepEnd` of an electrode at temperature t_k.  supply : 1 - t+."""
+    thermal = GAS_OVER_FARADAY * t_k
+    quicker = arrhenius(cell.energies[2 + side], t_k, cell.reference_k)
+    return StepEnd(dt, held, thermal, t_k - cell.reference_k, 2.0 * supply * thermal, quicker)
+
+
+@compiled
+def react(side, total, last_total, at, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Currents of the units of one electrode at the end of a step, from the last deviations on; returns Phi.
+
+    total, last_total : A/m2 of cell, positive for delithiation, now and at the end of the step before.
+    """
+    lo, hi = units_of(side, particles)
+    regions = memory.ohm.shape[0]
+    first = side * regions
+    for u in range(lo, hi):
+        memory.y[u] += particles.share[u] * (total - last_total)
+    region_drops(surfaces.solid[side], surfaces.salt[side], memory.kappa, first, memory.ohm)
+    phi = solve_electrode(lo, hi, side, total, at, particles, surfaces, memory)
+    for r in range(first, first + regions):
+        memory.deviation[r] = memory.total[r] - total / regions
+    return phi
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def units_of(side, particles):  # type: ignore[no-untyped-def]
+    """First unit of an electrode, and the one after its last."""
+    n_units, split = particles.place.shape[0], 0
+    while split < n_units and particles.place[split, 0] == 0:
+        split += 1
+    return (0, split) if side == 0 else (split, n_units)
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def take_deviations(density, dt, slot, particles, memory, modes):  # type: ignore[no-untyped-def]
+    """Give the particles what their units carried beyond their shares, as if over the whole step."""
+    for u in range(modes.means.shape[0]):
+        share = particles.share[u] if particles.place[u, 0] == 0 else -particles.share[u]
+        extra = memory.y[u] - share * density
+        if extra != 0.0:
+            for j in range(modes.z.shape[1]):
+                weight = modes.w[slot, u, 1, j] + modes.w[slot, u, 2, j]
+                modes.z[u, j] -= particles.gains[u, j] * weight * extra
+            modes.means[u] -= particles.lump[u] * dt * extra
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def reaction_heat(t_k, cell, particles, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Power (W) that the reactions give, with their entropy."""
+    power = 0.0
+    for u in range(memory.y.shape[0]):
+        side = particles.place[u, 0]
+        slope = lookup(surfaces.entropic[side], memory.theta[u])
+        u_eq = open_circuit(surfaces.ocp[side], memory.theta[u]) + (t_k - cell.reference_k) * slope
+        power += cell.area * memory.y[u] * (t_k * slope - u_eq)
+    return power
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def record_sample(k, driest, particles, memory, modes, c, out):  # type: ignore[no-untyped-def]
+    """Means of the electrodes, salt at the collectors, plated lithium; returns what left its range, 0 for nothing."""
+    what = 0
+    for row in range(1, 7):
+        out[row, k] = 0.0
+    for u in range(memory.y.shape[0]):
+        side = particles.place[u, 0]
+        out[1 + side, k] += particles.share[u] * memory.theta[u]
+        out[5 + side, k] += particles.volume[u] * modes.means[u]
+        if what == 0 and not 0.0 <= memory.theta[u] <= 1.0:
+            what = 1 + side
+    out[3, k], out[4, k] = c[0], c[c.shape[0] - 1]
+    out[8, k] = np.mean(memory.plated)
+    return what if what > 0 or driest > 0.0 else 3

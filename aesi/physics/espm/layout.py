@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 from aesi.numerics.typing import Array, IntArray
 
+CACHE_SLOTS = 64
+"""Lengths of a step whose weights are kept at a time."""
 VOLTAGE_ROWS = 7
 """Rows of the output of every path: voltage, surface stoichiometries (n, p), salt at the collectors (n, p) and mean
 stoichiometries (n, p). Further states stand below."""
@@ -72,6 +74,30 @@ class PlainCell(NamedTuple):
     path: float
     solid: float
     contact: float
+
+
+class PlainMemory(NamedTuple):
+    """What the steps of the plain path change.
+
+    z_n, z_p : (modes,) of the particles.  q, forcing, before : (salt modes,).  c, rest : (nodes,) mol/m3.
+    g : (6,) salt over rest at the Gauss points.
+    keys, parts : (slots,) nanoseconds of the steps whose weights are kept, and into how many each is divided.
+    w_n, w_p : (slots, 3, modes).  w_e : (slots, 5, salt modes).
+    """
+
+    z_n: Array
+    z_p: Array
+    q: Array
+    c: Array
+    g: Array
+    forcing: Array
+    before: Array
+    rest: Array
+    keys: IntArray
+    parts: IntArray
+    w_n: Array
+    w_p: Array
+    w_e: Array
 
 
 class Drive(NamedTuple):
@@ -179,7 +205,9 @@ class Memory(NamedTuple):
     one unit of deviating current takes from it.  ohm : (regions, regions) ohm m2.
     salt, log_salt, region_salt : at Gauss points over rest; by region its mean logarithm and mean, mol/m3.
     delta, layer : (2 regions,) V and A/m2 of the double layers.  total : (2 regions,) A/m2.
-    plated, plating : (regions,) mol/m3 and A/m2.  work : scratch.
+    plated, plating : (regions,) mol/m3 and A/m2.
+    kappa : (2 regions + 1,) S/m, the separator's last.  deviation : (2 regions,) A/m2 beyond its share of the current.
+    potential, slope, gain, matrix : scratch, by unit of one electrode.  new_delta, new_layer, fitted : by its regions.
     """
 
     y: Array
@@ -195,7 +223,51 @@ class Memory(NamedTuple):
     total: Array
     plated: Array
     plating: Array
-    work: Array
+    kappa: Array
+    deviation: Array
+    potential: Array
+    slope: Array
+    gain: Array
+    matrix: Array
+    new_delta: Array
+    new_layer: Array
+    fitted: Array
+
+
+class Modes(NamedTuple):
+    """What the steps of diffusion know of the particles.
+
+    z, means : (units, modes) and (units,).  nodes, force, force_end : scratch of the variable part.
+    faster : (3,) factors of temperature, negative, positive, salt.
+    keys, w, w_e : (slots,) nanoseconds of the steps whose weights are kept, (slots, units, 3, modes) those of the
+    particles, (slots, 3, salt modes) those of the salt.
+    """
+
+    z: Array
+    means: Array
+    nodes: Array
+    force: Array
+    force_end: Array
+    faster: Array
+    keys: IntArray
+    w: Array
+    w_e: Array
+
+
+class StepEnd(NamedTuple):
+    """What holds for one electrode at the end of a step.
+
+    dt : s.  held : whether the current jumped to its value where the step began; a double layer's current is then no
+    continuation of the last one, and would ring.  thermal : R T / F, V.  rise : K above the reference.
+    chi : 2 (1 - t+) R T / F, V.  quicker : factor of temperature on rate constants.
+    """
+
+    dt: float
+    held: bool
+    thermal: float
+    rise: float
+    chi: float
+    quicker: float
 
 
 class SaltMemory(NamedTuple):

@@ -11,7 +11,7 @@ from aesi.numerics.modes.galerkin import StackModes, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.relations import Constant, Relation, Scaled, Sum
-from aesi.physics.espm.layout import PlainCell, PlainSalt, PlainSolid
+from aesi.physics.espm.layout import CACHE_SLOTS, PlainCell, PlainMemory, PlainSalt, PlainSolid
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
@@ -24,13 +24,33 @@ def run_plain(
 
     And the first sample at which a surface or the electrolyte left its range, -1 for none, with what it was.
     """
-    from aesi.physics.espm.kernels import run_linear
+    from aesi.physics.espm.plain_kernels import run_linear
 
     out = np.empty((7, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))
     arguments = plain_arguments(model)
-    fault_at, fault = run_linear(time, current, hold == "backward", theta0, *arguments, out)
+    memory = _memory(*arguments[:2])
+    fault_at, fault = run_linear(time, current, hold == "backward", theta0, *arguments, memory, out)
     return out, fault_at, fault
+
+
+def _memory(solid: PlainSolid, salt: PlainSalt) -> PlainMemory:
+    (nodes, salt_modes), modes = salt.to_nodes.shape, solid.rates.shape[1]
+    return PlainMemory(
+        z_n=np.zeros(modes),
+        z_p=np.zeros(modes),
+        q=np.zeros(salt_modes),
+        c=np.zeros(nodes),
+        g=np.zeros(6),
+        forcing=np.zeros(salt_modes),
+        before=np.zeros(salt_modes),
+        rest=np.zeros(nodes),
+        keys=np.full(CACHE_SLOTS, -1, dtype=np.int64),
+        parts=np.ones(CACHE_SLOTS, dtype=np.int64),
+        w_n=np.zeros((CACHE_SLOTS, 3, modes)),
+        w_p=np.zeros((CACHE_SLOTS, 3, modes)),
+        w_e=np.zeros((CACHE_SLOTS, 5, salt_modes)),
+    )
 
 
 def rate_factor(energy_j_mol: float, temperature_k: float, reference_k: float) -> float:
@@ -72,7 +92,7 @@ def _salt_gain(stack: StackModes) -> Array:
 
 @lru_cache(maxsize=64)
 def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]:
-    """What `kernels.run_linear` knows of the cell."""
+    """What `plain_kernels.run_linear` knows of the cell."""
     cell = model.cell
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     temperature, reference = cell.initial_temperature_k, cell.reference_temperature_k

@@ -5,7 +5,7 @@ import math
 from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.kernels import FASTMATH, lookup, step_weights, wet
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights, wet
 
 TEMPERATURE_STEP_K = 0.01
 """Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
@@ -19,7 +19,7 @@ def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
     return math.exp(energy / GAS_CONSTANT_J_MOL_K * (1.0 / reference - 1.0 / temperature))
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def renew_weights(dt, faster, units, rates, e_rates, w, w_e):  # type: ignore[no-untyped-def]
     """Decay and input weights of all modes for a step; w : (units, 3, modes), w_e : (3, modes).
 
@@ -44,10 +44,10 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
     """
     rates, gains, to_nodes, project = electrolyte[:4]
     psi, top, c0, one_minus_t = electrolyte.psi, electrolyte.top, electrolyte.c0, electrolyte.supply
-    q, c, rest, forcing, before = dissolved
+    q, c, rest, forcing, before = dissolved[:5]
     strength = electrolyte.strength * faster
     regions = deviation.shape[0] // 2
-    forcing[:] = 0.0
+    forcing.fill(0.0)
     if strength > 0.0:
         for i in range(rest.shape[0]):
             rest[i] = lookup(psi, c[i] / top)
@@ -64,11 +64,12 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
             )
             slope += one_minus_t * (gains[r, j] - gains[regions + r, j]) * (j1 - j0) / regions
         q[j] = w[0, j] * q[j] + (w[1, j] + w[2, j]) * source + w[2, j] * slope
-    before[:] = forcing
-    c[:] = c0
-    for j in range(q.shape[0]):
-        for i in range(c.shape[0]):
-            c[i] += to_nodes[i, j] * q[j]
+        before[j] = forcing[j]
+    for i in range(c.shape[0]):
+        level = c0
+        for j in range(q.shape[0]):
+            level += to_nodes[i, j] * q[j]
+        c[i] = level
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -89,7 +90,7 @@ def step_particle(  # type: ignore[no-untyped-def]
     at, project = particles.at, particles.project
     nodes, force, force_end = scratch
     taken = lump * dt
-    force[:] = 0.0
+    force.fill(0.0)
     if strength > 0.0:
         solid_forcing(mean, z, at, project, psi, nodes, force)
     for j in range(z.shape[0]):
@@ -105,14 +106,15 @@ def step_particle(  # type: ignore[no-untyped-def]
     return mean, taken
 
 
-@njit(cache=True, nogil=True, fastmath=FASTMATH)
+@compiled
 def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-untyped-def]
     """force[k] : mode k of the integral psi of the diffusivity's variable part, at the profile of (mean, z)."""
-    nodes[:] = mean
     for i in range(nodes.shape[0]):
+        level = mean
         for j in range(z.shape[0]):
-            nodes[i] += at[i, j + 1] * z[j]
-    force[:] = 0.0
+            level += at[i, j + 1] * z[j]
+        nodes[i] = level
+    force.fill(0.0)
     for i in range(nodes.shape[0]):
         value = lookup(psi, nodes[i])
         for j in range(force.shape[0]):

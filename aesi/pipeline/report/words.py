@@ -67,6 +67,26 @@ def corrected_finding(view: RunView) -> str:
     )
 
 
+def others_finding(view: RunView) -> str:
+    """Which other corrections do better on the test records, in words; '' where none does."""
+    ours = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    physics = (view.physics, view.corrected)
+    left = {
+        row["name"]: _figure(row, "free_run", "test_rmse_mv")
+        for row in view.models
+        if row["name"] != view.chosen and row["name"].startswith(tuple(f"{name} + " for name in physics))
+    }
+    better = {name: error for name, error in left.items() if error is not None and ours and error < ours}
+    if not better:
+        return ""
+    best = min(better, key=lambda name: better[name])
+    verb = "errs" if len(better) == 1 else "err"
+    return (
+        f"{len(better)} of {len(left)} other corrections learnt on the same records {verb} less there, "
+        f"{best} least: {better[best]:.1f} mV."
+    )
+
+
 def persistence_finding(model: Row) -> str:
     """One step ahead against persistence, in words."""
     ours, echo = (_figure(model, "one_step", key) for key in ("test_rmse_mv", "persistence_rmse_mv"))

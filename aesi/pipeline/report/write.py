@@ -42,6 +42,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
             sentence
             for sentence in (
                 words.corrected_finding(view),
+                words.others_finding(view),
                 words.persistence_finding(chosen),
                 words.interval_finding(chosen),
                 words.outside_finding(chosen),

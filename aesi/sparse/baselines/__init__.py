@@ -6,6 +6,7 @@ from typing import Any
 
 from aesi.records import ErrorModel
 from aesi.sparse.baselines.boosting import gradient_boosting
+from aesi.sparse.baselines.constant import constant
 from aesi.sparse.baselines.dmd_c import dmd_with_control
 from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
 from aesi.sparse.baselines.ridge import plain_ridge
@@ -31,6 +32,7 @@ class Tuning:
 
 
 BASELINES: dict[str, Callable[[Problem, Tuning], ErrorModel]] = {
+    "constant": lambda problem, _: constant(problem),
     "SINDy-C": lambda problem, tuning: tuned_sindy_c(
         problem, tuning.seed, tuning.candidates, tuning.population, tuning.space, tuning.judge, tuning.told
     ),

@@ -102,3 +102,18 @@ def test_closing_does_not_wait_for_a_store_that_is_away(tmp_path, store, said):
     started = time.monotonic()
     box.close()
     assert time.monotonic() - started < 2
+
+
+def test_an_item_that_takes_long_is_waited_for(tmp_path, said):
+    delivered = []
+
+    def slowly(item, again):
+        time.sleep(0.6)
+        delivered.append(item["n"])
+
+    box = Outbox(tmp_path / "box", slowly, lambda error: False, said.append)
+    box.put({"n": 1})
+    box.put({"n": 2})
+    assert box.flush(0.2) == 0
+    assert delivered == [1, 2]
+    assert not said

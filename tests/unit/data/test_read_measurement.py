@@ -254,3 +254,28 @@ def test_a_refused_file_is_closed_while_its_error_lives(tmp_path, monkeypatch, l
         read_measurement(written(tmp_path, with_line(10, line)))
     assert len(opened) >= 3  # a look at the head, the columns, and the search for the row
     assert all(stream.closed for stream in opened)
+
+
+def test_a_current_of_nought_under_a_moving_voltage_is_refused(tmp_path):
+    falling = np.linspace(4.1, 3.2, N)
+    said = refusal(tmp_path, text(current=0.0 * CURRENT, voltage=falling))
+    assert "current_a: the current is 0 A in all 200 rows while the voltage moves by 0.90 V" in said
+
+
+@pytest.mark.parametrize(
+    "name", ["T_cell", "Tcell [degC]", "T surf", "thermocouple 1", "TC1", "Can Temp", "T2"]
+)
+def test_a_temperature_under_another_header_is_told_of(tmp_path, name):
+    rows = "".join(f"{t},{i},{v},25.0\n" for t, i, v in zip(TIME, CURRENT, VOLTAGE, strict=True))
+    found = read_measurement(written(tmp_path, f"{HEADER},{name}\n{rows}"))
+    assert found.temperature_degc is None
+    assert any(f"{name!r} looks like a temperature and is not used" in note for note in found.notes)
+
+
+def test_a_room_in_fahrenheit_is_doubted(tmp_path):
+    rows = "".join(f"{t},{i},{v},77\n" for t, i, v in zip(TIME, CURRENT, VOLTAGE, strict=True))
+    path = written(tmp_path, f"{HEADER},temperature_degc\n{rows}")
+    assert "starts at 77 degC" in read_measurement(path).notes[-1]
+    converted = read_measurement(path, units={"temperature_degc": "F"})
+    np.testing.assert_allclose(converted.temperature_degc, 25.0)
+    assert not any("starts at" in note for note in converted.notes)

@@ -37,6 +37,17 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     assert "errs by 2.0 mV there: recalibrate it first" in words.corrected_finding(refit_does)
 
 
+def test_other_corrections_that_do_better_are_told(views):
+    view = views.run_view(200)
+    names = {"ESPM + AESI I": 4.1, "ESPM + ridge": 3.9, "ESPM + constant": 3.2, "ESPM + boosting": 5.0}
+    rows = [{"name": name, "free_run": {"test_rmse_mv": error}} for name, error in names.items()]
+    physics = [{"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 1.0}}]
+    assert words.others_finding(replace(view, models=(view.models[0], *rows, *physics))) == (
+        "2 of 3 other corrections learnt on the same records err less there, ESPM + constant least: 3.2 mV."
+    )
+    assert words.others_finding(replace(view, models=(view.models[0], rows[0], rows[3]))) == ""
+
+
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
 def test_a_model_that_diverged_has_no_figures_to_tell(views, figures):
     view = views.run_view(200)

@@ -1,0 +1,22 @@
+"""What a calibration says of parameters that its records do not tell."""
+
+from aesi.pipeline.calibrate import open_line
+
+
+def content(weights: list[dict[str, float]], total: int) -> dict[str, object]:
+    return {
+        "parameters": {f"p{i}": {} for i in range(total)},
+        "undetermined": [{"weights": w, "narrowed": 0.9, "sentence": ""} for w in weights],
+    }
+
+
+def test_many_open_combinations_are_one_sentence_that_names_the_heaviest():
+    many = [{"p0": 0.9, "p1": 0.4}, {"p2": -0.8, "p0": 0.6}, {"p3": 1.0}, {"p4": 1.0}, {"p0": 1.0}]
+    assert open_line(content(many, 9)) == (
+        "these records tell 4 of 9 combinations of parameters better than their priors do; "
+        "the others (p0, p2, p3 and others) stay near the priors"
+    )
+
+
+def test_nothing_open_is_no_sentence():
+    assert open_line(content([], 3)) == ""
