@@ -1,8 +1,8 @@
 """Single particle or porous electrode: settled before an effect is blamed on the cell.
 
 Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
-not where the single particle cannot explain the data and the fuller one, with the same effects, leaves as much: what is
-missing is something else then, and a search takes ten times as long.
+not where the single particle cannot explain the data and the fuller one says no more, with no effects, and leaves as
+much with the same ones: what is missing is something else then, and a search takes ten times as long.
 What was measured may still be a single particle's (a thin electrode, a file made with one): what the two searches end
 with is weighed as any two hypotheses are.
 """
@@ -17,9 +17,10 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.evidence import Evidence, believed
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import fitted_hypothesis
+from aesi.tracer.search.fitted import base_of, fitted_hypothesis
 from aesi.tracer.search.forward import HOPELESS_SHARE
 from aesi.tracer.search.path import Path, beyond_noise
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
@@ -59,12 +60,21 @@ def with_model(
     if reduction is None or not reduction.notable:
         return told(first, "espm")
     full = fine("dfn")
-    if first.verdict.word == "unknown" and not _takes_off(full, first.paths["tight"], kept):
-        return told(first, "espm", ", what it leaves is not taken off by the other one")
+    tight = first.paths["tight"]
+    if first.verdict.word == "unknown" and not (
+        _says_more(full, tight, kept) or _takes_off(full, tight, kept)
+    ):
+        return told(first, "espm", ", what it leaves the other one leaves as well")
     second = search(full, kept(full))
     if believed((second.path, second.verdict), (first.path, first.verdict)):
         return told(first, "espm", ", with which less or more usual things have to be missing")
     return told(second, "dfn")
+
+
+def _says_more(full: InverseProblem, path: Path, kept: Kept) -> bool:
+    """Does the porous electrode say more of unseen data with nothing but its own parameters moved?"""
+    base = base_of(full, path.blocks, kept(full))
+    return base is not None and base.score.total > path.base.score.total + ALIKE_NATS
 
 
 def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
