@@ -206,7 +206,7 @@ def smallest(values):  # type: ignore[no-untyped-def]
 @njit(inline="always", fastmath=FASTMATH)
 def set_rates(e, t, t_k):  # type: ignore[no-untyped-def]
     """Arrhenius factors of everything that has an activation energy."""
-    for i in range(7):
+    for i in range(8):
         t.rates[i] = arrhenius(e.energies[i], t_k, e.reference_k)
 
 
@@ -217,7 +217,7 @@ def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untype
     for i in range(s.gap_path.shape[0]):
         if s.gap_path[i] > 0.0:
             gap += s.gap_path[i] / lookup(s.kappa, state.c[i] / s.top)
-    return phi_p - phi_n - density * (gap / t.rates[5] + (e.contact + e.film / t.rates[6]) * e.area)
+    return phi_p - phi_n - density * (gap / t.rates[5] + e.contact * e.area)
 
 
 @compiled

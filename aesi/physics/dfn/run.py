@@ -117,7 +117,7 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
         force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
         salt_before=np.ones(places), q=of(salt_modes), c=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
         kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),
-        no_spread=of(places, places), z_end=of(modes), rates=np.ones(7),
+        no_spread=of(places, places), z_end=of(modes), rates=np.ones(8),
         total=of(2), before=of(2), change=of(2), faster=np.ones(3),
     )  # fmt: skip
     newton = NewtonScratch(
