@@ -147,7 +147,9 @@ class Model:
             rise = (
                 np.full(len(record.rows), cell.initial_temperature_k) if kelvin is None else kelvin
             ) - cell.reference_temperature_k
-            blocks[i][:, self.layout.shapes] = self.shapes.columns(runs[i][1], runs[i][2], rise)
+            blocks[i][:, self.layout.shapes] = self.shapes.columns(
+                x[self.layout.shapes], runs[i][1], runs[i][2], rise
+            )
             for j in (self.layout.soc(i), self.layout.age(i)):
                 there = x.copy()
                 there[j] += 10.0 * STEP

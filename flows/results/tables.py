@@ -7,7 +7,6 @@ together as mean and spread, with their ids beneath.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +14,9 @@ from typing import Any, Literal
 from aesi.errors import InputError
 from aesi.pipeline.report import tables
 from flows.tracking.store import KIND, Store
+
+RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
+"""What tables show with the range over seeds."""
 
 
 def tables_of(
@@ -42,7 +44,7 @@ def tables_of(
 
 
 def merged(runs: Sequence[Sequence[dict[str, Any]]]) -> list[dict[str, Any]]:
-    """Rows of several runs as one set: the mean of every number, and the range over seeds."""
+    """Rows of several runs as one set: the mean of every number, and of RANGED the range over seeds."""
     if len(runs) == 1:
         return list(runs[0])
     names = list(dict.fromkeys(row["name"] for rows in runs for row in rows))
@@ -50,16 +52,7 @@ def merged(runs: Sequence[Sequence[dict[str, Any]]]) -> list[dict[str, Any]]:
 
 
 def _mean(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    row = _mean_value(rows)
-    msers = [_at(each, "free_run", "test_mser_pct") for each in rows]
-    found = [value for value in msers if value is not None]
-    if found:
-        row["spread"] = {
-            "seeds": len(found),
-            "test_mser_pct": [min(found), max(found)],
-            "test_mser_sd": _deviation(found),
-        }
-    return row
+    return {**_mean_value(rows), "seeds": len(rows)}
 
 
 def _mean_value(values: Sequence[Any]) -> Any:
@@ -69,22 +62,17 @@ def _mean_value(values: Sequence[Any]) -> Any:
     first = present[0]
     if isinstance(first, Mapping):
         keys = dict.fromkeys(key for value in present for key in value)
-        return {key: _mean_value([value.get(key) for value in present]) for key in keys}
+        mean = {key: _mean_value([value.get(key) for value in present]) for key in keys}
+        spread = {key: _ends([value.get(key) for value in present]) for key in keys if key in RANGED}
+        return mean | ({"spread": spread} if spread else {})
     if isinstance(first, (int, float)) and not isinstance(first, bool):
         return sum(present) / len(present)
     return first
 
 
-def _deviation(values: Sequence[float]) -> float:
-    mean = sum(values) / len(values)
-    return math.sqrt(sum((value - mean) ** 2 for value in values) / max(1, len(values) - 1))
-
-
-def _at(row: Mapping[str, Any], *keys: str) -> Any:
-    value: Any = row
-    for key in keys:
-        value = value.get(key) if isinstance(value, Mapping) else None
-    return value
+def _ends(values: Sequence[float | None]) -> list[float] | None:
+    present = [value for value in values if value is not None]
+    return [min(present), max(present)] if present else None
 
 
 def _name(experiment: str) -> str:

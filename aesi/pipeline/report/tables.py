@@ -11,7 +11,7 @@ absent; beyond the published schema a row may carry
     free_run_intervals   the same keys, in free run; with inside_coverage_pct, and pieces and
                          worst_piece_coverage_pct of the calibration
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
-    spread     {"seeds": n, "test_mser_pct": [low, high]}
+    seeds      how many runs the row is the mean of; a group then holds spread, {key: [lowest, highest]}
     seconds    wall time of fit and evaluation
 
 Captions name the regime, because figures of the two regimes must never be read side by side.
@@ -28,6 +28,7 @@ from aesi.pipeline.report.table_formats import ABSENT, Table, to_csv, to_latex, 
 from aesi.pipeline.report.views import Row
 
 TableFormat = Literal["md", "tex", "csv"]
+OWN_METHOD = "as in Table 2"
 
 
 def free_run_table(models: Sequence[Row]) -> Table:
@@ -37,7 +38,7 @@ def free_run_table(models: Sequence[Row]) -> Table:
         ("MSER valid, %", lambda row: _number(row, "free_run.valid_mser_pct", 2)),
         ("MSER, drives that chose nothing, %", lambda row: _number(row, "validation_mser_pct", 2)),
         ("MSER test, %", _test_mser),
-        ("against recalibrated, %", lambda row: _number(row, "free_run.test_mser_recalibrated_pct", 2)),
+        ("against recalibrated, %", lambda row: _ranged(row, "free_run", "test_mser_recalibrated_pct")),
         ("RMSE test, mV", lambda row: _number(row, "free_run.test_rmse_mv", 2)),
         ("terms", lambda row: _number(row, "terms", 0)),
         ("time, s", lambda row: _number(row, "seconds", 1)),
@@ -49,10 +50,7 @@ def free_run_table(models: Sequence[Row]) -> Table:
         "on itself and no measured voltage is used after the first sample. Drives that chose nothing: each training "
         "drive under physics fitted, and a model chosen, without it."
     )
-    seeds = _seeds(models)
-    if seeds:
-        caption += f" In brackets: lowest and highest of {seeds} seeds."
-    return _table("mser", caption, columns, models)
+    return _table("mser", caption + _brackets(models), columns, models)
 
 
 def interval_table(models: Sequence[Row]) -> Table:
@@ -62,7 +60,8 @@ def interval_table(models: Sequence[Row]) -> Table:
         "step before is given. Worst bin: the lowest coverage in any (current, SOC) bin. Low minutes: minute-long "
         "windows with under 70 % coverage. Winkler score: width plus the penalty for misses; lower is better."
     )
-    return _table("intervals", caption, _interval_columns("intervals"), _having(models, "intervals"))
+    rows = _having(models, "intervals")
+    return _table("intervals", caption + _brackets(models), _interval_columns("intervals"), rows)
 
 
 def method_table(models: Sequence[Row]) -> Table:
@@ -70,13 +69,14 @@ def method_table(models: Sequence[Row]) -> Table:
     rows = [
         {"name": f"{row['name']}, {method}", "by_method": figures}
         for row in _having(models, "intervals_by_method")
-        for method, figures in row["intervals_by_method"].items()
+        for method, figures in ({OWN_METHOD: row["intervals"]} | row["intervals_by_method"]).items()
     ]
     caption = (
         "Prediction intervals on the test set by method, calibrated on the same residuals. Regime: one step ahead, "
-        "the measured voltage of the step before is given. Low minutes: minute-long windows with under 70 % coverage."
+        "the measured voltage of the step before is given. Low minutes: minute-long windows with under 70 % coverage. "
+        f"{OWN_METHOD.capitalize()}: the method of the experiment, repeated from there."
     )
-    return _table("interval-methods", caption, _interval_columns("by_method"), rows)
+    return _table("interval-methods", caption + _brackets(models), _interval_columns("by_method"), rows)
 
 
 def free_run_band_table(models: Sequence[Row]) -> Table:
@@ -172,7 +172,7 @@ def _table(key: str, caption: str, columns: Sequence[Column], models: Sequence[R
 def _interval_columns(group: str) -> list[Column]:
     return [
         ("nominal, %", lambda row: _number(row, f"{group}.nominal_pct", 0)),
-        ("coverage, %", lambda row: _number(row, f"{group}.coverage_pct", 2)),
+        ("coverage, %", lambda row: _ranged(row, group, "coverage_pct")),
         ("worst bin, %", lambda row: _number(row, f"{group}.worst_bin_coverage_pct", 2)),
         ("low minutes, %", lambda row: _number(row, f"{group}.low_minutes_pct", 2)),
         ("average width, mV", lambda row: _number(row, f"{group}.average_width_v", 3, MV_PER_V)),
@@ -181,12 +181,15 @@ def _interval_columns(group: str) -> list[Column]:
 
 
 def _test_mser(row: Row) -> str:
-    text = _number(row, "free_run.test_mser_pct", 2)
+    text = _ranged(row, "free_run", "test_mser_pct")
     diverged = _find(row, "free_run.diverged")
-    if diverged:
-        text += f" ({int(diverged)} diverged)"
-    spread = _find(row, "spread.test_mser_pct")
-    return text if spread is None else f"{text} [{spread[0]:.2f}, {spread[1]:.2f}]"
+    return f"{text} ({int(diverged)} diverged)" if diverged else text
+
+
+def _ranged(row: Row, group: str, key: str) -> str:
+    """A number to two digits with its range over seeds, where the row is of several."""
+    text, ends = _number(row, f"{group}.{key}", 2), _find(row, f"{group}.spread.{key}")
+    return text if ends is None else f"{text} [{ends[0]:.2f}, {ends[1]:.2f}]"
 
 
 def _k_step_cell(horizon: str) -> Callable[[Row], str]:
@@ -197,8 +200,10 @@ def _horizons(row: Row) -> list[str]:
     return sorted(row.get("bands_by_horizon", ()), key=float)
 
 
-def _seeds(models: Sequence[Row]) -> int:
-    return max((int(_find(row, "spread.seeds") or 0) for row in models), default=0)
+def _brackets(models: Sequence[Row]) -> str:
+    """What stands in brackets, for the caption; '' where a row is of one run."""
+    seeds = max((int(row.get("seeds") or 0) for row in models), default=0)
+    return f" In brackets: lowest and highest of {seeds} seeds." if seeds else ""
 
 
 def _having(models: Sequence[Row], group: str) -> list[Row]:

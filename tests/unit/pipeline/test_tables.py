@@ -16,7 +16,13 @@ ESPM = {
 HYBRID = {
     "name": "ESPM + AESI I",
     "terms": 56,
-    "free_run": {"train_mser_pct": 71.25, "test_mser_pct": 44.444, "test_rmse_mv": 13.94, "diverged": 1},
+    "free_run": {
+        "train_mser_pct": 71.25,
+        "test_mser_pct": 44.444,
+        "test_rmse_mv": 13.94,
+        "diverged": 1,
+        "spread": {"test_mser_pct": [40.0, 47.5]},
+    },
     "one_step": {"test_rmse_mv": 3.9, "persistence_rmse_mv": 4.03},
     "k_step": {"1": 4.0, "10": 8.25, "60": 12.5},
     "intervals": {
@@ -25,8 +31,9 @@ HYBRID = {
         "average_width_v": 0.0123,
         "winkler_v": 0.02,
         "worst_bin_coverage_pct": 81.0,
+        "spread": {"coverage_pct": [90.25, 90.75]},
     },
-    "spread": {"seeds": 3, "test_mser_pct": [40.0, 47.5]},
+    "seeds": 3,
 }
 MODELS = [ESPM, HYBRID]
 
@@ -38,7 +45,7 @@ def row_of(table, name):
 def test_table_1_puts_the_bare_model_beside_the_hybrid():
     table = tables.free_run_table(MODELS)
     assert row_of(table, "ESPM")["MSER test, %"] == "0.00"
-    assert row_of(table, "ESPM + AESI I")["MSER test, %"] == "44.44 (1 diverged) [40.00, 47.50]"
+    assert row_of(table, "ESPM + AESI I")["MSER test, %"] == "44.44 [40.00, 47.50] (1 diverged)"
     assert "3 seeds" in table.caption
 
 
@@ -56,6 +63,19 @@ def test_widths_leave_in_millivolts():
     row = row_of(tables.interval_table(MODELS), "ESPM + AESI I")
     assert row["average width, mV"] == "12.300"
     assert row["Winkler, mV"] == "20.000"
+
+
+def test_coverage_of_several_seeds_stands_with_its_range():
+    table = tables.interval_table(MODELS)
+    assert row_of(table, "ESPM + AESI I")["coverage, %"] == "90.50 [90.25, 90.75]"
+    assert "lowest and highest of 3 seeds" in table.caption
+
+
+def test_the_table_of_methods_holds_the_experiments_own_too():
+    forest = {"coverage_pct": 87.5, "average_width_v": 0.014, "nominal_pct": 90}
+    table = tables.method_table([{**HYBRID, "intervals_by_method": {"spci_refitted": forest}}])
+    assert row_of(table, "ESPM + AESI I, as in Table 2")["average width, mV"] == "12.300"
+    assert row_of(table, "ESPM + AESI I, spci_refitted")["average width, mV"] == "14.000"
 
 
 def test_a_model_without_intervals_has_no_row_in_table_2():
