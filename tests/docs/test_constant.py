@@ -13,11 +13,14 @@ def test_a_replaced_constant_is_replaced_where_it_was_imported():
     assert spec.loader is not None
     hook = module_from_spec(spec)
     spec.loader.exec_module(hook)
-    owner, reader = import_module("aesi.tracer.search.fitted"), import_module("aesi.tracer.decide.evidence")
-    was = owner.ALIKE_NATS
+    owner, reader = (
+        import_module("aesi.physics.start.open_circuit"),
+        import_module("aesi.physics.initial_state"),
+    )
+    was = owner.CHARGED_V
     try:
-        assert hook.replaced("aesi.tracer.search.fitted", "ALIKE_NATS", 2.0 * was) == was
-        assert [2.0 * was] * 2 == [owner.ALIKE_NATS, reader.ALIKE_NATS]
+        assert hook.replaced("aesi.physics.start.open_circuit", "CHARGED_V", 2.0 * was) == was
+        assert [2.0 * was] * 2 == [owner.CHARGED_V, reader.CHARGED_V]
     finally:
-        hook.replaced("aesi.tracer.search.fitted", "ALIKE_NATS", was)
-    assert was == reader.ALIKE_NATS
+        hook.replaced("aesi.physics.start.open_circuit", "CHARGED_V", was)
+    assert was == reader.CHARGED_V

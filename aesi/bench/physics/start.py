@@ -24,8 +24,9 @@ from aesi.numerics.typing import Array
 from aesi.physics import Cell, initial_state
 from aesi.records import Measurement
 
-RECORDS = ((NCR, "25degC_c20_ocv"), (NCR, "25degC_hppc"), (HG2, "25degC_cap_1c"), (HG2, "25degC_mixed1"))
-"""At 25 degC, where the capacity is that of the cell file."""
+RECORDS = ((NCR, "25degC_hppc"), (HG2, "25degC_cap_1c"), (HG2, "25degC_mixed1"))
+"""At 25 degC, where the capacity is that of the cell file, and without the slow discharges, whose cycler counts some
+percent of charge too much."""
 NEAR, WRONG = 0.02, 0.2
 """Of a given state of charge: what a careful user is off by, and a mistake. Conventions of this benchmark."""
 LEAST_ROWS = 300

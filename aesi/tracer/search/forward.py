@@ -23,14 +23,18 @@ from aesi.tracer.search.plausible import most_plausible
 
 FINALISTS = 6
 """Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
-before, so that what it says of a right effect can be too little."""
+before, so that what it says of a right effect can be too little. On a blind development case (leakage and a resistance
+on the LG M50) the right second effect stood fifth to first order, with 10 nats, and first with 61 when fitted: three
+fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead of 22 s of processor."""
 FINALIST_SHARE = 0.5
 """Of what the best of them says more when it is grown. On six blind cases of seeds 0 and 12 those that said less ended
 at 2 to 27 % of the best one's full fit."""
 BEAM = 2
-"""Hypotheses that a further effect is tried on."""
+"""Hypotheses that a further effect is tried on. The best and one to fall back on, a convention: each costs
+another round of growing."""
 HOPELESS_SHARE = 0.7
-"""Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried."""
+"""Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried. A
+convention that saves time, and gives up pairs that say much together and little apart."""
 
 
 def searched(

@@ -16,7 +16,8 @@ from aesi.tracer.search.plausible import ALIKE_NATS
 NINETY = 1.645
 """Standard deviations either side of a 90 % interval."""
 WRONG_SDS = 2.0
-"""Of its spread: a declared parameter that the data put further off, with 95 % probability, is wrong and is named."""
+"""Of its spread: a declared parameter that the data put further off, with 95 % probability, is wrong and is named. A
+convention: of values that scatter as the spread says, one in twenty lies further off."""
 
 
 def with_wrong_parameters(path: Path, archive: Archive) -> Path:
