@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import AGEING_SD, Model
-from aesi.calibration.parameters import free_parameters
+from aesi.calibration.parameters import free_parameters, with_films
 from aesi.calibration.records import Prepared, check_charge, prepared, with_temperatures
 from aesi.calibration.result import (
     Calibration,
@@ -109,6 +109,7 @@ def problem(
     span = _span_k(start, ready)
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
+    start = with_films(start)
     model = Model(start, ready, free_parameters(start, span), Shapes.over(start, span), physics)
     starts = tuple(r.start.sentence for r in ready)
     return model, (*notes, *(n for _, more in kept for n in more), *told, *typical, *starts)

@@ -29,8 +29,9 @@ HEALTH_WORDS = {
 class Health:
     """State of one check-up, from the calibrated cell.
 
-    resistance_mohm : of contacts and films, beyond the electrolyte and the electrodes.  inventory_ah : cyclable
-    lithium, in both electrodes.  negative_ah, positive_ah : charge that the active material of each can hold.
+    resistance_mohm : of contacts and of films at half charge, beyond the electrolyte and the electrodes.
+    inventory_ah : cyclable lithium, in both electrodes.  negative_ah, positive_ah : charge that the active material of
+    each can hold.
     """
 
     resistance_mohm: float
@@ -45,12 +46,22 @@ def health_of(cell: Cell) -> Health:
     negative, positive = (cell.electrode_capacity_ah(e) for e in (cell.negative, cell.positive))
     theta_n, theta_p = cell.stoichiometries(1.0)
     return Health(
-        resistance_mohm=MILLI * (cell.contact_resistance_ohm + cell.film_resistance_ohm),
+        resistance_mohm=MILLI * (cell.contact_resistance_ohm + _films_ohm(cell)),
         inventory_ah=negative * theta_n + positive * theta_p,
         negative_ah=negative,
         positive_ah=positive,
         capacity_ah=cell.capacity_ah,
     )
+
+
+def _films_ohm(cell: Cell) -> float:
+    """Of both electrodes' films over the whole cell, half charged, at the reference temperature."""
+    half = cell.stoichiometries(0.5)
+    ohm = 0.0
+    for electrode, theta in zip((cell.negative, cell.positive), half, strict=True):
+        surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * cell.total_area_m2
+        ohm += float(electrode.film_ohm_m2(np.array([theta]))[0]) / surface_m2
+    return ohm
 
 
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:

@@ -152,7 +152,10 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
         if value >= 1.0:
             break
         vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
-        heavy = [j for j in np.argsort(-np.abs(vector)) if abs(vector[j]) > 0.3]
+        order = np.argsort(-np.abs(vector))
+        heavy = [j for j in order if abs(vector[j]) > 0.3] or order[
+            :1
+        ].tolist()  # of many, none need stand out
         weights = tuple((model.free[j].name, float(vector[j])) for j in heavy)
         out.append(Open(weights, float(1.0 / np.sqrt(1.0 + max(value, 0.0)))))
     return tuple(out)

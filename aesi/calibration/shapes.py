@@ -1,8 +1,13 @@
-"""Corrections of potentials, linear in their knots: what a full cell's voltage tells of them needs no simulation.
+"""Corrections of potentials that keep them falling, and of an entropy.
 
-The record of a full cell tells the sum of both electrodes' potentials. The positive electrode's correction has knots
-over its whole window; the negative one's are dense where it is all but empty, since there it falls by volts within a
-few per cent of stoichiometry and the positive one's are too far apart to follow.
+A potential falls with stoichiometry: one that rose would give a particle two states at one voltage, and a porous
+electrode none. What is fitted is therefore the logarithm of its slope against that of the start file:
+
+    -dU/dx = s(x) exp(sum_k z_k B_k(x)),      s = max(-dU_start/dx, LEAST_SLOPE)
+
+B_k cardinal cubic splines over the whole range of stoichiometry. The record of a full cell tells the difference of both
+electrodes' potentials, so that one level is free, that of the positive electrode. The voltage's slopes in z follow by
+quadrature from the surface stoichiometries of a run; they need no simulation.
 """
 
 from __future__ import annotations
@@ -18,51 +23,101 @@ from aesi.physics.cell.relations import Constant, LookupTable, Relation, Sum
 
 SPAN_K = 8.0
 """Records have to span this many kelvins before activation energies and entropy move."""
-POSITIVE_KNOTS, NEGATIVE_KNOTS = 23, 13
+POSITIVE_KNOTS, NEGATIVE_KNOTS = 23, 15
 """Of the corrections of both potentials, dense where they are steep."""
 ENTROPY_KNOTS = 5
 """Of the correction of an entropy, which is smoother."""
-TABLE_POINTS = 513
-"""Of the table that a corrected potential becomes."""
-BEYOND = 0.06
-"""Of the stoichiometry window, that the table reaches further: surfaces leave it under load."""
-OCP_SD_V = 0.04
-"""Of a potential at each knot: what half-cell measurements of one material differ by."""
+GRID = 2049
+"""Stoichiometries at which a corrected potential is laid down, from 0 to 1."""
+LEAST_SLOPE = 5e-3
+"""V per unit of stoichiometry: plateaus of graphite fall by some hundredths of a volt, formulas of them by less."""
+LOG_SLOPE_SD = 0.7
+"""Of the logarithm of a slope: half-cell measurements of one material differ by a factor of two in it."""
+LEVEL_SD_V = 0.04
+"""Of the difference of both potentials: what half-cell measurements of one material differ by."""
 ENTROPY_SD_V_K = 1.5e-4
 """Of an entropic coefficient at each knot: its own size."""
+BEYOND = 0.06
+"""Of the stoichiometry window, that an entropy's table reaches further: surfaces leave it under load."""
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class Potential:
+    """A potential whose slope is a file's times a factor, always negative.
+
+    grid : (n,) stoichiometries 0..1.  slope : (n - 1,) V per unit, the file's fall between them.  anchor : index of the
+    grid where the potential is the file's, at volts `level`.  basis : (n - 1, knots) deviations of the log slope.
+    """
+
+    grid: Array
+    slope: Array
+    anchor: int
+    level: float
+    basis: Array
+
+    @classmethod
+    def of(cls, electrode: Electrode, places: Array) -> Potential:
+        """places : (knots,) stoichiometries of the knots, from 0 to 1."""
+        grid = np.linspace(0.0, 1.0, GRID)
+        inner = np.clip(grid, 1e-6, 1.0 - 1e-6)
+        slope = np.maximum(-np.diff(electrode.ocp(inner)) / np.diff(grid), LEAST_SLOPE)
+        anchor = int(np.argmin(np.abs(grid - 0.5 * (electrode.theta_min + electrode.theta_max))))
+        middle = np.clip(0.5 * (grid[1:] + grid[:-1]), places[0], places[-1])
+        basis = LOG_SLOPE_SD * CubicSpline(places, np.eye(len(places)), bc_type="natural")(middle)
+        return cls(grid, slope, anchor, float(electrode.ocp(grid[anchor : anchor + 1])[0]), np.asarray(basis))
+
+    @property
+    def knots(self) -> int:
+        """How many."""
+        return self.basis.shape[1]
+
+    def falls(self, z: Array) -> Array:
+        """(n - 1,) V that the potential falls by from one point of the grid to the next."""
+        return self.slope * np.exp(self.basis @ z) * np.diff(self.grid)
+
+    def at(self, z: Array) -> LookupTable:
+        """The potential of working coordinates z (knots,)."""
+        fallen = np.concatenate([[0.0], np.cumsum(self.falls(z))])
+        volts = self.level - (fallen - fallen[self.anchor])
+        return LookupTable(tuple(map(float, self.grid)), tuple(map(float, volts)))
+
+    def columns(self, z: Array, theta: Array) -> Array:
+        """(n, knots) V per working unit of each knot, at stoichiometries theta (n,)."""
+        fallen = np.cumsum(self.falls(z)[:, None] * self.basis, axis=0)
+        fallen = np.concatenate([np.zeros((1, self.knots)), fallen])
+        volts = -(fallen - fallen[self.anchor])
+        place = np.clip(theta, 0.0, 1.0) * (GRID - 1)
+        k = np.minimum(place.astype(int), GRID - 2)
+        share = (place - k)[:, None]
+        return volts[k] * (1.0 - share) + volts[k + 1] * share
+
+
+@dataclass(frozen=True, eq=False)
+class Entropy:
     """Cardinal cubic splines over the stoichiometries [low, high], constant beyond, times a deviation."""
 
     low: float
     high: float
     spline: CubicSpline
-    sd: float
 
     @classmethod
-    def over(cls, low: float, high: float, places: Array, sd: float) -> Course:
-        """places : (knots,) shares of [low, high], from 0 to 1."""
-        return cls(
-            low, high, CubicSpline(low + (high - low) * places, np.eye(len(places)), bc_type="natural"), sd
-        )
+    def over(cls, electrode: Electrode) -> Entropy:
+        """Of the electrode's window."""
+        low, high = electrode.theta_min, electrode.theta_max
+        places = np.linspace(low, high, ENTROPY_KNOTS)
+        return cls(low, high, CubicSpline(places, np.eye(ENTROPY_KNOTS), bc_type="natural"))
 
-    @property
-    def knots(self) -> int:
-        """How many."""
-        return len(self.spline.x)
-
-    def at(self, theta: Array) -> Array:
-        """(n, knots) the correction per working unit of each knot."""
-        return np.asarray(self.sd * self.spline(np.clip(theta, self.low, self.high)))
+    def columns(self, theta: Array) -> Array:
+        """(n, knots) V/K per working unit of each knot."""
+        return np.asarray(ENTROPY_SD_V_K * self.spline(np.clip(theta, self.low, self.high)))
 
     def added(self, base: Relation, z: Array) -> Relation:
         """`base` with the correction of working coordinates z (knots,)."""
         if not np.any(z):
             return base
-        x = np.linspace(max(self.low - BEYOND, 1e-3), min(self.high + BEYOND, 1.0 - 1e-3), TABLE_POINTS)
-        table = LookupTable(tuple(map(float, x)), tuple(map(float, self.at(x) @ z)))
+        reach = BEYOND * (self.high - self.low)
+        x = np.linspace(max(self.low - reach, 0.0), min(self.high + reach, 1.0), 129)
+        table = LookupTable(tuple(map(float, x)), tuple(map(float, self.columns(x) @ z)))
         return table if base == Constant(0.0) else Sum(base, table)
 
 
@@ -70,47 +125,48 @@ class Course:
 class Shapes:
     """Corrections of both potentials and of the positive electrode's entropic coefficient (None where not fitted)."""
 
-    positive: Course
-    negative: Course
-    entropic: Course | None
+    positive: Potential
+    negative: Potential
+    entropic: Entropy | None
 
     @classmethod
     def over(cls, cell: Cell, span_k: float) -> Shapes:
-        """For the cell's windows, and a little beyond them."""
+        """For the cell's electrodes."""
+        p, n = cell.positive, cell.negative
+        least = max(p.theta_min - 0.08, 0.0)
         places = np.linspace(0.0, 1.0, POSITIVE_KNOTS)
         dense_at_ends = places - 0.7 * np.sin(2.0 * np.pi * places) / (2.0 * np.pi)
         dense_at_empty = np.linspace(0.0, 1.0, NEGATIVE_KNOTS) ** 2
-        positive, negative = _range(cell.positive), _range(cell.negative)
-        few = np.linspace(0.0, 1.0, ENTROPY_KNOTS)
         return cls(
-            Course.over(*positive, dense_at_ends, OCP_SD_V),
-            Course.over(*negative, dense_at_empty, OCP_SD_V),
-            Course.over(*positive, few, ENTROPY_SD_V_K) if span_k > SPAN_K else None,
+            Potential.of(p, least + (1.0 - least) * dense_at_ends),
+            Potential.of(n, dense_at_empty),
+            Entropy.over(p) if span_k > SPAN_K else None,
         )
 
     @property
     def size(self) -> int:
-        """Knots of all."""
-        entropic = 0 if self.entropic is None else self.entropic.knots
-        return self.positive.knots + self.negative.knots + entropic
+        """Working coordinates of all: knots, and the level of the positive potential."""
+        entropic = 0 if self.entropic is None else ENTROPY_KNOTS
+        return self.positive.knots + self.negative.knots + 1 + entropic
 
-    def columns(self, theta_n: Array, theta_p: Array, rise_k: Array) -> Array:
+    def columns(self, z: Array, theta_n: Array, theta_p: Array, rise_k: Array) -> Array:
         """(n, size) V per working unit: what the voltage gains, at surface stoichiometries and above the reference."""
-        parts = [self.positive.at(theta_p), -self.negative.at(theta_n)]
+        of_p, of_n, _, _ = self._split(z)
+        level = np.full((len(theta_p), 1), LEVEL_SD_V)
+        parts = [self.positive.columns(of_p, theta_p), -self.negative.columns(of_n, theta_n), level]
         if self.entropic is not None:
-            parts.append(rise_k[:, None] * self.entropic.at(theta_p))
+            parts.append(rise_k[:, None] * self.entropic.columns(theta_p))
         return np.concatenate(parts, axis=1)
 
     def on(self, cell: Cell, z: Array) -> Cell:
         """The cell with all corrections; z : (size,) working coordinates."""
-        of_p, of_n, of_s = np.split(z, np.cumsum([self.positive.knots, self.negative.knots]))
-        positive = replace(cell.positive, ocp=self.positive.added(cell.positive.ocp, of_p))
+        of_p, of_n, of_level, of_s = self._split(z)
+        shift = replace(self.positive, level=self.positive.level + LEVEL_SD_V * float(of_level[0]))
+        positive = replace(cell.positive, ocp=shift.at(of_p))
         if self.entropic is not None:
             positive = replace(positive, entropic=self.entropic.added(positive.entropic, of_s))
-        negative = replace(cell.negative, ocp=self.negative.added(cell.negative.ocp, of_n))
-        return replace(cell, positive=positive, negative=negative)
+        return replace(cell, positive=positive, negative=replace(cell.negative, ocp=self.negative.at(of_n)))
 
-
-def _range(electrode: Electrode) -> tuple[float, float]:
-    margin = 0.02 * (electrode.theta_max - electrode.theta_min)
-    return max(electrode.theta_min - margin, 1e-3), min(electrode.theta_max + margin, 1.0 - 1e-3)
+    def _split(self, z: Array) -> list[Array]:
+        ends = np.cumsum([self.positive.knots, self.negative.knots, 1])
+        return np.split(z, ends)

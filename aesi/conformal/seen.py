@@ -1,10 +1,10 @@
 """States of charge and temperatures that a model was fitted to; a band widens away from them.
 
-    g(x) = sqrt(1 - exp(-(d(x) / LENGTH)**2)),     d the distance in the state of charge to the nearest fitted row   (1)
+    g(x) = sqrt(1 - rho(d(x))**2),     d the distance in the state of charge to the nearest fitted row       (1)
     k_T  = exp(E / R |1 / T - 1 / T_near|),     T_near the nearest temperature of the fitted rows           (2)
 
-(1) is the posterior over the prior standard deviation of a Gaussian process with a squared-exponential covariance of
-correlation length LENGTH, at a distance d from its nearest observation. It is a term of the scale
+(1) is the posterior over the prior standard deviation of a Gaussian process with the correlation rho
+(`aesi.numerics.visited`), at a distance d from its nearest observation. It is a term of the scale
 (local_scale.py); left-out pieces give it its weight. Pieces of one temperature cannot calibrate another, so (2) assumes
 that the error grows as the overpotentials do, by an Arrhenius factor with an activation energy E between those of
 kinetics and diffusion. A record without a measured temperature counts as fitted.
@@ -23,10 +23,8 @@ import numpy as np
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array, SavedState
-from aesi.numerics.visited import distance_to_visited, visited
+from aesi.numerics.visited import correlation, distance_to_visited, visited
 
-LENGTH = 0.12
-"""Share of the charge, the correlation length of the effect ocp_shape. A convention."""
 ENERGY_J_MOL = 40e3
 """The mean of 53 and 44 (Ecker et al. 2015), 35 and 18 (Chen et al. 2020), 55 and 35 kJ/mol (About:Energy 2022)."""
 
@@ -51,8 +49,7 @@ class Seen:
 
     def gap(self, soc: Array) -> Array:
         """(n,) of (1), 0 to 1."""
-        distance = distance_to_visited(soc, self.charge)
-        return np.asarray(np.sqrt(-np.expm1(-((distance / LENGTH) ** 2))))
+        return np.asarray(np.sqrt(1.0 - correlation(distance_to_visited(soc, self.charge)) ** 2))
 
     def growth(self, temperature_degc: Array | None) -> Array | float:
         """(n,) k_T of (2), >= 1."""

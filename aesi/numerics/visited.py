@@ -1,4 +1,4 @@
-"""Where on an axis rows lie, thinned to what matters, and how far from there another place is."""
+"""Where on the axis of the charge rows lie, thinned to what matters, and how far from there another place is."""
 
 from __future__ import annotations
 
@@ -8,6 +8,11 @@ from aesi.numerics.typing import Array
 
 RESOLUTION = 0.005
 """Of a state of charge: no model of an error tells places apart that are closer."""
+LENGTH = 0.12
+"""Share of the charge over which a cell model's error changes: that of the potentials in the effect ocp_shape. Over
+the development splits of the NMC drive in `aesi bench splits` (16 candidates) a correction that fades so takes 65.4 %
+off the declared model's squared error, 37.7 % at worst, with 0.06; 65.5 and 31.5 % with 0.12; 65.1 and 25.8 % with
+0.16; 64.2 and 16.7 % with 0.24."""
 
 
 def visited(places: Array) -> Array:
@@ -23,3 +28,8 @@ def distance_to_visited(places: Array, known: Array) -> Array:
     place = np.clip(np.searchsorted(known, places), 1, max(last, 1))
     below, above = np.abs(places - known[place - 1]), np.abs(places - known[np.minimum(place, last)])
     return np.asarray(np.maximum(np.minimum(below, above) - RESOLUTION / 2, 0.0))
+
+
+def correlation(distance: Array) -> Array:
+    """(n,) exp(-(d / LENGTH)**2 / 2), of a model's errors at states of charge a distance apart."""
+    return np.asarray(np.exp(-0.5 * (distance / LENGTH) ** 2))

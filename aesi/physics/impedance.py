@@ -3,7 +3,8 @@
     V(w) = -Z(w) I(w)     about a cell at rest, I > 0 on discharge
 
 A particle of stoichiometry x answers to a current y with its surface, through the modes of solid diffusion; the salt
-answers with the modes of the electrolyte; kinetics are a resistance R T/(F j0), with a double layer where one is in:
+answers with the modes of the electrolyte; kinetics are a resistance R T/(F j0) with that of the film after it, and a
+double layer beside both where one is in:
 
     x_u = -(lump/(jw) + sum gains/(jw + rates)) y_u,      phi_u = U' x_u + R_u y_u,      i_r = sum_u y_u + jw C phi_r
 
@@ -127,14 +128,11 @@ class _Linear:
             cell.electrolyte.conductivity_ea_j_mol, self.kelvin, cell.reference_temperature_k
         )
         gap = cell.separator.thickness_m / cell.separator.transport_efficiency / (self._kappa() * warmer)
-        film = cell.film_resistance_ohm / rate_factor(
-            cell.film_ea_j_mol, self.kelvin, cell.reference_temperature_k
-        )
-        contact = cell.contact_resistance_ohm + film
-        return cast(ComplexArray, solved[:, n] - solved[:, n + 1] + gap / cell.total_area_m2 + contact)
+        series = gap / cell.total_area_m2 + cell.contact_resistance_ohm
+        return cast(ComplexArray, solved[:, n] - solved[:, n + 1] + series)
 
     def _local(self, units: Units, s: ComplexArray) -> ComplexArray:
-        """(frequencies, units) ohm m2: kinetics, and open-circuit slope times what the surface loses."""
+        """(frequencies, units) ohm m2: kinetics, film, and open-circuit slope times what the surface loses."""
         cell = self.model.cell
         slopes = _slopes(cell, self.rest, self.kelvin)
         out = np.zeros((len(s), len(units.place)), dtype=complex)
@@ -149,11 +147,13 @@ class _Linear:
                 float(electrode.diffusivity(np.array([at]))[0]) / solid_diffusion(electrode.diffusivity).d0
             )
             factor = float(electrode.rate_factor(np.array([at]))[0])
+            film = float(electrode.film_ohm_m2(np.array([at]))[0])
+            film /= rate_factor(electrode.film_ea_j_mol, self.kelvin, cell.reference_temperature_k)
             for u in here:
                 answer = units.lump[u] / s
                 answer = answer + (units.gains[u] / (s[:, None] + faster * units.rates[u])).sum(axis=1)
                 resistance = thermal / (units.exchange[u] * kinetic * factor * np.sqrt(at * (1.0 - at)))
-                out[:, u] = resistance - slope * answer
+                out[:, u] = resistance + film / units.reactive[u] - slope * answer
         return out
 
     def _salt(self, s: ComplexArray) -> ComplexArray:

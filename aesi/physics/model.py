@@ -12,7 +12,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
-from aesi.physics.cell.parts import UNITY
+from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.cell.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
@@ -106,19 +106,19 @@ class EspmModel:
             and self.heat is None
             and all(isinstance(d, Constant) for d in solids)
             and all(
-                x.rate_factor == UNITY and x.double_layer_f_m2 == 0.0
+                x.rate_factor == UNITY and x.double_layer_f_m2 == 0.0 and x.film_ohm_m2 == NO_FILM
                 for x in (self.cell.negative, self.cell.positive)
             )
         )
 
 
 def activation_energies(cell: Cell) -> Array:
-    """(7,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, films."""
+    """(8,) J/mol: diffusion (n, p), kinetics (n, p), electrolyte diffusion and conductivity, films (n, p)."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     return np.array(
         [
             n.diffusivity_ea_j_mol, p.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.rate_ea_j_mol,
-            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, cell.film_ea_j_mol,
+            e.diffusivity_ea_j_mol, e.conductivity_ea_j_mol, n.film_ea_j_mol, p.film_ea_j_mol,
         ]
     )  # fmt: skip
 

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from aesi.physics import Cell
-from aesi.physics.cell.parts import UNITY
+from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
@@ -77,7 +77,7 @@ def _beyond_bpx(cell: Cell) -> list[str]:
     """What a calibrated cell holds in its section User-defined that neither target takes over."""
     both = (cell.negative, cell.positive)
     own = {
-        "resistance of films": bool(cell.film_resistance_ohm),
+        "resistance of films": any(x.film_ohm_m2 != NO_FILM for x in both),
         "rates over stoichiometry": any(x.rate_factor != UNITY for x in both),
         "double layers": any(x.double_layer_f_m2 for x in both),
     }

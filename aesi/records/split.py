@@ -13,13 +13,19 @@ ROLES: tuple[Role, ...] = ("train", "valid", "test")
 
 @dataclass(frozen=True, eq=False)
 class HeldOutDrive:
-    """A training record under physics that was fitted without some of its samples.
+    """The training records under physics that was fitted without some samples of one of them.
 
-    rows : these samples.
+    place : of that one.  rows : these samples.
     """
 
-    series: ErrorSeries
+    train: tuple[ErrorSeries, ...]
+    place: int
     rows: slice
+
+    @property
+    def series(self) -> ErrorSeries:
+        """The record that the samples are of."""
+        return self.train[self.place]
 
 
 @dataclass(frozen=True)

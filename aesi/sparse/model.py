@@ -31,7 +31,7 @@ from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library, Term, evaluate_terms
 from aesi.sparse.terms.scaling import Scaling
 
-SCHEMA = "aesi.sparse_model/4"
+SCHEMA = "aesi.sparse_model/5"
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
     [
         ("hg2", "lg_18650hg2", "lg_18650hg2"),
         ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
+        ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
     ],
 )
 def test_the_command_gives_the_file_again(name, file, data, tmp_path):

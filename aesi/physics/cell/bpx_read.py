@@ -12,10 +12,11 @@ from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,
     DOUBLE_LAYERS,
-    FILM_ENERGY,
-    FILM_RESISTANCE,
+    FILM_ENERGIES,
+    FILM_RESISTANCES,
     FITTED_WITH,
     HEAT_TRANSFER,
+    NO_FILM,
     RATE_FACTORS,
     UNITY,
     CellParameters,
@@ -68,8 +69,6 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         surface_area_m2=_optional(fields, "External surface area [m2]"),
         heat_transfer_w_m2_k=_optional(thermal, HEAT_TRANSFER),
         contact_resistance_ohm=float(user.get(CONTACT_RESISTANCE, 0.0)),
-        film_resistance_ohm=float(user.get(FILM_RESISTANCE, 0.0)),
-        film_ea_j_mol=float(user.get(FILM_ENERGY, 0.0)),
         capacity_shares=tuple((str(k), float(v)) for k, v in (user.get(CAPACITY_SHARES) or {}).items()),
         fitted_with=next((model for model, field in FITTED_WITH.items() if user.get(field)), ""),
         name=str(header.get("Title") or "cell"),
@@ -87,7 +86,7 @@ def _optional(fields: Fields, name: str) -> float | None:
 
 def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode:
     what = f"{where}: {side} electrode"
-    factor = user.get(RATE_FACTORS[side])
+    factor, film = user.get(RATE_FACTORS[side]), user.get(FILM_RESISTANCES[side])
 
     def optional_relation(name: str) -> Relation | None:
         return None if fields.get(name) is None else relation(fields[name], f"{what}, {name}")
@@ -107,6 +106,8 @@ def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode
         rate_constant=float(fields["Reaction rate constant [mol.m-2.s-1]"]),
         entropic=optional_relation("Entropic change coefficient [V.K-1]") or Constant(0.0),
         double_layer_f_m2=float(user.get(DOUBLE_LAYERS[side], 0.0)),
+        film_ohm_m2=NO_FILM if film is None else relation(film, f"{where}: {FILM_RESISTANCES[side]}"),
+        film_ea_j_mol=float(user.get(FILM_ENERGIES[side], 0.0)),
         rate_factor=UNITY if factor is None else relation(factor, f"{where}: {RATE_FACTORS[side]}"),
         diffusivity_ea_j_mol=float(fields.get("Diffusivity activation energy [J.mol-1]") or 0.0),
         rate_ea_j_mol=float(fields.get("Reaction rate constant activation energy [J.mol-1]") or 0.0),

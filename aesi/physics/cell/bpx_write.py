@@ -8,10 +8,11 @@ from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,
     DOUBLE_LAYERS,
-    FILM_ENERGY,
-    FILM_RESISTANCE,
+    FILM_ENERGIES,
+    FILM_RESISTANCES,
     FITTED_WITH,
     HEAT_TRANSFER,
+    NO_FILM,
     RATE_FACTORS,
     UNITY,
     CellParameters,
@@ -66,16 +67,16 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
     }
     own: dict[str, Any] = {
         CONTACT_RESISTANCE: cell.contact_resistance_ohm,
-        FILM_RESISTANCE: cell.film_resistance_ohm,
         **{field: float(model == cell.fitted_with) for model, field in FITTED_WITH.items()},
         CAPACITY_SHARES: dict(cell.capacity_shares),
     }
-    if cell.film_resistance_ohm:
-        own[FILM_ENERGY] = cell.film_ea_j_mol
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
         if electrode.rate_factor != UNITY:
             own[RATE_FACTORS[side]] = to_bpx(electrode.rate_factor)
         own[DOUBLE_LAYERS[side]] = electrode.double_layer_f_m2
+        if electrode.film_ohm_m2 != NO_FILM:
+            own[FILM_RESISTANCES[side]] = to_bpx(electrode.film_ohm_m2)
+            own[FILM_ENERGIES[side]] = electrode.film_ea_j_mol
     if any(own.values()):
         parts["User-defined"] = {name: value for name, value in own.items() if value}
     surroundings = {"Ambient temperature [K]": cell.ambient_temperature_k}

@@ -16,6 +16,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell.relations import Constant, Relation
 
 NO_ENTROPY = Constant(0.0)
+NO_FILM = Constant(0.0)
 UNITY = Constant(1.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
@@ -23,8 +24,10 @@ HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FITTED_WITH = {model: f"Fitted with {model}" for model in ("espm", "dfn")}
 """Fields of `fitted_with`, one of them 1: the standard takes numbers there, and reads words as formulas."""
 CAPACITY_SHARES = "Capacity share by record"
-FILM_RESISTANCE = "Film resistance [Ohm]"
-FILM_ENERGY = "Film resistance activation energy [J.mol-1]"
+FILM_RESISTANCES = {side: f"{side} electrode film resistance [Ohm.m2]" for side in ("Negative", "Positive")}
+FILM_ENERGIES = {
+    side: f"{side} electrode film resistance activation energy [J.mol-1]" for side in ("Negative", "Positive")
+}
 RATE_FACTORS = {side: f"{side} electrode reaction rate factor" for side in ("Negative", "Positive")}
 """The fields of `Electrode.rate_factor` in the user-defined section."""
 DOUBLE_LAYERS = {side: f"{side} electrode double-layer capacity [F.m-2]" for side in ("Negative", "Positive")}
@@ -37,7 +40,9 @@ class Electrode:
     Lengths in m, concentrations in mol/m3, diffusivity in m2/s at stoichiometry x, open-circuit potential in
     V against Li/Li+, entropic coefficient in V/K, effective solid conductivity in S/m, rate constant in
     mol/(m2 s) so that the exchange current density is F K f(x) sqrt(c_e/c_e0 x (1 - x)) with f the rate factor at
-    stoichiometry x, activation energies in J/mol, capacity of the double layer in F per m2 of reactive surface.
+    stoichiometry x, activation energies in J/mol, capacity of the double layer in F per m2 of reactive surface,
+    resistance of the film between the reaction and the electrolyte in ohm m2 of reactive surface at stoichiometry x
+    and the reference temperature.
     """
 
     thickness_m: float
@@ -55,8 +60,10 @@ class Electrode:
     entropic: Relation = NO_ENTROPY
     rate_factor: Relation = UNITY
     double_layer_f_m2: float = 0.0
+    film_ohm_m2: Relation = NO_FILM
     diffusivity_ea_j_mol: float = 0.0
     rate_ea_j_mol: float = 0.0
+    film_ea_j_mol: float = 0.0
     ocp_lithiation: Relation | None = None
     ocp_delithiation: Relation | None = None
     hysteresis_decay: float | None = None
@@ -93,9 +100,8 @@ class CellParameters:
     """Everything a simulation needs to know about a cell; `aesi.Cell` adds how it is read and written.
 
     Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no thermal data),
-    contact resistance in ohm in series with the whole cell; it is that of metal, the same at any temperature. That of
-    films on the particles, ohm at the reference temperature, falls as
-    exp(E/R (1/T - 1/T_ref)) with its activation energy in J/mol.  fitted_with : the model whose parameters these are,
+    contact resistance in ohm in series with the whole cell; it is that of metal, the same at any temperature.
+    fitted_with : the model whose parameters these are,
     "espm" or "dfn", where they were fitted.  capacity_shares : (record, share of this capacity that the cell had then)
     of the records that they were fitted to.
     """
@@ -118,8 +124,6 @@ class CellParameters:
     surface_area_m2: float | None = None
     heat_transfer_w_m2_k: float | None = None
     contact_resistance_ohm: float = 0.0
-    film_resistance_ohm: float = 0.0
-    film_ea_j_mol: float = 0.0
     fitted_with: str = ""
     capacity_shares: tuple[tuple[str, float], ...] = ()
     name: str = "cell"

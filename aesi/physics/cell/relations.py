@@ -6,7 +6,7 @@ Relations are frozen and hashable by value, so that whatever is computed from th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -61,7 +61,12 @@ class LookupTable:
 
     def __call__(self, x: Array) -> Array:
         """(n,) interpolated."""
-        return np.interp(np.asarray(x, dtype=float), self.x, self.y)
+        return np.interp(np.asarray(x, dtype=float), *self._points)
+
+    @cached_property
+    def _points(self) -> tuple[Array, Array]:
+        """As arrays: balances look a potential up hundreds of times."""
+        return np.array(self.x), np.array(self.y)
 
 
 @dataclass(frozen=True)

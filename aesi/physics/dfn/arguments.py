@@ -14,6 +14,7 @@ from aesi.physics.dfn.layout import Electrodes, Particles, Stack
 from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
+    film_tables,
     ocp_table,
     rate_tables,
     solid_diffusion,
@@ -31,7 +32,7 @@ def _particles(model: EspmModel) -> Particles:
     """Units place by place, size by size."""
     sphere, layer = sphere_modes(model.solid_order), gauss_layer(model.electrode_points)
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
-    place, kind, scale, share, volume, exchange = [], [], [], [], [], []
+    place, kind, scale, share, volume, exchange, reactive = [], [], [], [], [], [], []
     sides: list[int] = []
     rates: list[Array] = []
     parts = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))
@@ -52,6 +53,7 @@ def _particles(model: EspmModel) -> Particles:
                 share.append(part)
                 volume.append(part * ratio / of_volume)
                 exchange.append(area * FARADAY_C_MOL * electrode.rate_constant)
+                reactive.append(area)
     longest = max(len(x.psi) for x in solids)
     return Particles(
         place=np.array(place, dtype=np.int64),
@@ -61,6 +63,7 @@ def _particles(model: EspmModel) -> Particles:
         share=np.array(share),
         volume=np.array(volume),
         exchange=np.array(exchange),
+        reactive=np.array(reactive),
         rates=np.array(rates),
         gains=np.array(sphere.gain[1:]),
         psi=np.array([x.psi if len(x.psi) == longest else np.zeros(longest) for x in solids]),
@@ -135,6 +138,7 @@ def _electrodes(model: EspmModel) -> Electrodes:
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
         rate=rate_tables(cell),
+        film=film_tables(cell),
         alpha=np.array([x.transfer_coefficient for _, x in sides]),
         has_layers=any(x.double_layer_f_m2 + y.double_layer_f_m2 > 0.0 for x, y in sides),
         capacity=np.concatenate(capacity),
@@ -148,7 +152,6 @@ def _electrodes(model: EspmModel) -> Electrodes:
         heat=heat_numbers(model),
         area=cell.total_area_m2,
         contact=cell.contact_resistance_ohm,
-        film=cell.film_resistance_ohm,
         transference=e.transference,
         reference_k=cell.reference_temperature_k,
     )

@@ -83,10 +83,10 @@ def local_currents(p, e, t, n, spread, thermal, rise, y, theta, psi, given, salt
     for u in range(y.shape[0]):
         r = p.place[u]
         side = 0 if r < half else 1
-        exchange = t.rates[2 + side] * p.exchange[u]
+        exchange, film = t.rates[2 + side] * p.exchange[u], 1.0 / (t.rates[6 + side] * p.reactive[u])
         y[u], n.slope[u], n.by_salt[u] = local_current(
-            e, side, exchange, t.reach[u], t.give[u], max(salt[r], SMALLEST_SALT), thermal, rise, psi[r], y[u]
-        )
+            e, side, exchange, film, t.reach[u], t.give[u], max(salt[r], SMALLEST_SALT), thermal, rise, psi[r], y[u]
+        )  # fmt: skip
         if salt[r] <= SMALLEST_SALT:
             n.by_salt[u] = 0.0
         n.pot[u] = psi[r]
@@ -96,13 +96,13 @@ def local_currents(p, e, t, n, spread, thermal, rise, y, theta, psi, given, salt
 
 
 @compiled
-def local_current(e, side, exchange, reach, give, s, thermal, rise, psi, y):  # type: ignore[no-untyped-def]
+def local_current(e, side, exchange, film, reach, give, s, thermal, rise, psi, y):  # type: ignore[no-untyped-def]
     """Current of a unit whose potential is psi, its slope and by_salt: Newton's steps in the logarithm of the current
     where kinetics hold it, in the current where filling does, between bounds that close in."""
     low, high, slope, by_salt = -math.inf, math.inf, 1.0, 0.0
     for _ in range(LOCAL_STEPS):
         pot, slope, by_salt, d_eta, scale = unit_potential(
-            e, side, exchange, reach - give * y, give, y, s, thermal, rise
+            e, side, exchange, film, reach - give * y, give, y, s, thermal, rise
         )
         off = psi - pot
         if abs(off) < LOCAL_TOLERANCE_V:

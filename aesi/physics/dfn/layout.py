@@ -18,7 +18,8 @@ class Particles(NamedTuple):
 
     place, kind : (units,) where, and which row of `rates`.  side : (kinds,) electrode.  scale : (units,)
     stoichiometry/(A/m2 s) per unit gain.  share, volume : (units,) of its electrode's reaction and material.
-    exchange : (units,) A/m2 at unit salt and occupancy.  rates : (kinds, modes) 1/s.  gains : (modes,).
+    exchange : (units,) A/m2 at unit salt and occupancy.
+    reactive : (units,) surface per area of cell.  rates : (kinds, modes) 1/s.  gains : (modes,).
     psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
     """
 
@@ -29,6 +30,7 @@ class Particles(NamedTuple):
     share: Array
     volume: Array
     exchange: Array
+    reactive: Array
     rates: Array
     gains: Array
     psi: Array
@@ -64,9 +66,9 @@ class Electrodes(NamedTuple):
     """Constants of both electrodes and of the cell.
 
     before, after : see `collocation.GaussLayer`.  solid : (2, points, points) ohm m2.
-    ocp, entropic, rate : (2, table).  alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.
+    ocp, entropic, rate, film : (2, table).  alpha : (2,).  capacity, exchange : (places,) F/m2 and A/m2 of cell.
     node_share : (places,) weights.  plating : rate A/m2 of cell at c0, transfer coefficient, c0.
-    plating_to_c : mol/m3 per C/m2.  energies : (7,) J/mol.  heat : (3,).  area : m2.  contact, film : ohm.
+    plating_to_c : mol/m3 per C/m2.  energies : (8,) J/mol.  heat : (3,).  area : m2.  contact : ohm.
     transference : cation transference number.
     """
 
@@ -76,6 +78,7 @@ class Electrodes(NamedTuple):
     ocp: Array
     entropic: Array
     rate: Array
+    film: Array
     alpha: Array
     has_layers: bool
     capacity: Array
@@ -87,7 +90,6 @@ class Electrodes(NamedTuple):
     heat: Array
     area: float
     contact: float
-    film: float
     transference: float
     reference_k: float
 
@@ -128,7 +130,7 @@ class DfnTrial(NamedTuple):
     y_back, psi_start : (units,), (places,) as they were before the step.
     total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
     between.  faster : (3,) factors of diffusion, negative, positive, salt.
-    no_spread : zeros, for an instant.  rates : (7,) Arrhenius factors, by `Electrodes.energies`.
+    no_spread : zeros, for an instant.  rates : (8,) Arrhenius factors, by `Electrodes.energies`.
     """
 
     calm_z: Array

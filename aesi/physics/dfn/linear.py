@@ -5,7 +5,8 @@ At place r, with s = jw, the local admittance of its particles and double layer 
     psi_r = Y_r / (sum_u 1/(R_u - U' A_u(s)) + s C_r),      A_u = scale_u (3/s + sum gains/(s + rates))
     psi_r + sum_v (ohm[r, v] + chi spread[r, v](s)) Y_v = Phi of its electrode,      sum of Y = +- I
 
-Surfaces fall by A_u y_u, R_u = R T / (F j0) is kinetics; salt and drops are as in `reaction_kernels`.
+Surfaces fall by A_u y_u, R_u is R T / (F j0) of the kinetics and the film's resistance; salt and drops are as in
+`reaction_kernels`.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def porous_impedance(
         right[:, places + side] = sign / model.cell.total_area_m2
     solved = np.linalg.solve(matrix, right)[:, :, 0]
     gap = float(stack.gap_path.sum()) / kappa / model.cell.total_area_m2
-    series = gap + electrodes.contact + electrodes.film / rates[6]
+    series = gap + electrodes.contact
     return cast(ComplexArray, solved[:, places] - solved[:, places + 1] + series)
 
 
@@ -88,7 +89,9 @@ def _local(
         surface = p.scale[u] * (3.0 / s + modes)
         occupancy = float(np.sqrt(rest[side] * (1.0 - rest[side])))
         factor = float(electrodes[side].rate_factor(rest[side : side + 1])[0])
+        film = float(electrodes[side].film_ohm_m2(rest[side : side + 1])[0])
         resistance = thermal / (p.exchange[u] * rates[2 + side] * factor * occupancy)
+        resistance += film / (rates[6 + side] * p.reactive[u])
         admittance[:, place] += 1.0 / (resistance - slopes_v[side] * surface)
     return cast(ComplexArray, 1.0 / admittance)
 

@@ -67,6 +67,16 @@ def rate_course(rate, side, theta):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def film_course(film, side, theta):  # type: ignore[no-untyped-def]
+    """Ohm m2 of the film at a surface stoichiometry, and its slope."""
+    last = film.shape[1] - 1
+    s = min(max(theta, 0.0), 1.0) * last
+    i = min(int(s), last - 1)
+    step = film[side, i + 1] - film[side, i]
+    return film[side, i] + (s - i) * step, step * last
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def salt_logarithm(s):  # type: ignore[no-untyped-def]
     """Logarithm of the salt over its rest concentration and its slope; a straight line near zero."""
     if s < SMALLEST_SALT:
@@ -75,14 +85,19 @@ def salt_logarithm(s):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def unit_potential(e, side, exchange, surface, give, y, s, thermal, rise):  # type: ignore[no-untyped-def]
+def unit_potential(e, side, exchange, film, surface, give, y, s, thermal, rise):  # type: ignore[no-untyped-def]
     """Potential of a unit at a current y, its slope in y and in the salt s, the kinetic part of the slope, and the
-    exchange current as it is there."""
+    exchange current as it is there.  film : factor on the film's ohm m2, of temperature over reactive surface."""
     room, d_room = occupancy(surface)
     quicker, d_quicker = rate_course(e.rate, side, surface)
     scale = exchange * quicker * math.sqrt(s * room)
     eta, d_eta = kinetic_drop(y, scale, e.alpha[side], thermal)
     level, falls = equilibrium(e.ocp, e.entropic, side, rise, surface)
+    ohm, d_ohm = film_course(e.film, side, surface)
     moved = -0.5 * y * d_eta  # with the logarithm of the salt, or of the occupancy, in the exchange current
-    slope = max(d_eta - give * (falls + moved * (d_room + 2.0 * d_quicker)), SMALLEST_SLOPE * d_eta)
-    return level + eta, slope, moved / s, d_eta, scale
+    resistance = film * ohm
+    slope = d_eta + resistance
+    slope = max(
+        slope - give * (falls + moved * (d_room + 2.0 * d_quicker) + film * d_ohm * y), SMALLEST_SLOPE * slope
+    )
+    return level + eta + resistance * y, slope, moved / s, d_eta, scale

@@ -2,7 +2,7 @@
 
 Places are the Gauss points, those of the negative electrode first, each counted from its collector. At place r
 
-    psi_r = U(theta_u) + eta(y_u, theta_u, s_r)           for each unit u there (a particle of one size),
+    psi_r = U(theta_u) + eta(y_u, theta_u, s_r) + R(theta_u) y_u    for each unit u there (a particle of one size),
     psi_r + chi ln s_r + sum_v ohm[r, v] Y_v = Phi        with the collector's potential Phi of its electrode,
     Y_r = sum_u y_u + double layer + plating,             sum over an electrode Y_v = its current,
 
@@ -94,6 +94,7 @@ def evaluate_units(p, e, t, n, spread, thermal, rise, first, y, theta, psi, give
             e,
             side,
             t.rates[2 + side] * p.exchange[u],
+            1.0 / (t.rates[6 + side] * p.reactive[u]),
             surface,
             t.give[u],
             y[u],

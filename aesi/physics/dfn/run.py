@@ -10,7 +10,7 @@ from aesi.numerics.modes.galerkin import gauss_lobatto
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
-from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS
+from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS, Drive
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
 
@@ -43,11 +43,12 @@ def run_porous_electrode(
     kept = 0 if profiles is None else len(time)
     profile = np.zeros((kept, 4, len(electrodes.node_share)))
     salt_profile = np.zeros((kept, len(stack.to_nodes)))
+    substep_s = LONGER_STEPS * model.substep_s
+    drive = Drive(time, current, kelvin, given, hold == "backward", substep_s, model.most_substeps)
+    theta0 = np.array(model.cell.stoichiometries(soc0))
     fault_at, fault = run_porous(
-        time, current, kelvin, given, hold == "backward", LONGER_STEPS * model.substep_s, model.most_substeps,
-        np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, newton, weights,
-        out, profile, salt_profile,
-    )  # fmt: skip
+        drive, theta0, particles, stack, electrodes, state, trial, newton, weights, out, profile, salt_profile
+    )
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]
@@ -116,7 +117,7 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
         force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
         salt_before=np.ones(places), q=of(salt_modes), c=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
         kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),
-        no_spread=of(places, places), z_end=of(modes), rates=np.ones(7),
+        no_spread=of(places, places), z_end=of(modes), rates=np.ones(8),
         total=of(2), before=of(2), change=of(2), faster=np.ones(3),
     )  # fmt: skip
     newton = NewtonScratch(

@@ -3,11 +3,12 @@
 Each electrode holds units: a particle of one size in one region. All units of an electrode see one potential Phi
 between its collector and the electrolyte at the separator's edge:
 
-    Phi = U(theta_u) + eta(y_u) + (L/sigma S + L/kappa E) y + chi ln(c_r / c_mean),   sum y + capacitive + plating = J
+    Phi = U(theta_u) + eta(y_u) + R(theta_u) y_u + (L/sigma S + L/kappa E) y + chi ln(c_r / c_mean)
+    sum y + capacitive + plating = J
 
-with y_u the current of unit u per cell area, positive for delithiation, J = I/A in the negative electrode and -I/A
-in the positive. Newton's method on all y and Phi, of one unit on its y alone: without a double layer it is there at
-once.
+with y_u the current of unit u per cell area, positive for delithiation, R the film's resistance over the unit's
+surface, J = I/A in the negative electrode and -I/A in the positive. Newton's method on all y and Phi, of one unit on
+its y alone: without a double layer it is there at once.
 """
 
 import math
@@ -224,12 +225,13 @@ def surface_potential(u, side, total, at, particles, surfaces, memory):  # type:
         y[u], particles.exchange[u] * at.quicker * lookup(surfaces.rate[side], t), occupancy,
         salt[k], salt[k + 1], salt[k + 2], memory.log_salt[region], surfaces.alpha[side], at.thermal,
     )  # fmt: skip
+    resistance = lookup(surfaces.film[side], t) * at.film / particles.reactive[u]
     inside = min(max(t, 0.0), 1.0)
     last = ocp.shape[0] - 1
     cell = min(int(inside * last), last - 1)
     falls = (ocp[cell + 1] - ocp[cell]) * last if t == inside else -BEYOND_RANGE_V
     u_eq = open_circuit(ocp, t) + at.rise * lookup(surfaces.entropic[side], inside)
-    return u_eq + eta, max(d_eta - give[u] * falls, SMALLEST_SLOPE)
+    return u_eq + eta + resistance * y[u], max(d_eta + resistance - give[u] * falls, SMALLEST_SLOPE)
 
 
 @njit(inline="always", fastmath=FASTMATH)

@@ -29,6 +29,7 @@ from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
+    film_tables,
     ocp_table,
     rate_tables,
     solid_diffusion,
@@ -87,7 +88,6 @@ def general_arguments(model: EspmModel) -> tuple[Units, Salt, Surfaces, Whole]:
         area=cell.total_area_m2,
         separator=cell.separator.thickness_m / cell.separator.transport_efficiency,
         contact=cell.contact_resistance_ohm,
-        film=cell.film_resistance_ohm,
         reference_k=cell.reference_temperature_k,
     )
     return particle_units(model), _salt(model), _surfaces(model), whole
@@ -117,6 +117,7 @@ def particle_units(model: EspmModel) -> Units:
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
+    reactive = []
     sides = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))
     for side, (electrode, interface) in enumerate(sides):
         for region in range(model.regions):
@@ -132,6 +133,7 @@ def particle_units(model: EspmModel) -> Units:
                 share.append(part)
                 volume.append(part * radius_ratio)
                 exchange.append(area * FARADAY_C_MOL * electrode.rate_constant)
+                reactive.append(area)
     sums = [sum(v for v, unit in zip(volume, units, strict=True) if unit[0] == side) for side in range(2)]
     fractions = [v / sums[unit[0]] for v, unit in zip(volume, units, strict=True)]
     return Units(
@@ -142,6 +144,7 @@ def particle_units(model: EspmModel) -> Units:
         share=np.array(share),
         volume=np.array(fractions),
         exchange=np.array(exchange),
+        reactive=np.array(reactive),
         psi=_padded([x.psi for x in solids]),
         strength=np.array([0.0 if x.linear else 1.0 / x.d0 for x in solids]),
         at=sphere.at,
@@ -164,6 +167,7 @@ def _surfaces(model: EspmModel) -> Surfaces:
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
         entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
         rate=rate_tables(model.cell),
+        film=film_tables(model.cell),
         alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),
         capacity=np.array([interface_capacity(model, side) for side in range(2)]),
         plating=np.array([area_n * FARADAY_C_MOL * plating.rate_m_s, plating.transfer_coefficient]),

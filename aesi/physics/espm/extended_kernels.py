@@ -93,7 +93,7 @@ def run_general(  # type: ignore[no-untyped-def]
                     gone = surfaces.plating_to_c * memory.plating[r] * dt
                     memory.plated[r] = max(memory.plated[r] - gone, 0.0)
             voltage = phi_p - phi_n - j1 * cell.separator / memory.kappa[memory.kappa.shape[0] - 1]
-            voltage -= i1 * (cell.contact + cell.film / arrhenius(cell.energies[6], t_k, cell.reference_k))
+            voltage -= i1 * cell.contact
             if heat[0] > 0.0:
                 power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
                 if k > 0 and not drive.given:
@@ -210,7 +210,8 @@ def end_of_step(side, dt, held, t_k, supply, cell):  # type: ignore[no-untyped-d
     """The `StepEnd` of an electrode at temperature t_k.  supply : 1 - t+."""
     thermal = GAS_OVER_FARADAY * t_k
     quicker = arrhenius(cell.energies[2 + side], t_k, cell.reference_k)
-    return StepEnd(dt, held, thermal, t_k - cell.reference_k, 2.0 * supply * thermal, quicker)
+    film = 1.0 / arrhenius(cell.energies[6 + side], t_k, cell.reference_k)
+    return StepEnd(dt, held, thermal, t_k - cell.reference_k, 2.0 * supply * thermal, quicker, film)
 
 
 @compiled

@@ -121,7 +121,7 @@ class Units(NamedTuple):
 
     place : (units, 2) electrode and region.  rates, gains : (units, modes) 1/s and stoichiometry/(A/m2 s).
     lump : (units,) of the means.  share, volume : (units,) of the electrode's reaction and material.
-    exchange : (units,) A/m2 of cell at unit salt and occupancy.
+    exchange : (units,) A/m2 of cell at unit salt and occupancy.  reactive : (units,) surface per area of cell.
     psi, strength, at, project : of the variable part of diffusion, see `tables.DiffusionTable` and `SphereModes`.
     """
 
@@ -132,6 +132,7 @@ class Units(NamedTuple):
     share: Array
     volume: Array
     exchange: Array
+    reactive: Array
     psi: Array
     strength: Array
     at: Array
@@ -164,8 +165,9 @@ class Salt(NamedTuple):
 class Surfaces(NamedTuple):
     """Constants of both electrodes' surfaces.
 
-    ocp, entropic, rate : (2, table) V, V/K and factor of the rate constant.  alpha : (2,) transfer coefficients.
-    capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and transfer coefficient.
+    ocp, entropic, rate, film : (2, table) V, V/K, factor of the rate constant, ohm m2 of surface.
+    alpha : (2,) transfer coefficients.  capacity : (2,) F/m2 of cell a region.  plating : rate, A/m2 of cell, and
+    transfer coefficient.
     plating_to_c : mol/m3 per C/m2.
     solid : (2, regions, regions) ohm m2.  salt : the same times the conductivity, by region crossed.
     """
@@ -173,6 +175,7 @@ class Surfaces(NamedTuple):
     ocp: Array
     entropic: Array
     rate: Array
+    film: Array
     alpha: Array
     capacity: Array
     plating: Array
@@ -184,8 +187,8 @@ class Surfaces(NamedTuple):
 class Whole(NamedTuple):
     """Numbers of the whole cell.
 
-    energies : (7,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
-    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact, film : ohm.
+    energies : (8,) J/mol, see `activation_energies`.  heat : (3,) capacity J/K (0 for none), conductance W/K,
+    surroundings K.  area : m2.  separator : m, thickness over transport efficiency.  contact : ohm.
     reference_k : K.
     """
 
@@ -194,7 +197,6 @@ class Whole(NamedTuple):
     area: float
     separator: float
     contact: float
-    film: float
     reference_k: float
 
 
@@ -259,7 +261,7 @@ class StepEnd(NamedTuple):
 
     dt : s.  held : whether the current jumped to its value where the step began; a double layer's current is then no
     continuation of the last one, and would ring.  thermal : R T / F, V.  rise : K above the reference.
-    chi : 2 (1 - t+) R T / F, V.  quicker : factor of temperature on rate constants.
+    chi : 2 (1 - t+) R T / F, V.  quicker, film : factors of temperature on rate constants and films.
     """
 
     dt: float
@@ -268,6 +270,7 @@ class StepEnd(NamedTuple):
     rise: float
     chi: float
     quicker: float
+    film: float
 
 
 class SaltMemory(NamedTuple):

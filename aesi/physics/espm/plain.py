@@ -150,6 +150,5 @@ def _cell(model: EspmModel, temperature: float, top: float) -> PlainCell:
         salt_v=2.0 * (1.0 - e.transference) * thermal_v,
         path=through_layers + p.thickness_m / (3.0 * p.transport_efficiency),
         solid=(n.thickness_m / n.conductivity_s_m + p.thickness_m / p.conductivity_s_m) / 3.0,
-        contact=cell.contact_resistance_ohm
-        + cell.film_resistance_ohm / rate_factor(cell.film_ea_j_mol, temperature, reference),
+        contact=cell.contact_resistance_ohm,
     )

@@ -62,6 +62,20 @@ def rate_tables(cell: Cell) -> Array:
     return tables
 
 
+def film_tables(cell: Cell) -> Array:
+    """(2, points) ohm m2 of the films of the negative and the positive electrode over stoichiometry [0, 1].
+
+    Raises CellError where one is negative.
+    """
+    films = [cell.negative.film_ohm_m2, cell.positive.film_ohm_m2]
+    points = 2 if all(isinstance(f, Constant) for f in films) else RATE_POINTS
+    tables = np.array([tabulated(f, 0.0, 1.0, points) for f in films])
+    for table, side in zip(tables, ("negative", "positive"), strict=True):
+        if not (np.isfinite(table).all() and (table >= 0.0).all()):
+            raise CellError(f"the film resistance of the {side} electrode must not be negative on [0, 1].")
+    return tables
+
+
 @dataclass(frozen=True, eq=False)
 class DiffusionTable:
     """Diffusivity split into a constant `d0` and the integral `psi` of the rest over the variable.

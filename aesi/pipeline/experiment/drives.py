@@ -23,6 +23,15 @@ def by_role(
     return Split(train, valid, test)
 
 
+def training_part(
+    data: DataConfig, series: Mapping[str, ErrorSeries], roles: Mapping[Role, Sequence[str]]
+) -> tuple[ErrorSeries, ...]:
+    """`Split.train` of `by_role`; the series may be those of the training records alone."""
+    if data.repeats:
+        return cut_repeats(next(iter(series.values())), data.repeats).train
+    return tuple(series[name] for name in roles["train"])
+
+
 def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
     """Pieces of a record that repeats a schedule; each training repeat gives its last share to validation."""
     train, valid = [], []

@@ -7,7 +7,7 @@ the states that its history gave it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,12 +18,12 @@ from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
-from aesi.pipeline.experiment.drives import by_role, cuts, parts, training_drives
+from aesi.pipeline.experiment.drives import by_role, cuts, parts, training_drives, training_part
 from aesi.pipeline.experiment.physics_models import DECLARED, PhysicsModels, no_rows, physics_models, without
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sources import cell_path, sources_of
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import ErrorSeries, HeldOutDrive, Hold, Split
+from aesi.records import ErrorSeries, HeldOutDrive, Hold, Role, Split
 from aesi.sparse import with_inputs
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
@@ -37,7 +37,7 @@ class Loaded:
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
     cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : for each part of the training drives that
-    is left out in turn (`cuts`), its drive under physics that was fitted to all the others.
+    is left out in turn (`cuts`), all of them under physics that was fitted to the other parts.
     """
 
     cell: Cell
@@ -133,8 +133,12 @@ def _load(config: ExperimentConfig) -> Loaded:
     split = by_role(config.data, series, sources.roles)
     refitted = config.cell.start == "recalibrated" and len(drives) > 1
     left_out = tuple(
-        HeldOutDrive(_without(config, physics, records, drive, rows, piece.name) if refitted else piece, rows)
-        for drive, piece in zip(drives, split.train, strict=True)
+        HeldOutDrive(
+            _without(config, physics, records, drive, rows, sources.roles) if refitted else split.train,
+            place,
+            rows,
+        )
+        for place, (drive, piece) in enumerate(zip(drives, split.train, strict=True))
         for rows in parts(len(piece), cuts(config.data))
     )
     chosen = physics.chosen
@@ -188,9 +192,9 @@ def _without(
     records: Mapping[str, FitRecord],
     drive: tuple[str, slice],
     part: slice,
-    called: str,
-) -> ErrorSeries:
-    """A training drive under physics that was fitted to all but a part of it; `fitted` was fitted to that as well."""
+    roles: Mapping[Role, Sequence[str]],
+) -> tuple[ErrorSeries, ...]:
+    """The training drives under physics that was fitted to all but a part of one; `fitted` was fitted to that too."""
     name, rows = drive
     unseen = slice(rows.start + part.start, rows.start + part.stop)
     others = without(records, name, unseen)
@@ -198,8 +202,9 @@ def _without(
     physics = physics_models(
         declared.cell, declared.effects, others, config.data.hold, config.cell.start, fitted, declared.model
     )
-    series, _ = _series(physics, {name: records[name]}, config)
-    return series[name].take(rows, called)
+    of_training = records if config.data.repeats else {drive: records[drive] for drive in roles["train"]}
+    series, _ = _series(physics, of_training, config)
+    return training_part(config.data, series, roles)
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:

@@ -164,7 +164,7 @@ def fitness(losses: tuple[float, float, float], library_size: int, weights: Fitn
 
 
 def _out_of_fold(problem: Problem, runs: FoldRuns) -> tuple[OutOfFoldResiduals, ...]:
-    left = problem.scaling.error_volts_per_unit * (problem.target[:, None] - runs.one_step[:, :2])
+    left = problem.scaling.error_volts_per_unit * (problem.unseen_target[:, None] - runs.one_step[:, :2])
     return tuple(
         OutOfFoldResiduals(record.name, left[a:b, 0], left[a:b, 1])
         for record, (a, b) in zip(problem.split.train, problem.spans, strict=True)

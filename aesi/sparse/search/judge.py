@@ -79,16 +79,17 @@ class FoldRuns:
     def judge(self, problem: Problem, column: int) -> Judged:
         """How one of the three did over all pieces."""
         run = self.free_run if problem.options.regime == "free_run" else self.one_step
-        bare = problem.target - problem.zero
+        truth = problem.unseen_target
+        bare = truth - problem.zero
         with np.errstate(invalid="ignore"):
             runs = (run, self.from_none) if problem.options.regime == "free_run" else (run,)
-            squares = [problem.row_weights @ (problem.target - each[:, column]) ** 2 for each in runs]
+            squares = [problem.row_weights @ (truth - each[:, column]) ** 2 for each in runs]
             loss = float(np.mean(squares) / (problem.row_weights @ bare**2))
-            loss_free = mse(problem.target, self.free_run[:, column]) / float(np.mean(bare**2))
-            loss_step = mse(problem.target, self.one_step[:, column])
+            loss_free = mse(truth, self.free_run[:, column]) / float(np.mean(bare**2))
+            loss_step = mse(truth, self.one_step[:, column])
         return Judged(
             loss,
-            pearson(problem.target, self.free_run[:, column]),
+            pearson(truth, self.free_run[:, column]),
             100.0 * (1.0 - loss_free),
             problem.scaling.error_volts_per_unit * float(np.sqrt(loss_step)),
         )
@@ -118,7 +119,7 @@ def fold_runs(
 
 
 def _sums(problem: Problem, given: Array) -> Array:
-    error = problem.target[:, None] - problem.zero
+    error = problem.unseen_target[:, None] - problem.zero
     with np.errstate(invalid="ignore", over="ignore"):
         products = np.stack([np.broadcast_to(error**2, given.shape), error * given, given**2], axis=-1)
         return np.stack([products[a:b].sum(axis=0) for a, b in problem.folds], axis=1)
@@ -129,29 +130,32 @@ def _without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
     amplitudes = [1.0] * given.shape[1]
     sums = _sums(problem, given)
     if problem.options.fade:
-        given = problem.fade[:, None] * given
+        given = problem.nearness[:, None] * given
         sums = _sums(problem, given)
         amplitudes = [
-            amplitude(problem.target, column, problem.folds, problem.row_weights) for column in given.T
+            amplitude(problem.unseen_target, column, problem.folds, problem.row_weights) for column in given.T
         ]
         given = given * amplitudes
     memory = memory_of(problem, [given[a:b, 0] for a, b in problem.folds])
     one, free = np.empty_like(given), np.empty_like(given)
     for a, b in problem.folds:
         for j, column in enumerate(given[a:b].T):
-            one[a:b, j] = free_run.remember_ahead(column, memory, problem.error[a:b], 1)
-            free[a:b, j] = free_run.remember(column, memory, problem.error[a])
+            one[a:b, j] = free_run.remember_ahead(column, memory, problem.unseen_error[a:b], 1)
+            free[a:b, j] = free_run.remember(column, memory, problem.unseen_error[a])
     return FoldRuns(one, free, given, sums, (amplitudes[0], amplitudes[1], amplitudes[2])), memory
 
 
 def memory_of(problem: Problem, given: Sequence[Array]) -> float:
-    """Lag-one autoregression coefficient of a residual that the fit has not seen, within [0, 1)."""
-    product, square = 0.0, 0.0
+    """Lag-one autoregression coefficient of a residual that the fit has not seen, within [0, 1).
+
+    The median over the folds: one in which the physics drifts away by volts would set it for all.
+    """
+    each = []
     for (a, b), prediction in zip(problem.folds, given, strict=True):
-        left = problem.target[a:b] - prediction
-        product += float(left[1:] @ left[:-1])
-        square += float(left[:-1] @ left[:-1])
-    return float(np.clip(product / square, 0.0, _MOST_MEMORY)) if square > 0 else 0.0
+        left = problem.unseen_target[a:b] - prediction
+        square = float(left[:-1] @ left[:-1])
+        each.append(float(left[1:] @ left[:-1]) / square if square > 0 else 0.0)
+    return float(np.clip(np.median(each), 0.0, _MOST_MEMORY))
 
 
 def on_records(model: SparseModel, records: Sequence[ErrorSeries], problem: Problem) -> Judged:

@@ -15,6 +15,7 @@ that repeats the last measured error.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -32,19 +33,20 @@ from aesi.numerics.blocks import (
 )
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
-from aesi.records import Split
+from aesi.records import HeldOutDrive, Split
 from aesi.sparse.search.prepare import not_finite, prepared_series, variables
 from aesi.sparse.search.rows import (
     balanced_weights,
     default_block,
-    fade_of_left_out,
     left_out_pieces,
+    nearness_of_left_out,
     spans_of,
 )
+from aesi.sparse.search.unseen import unseen_errors
 from aesi.sparse.terms.basis import FUNCTIONS, values
 from aesi.sparse.terms.library import Library, evaluate_terms
 from aesi.sparse.terms.scaling import Outside, Scaling
-from aesi.sparse.trained_region import TrainedRegion, farthest_left_out
+from aesi.sparse.trained_region import TrainedRegion
 
 Regime = Literal["free_run", "one_step"]
 
@@ -93,11 +95,12 @@ class Problem:
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
     error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
     error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  region : what a fit to all rows is fitted to.
+    unseen_error, unseen_target : the same by physics that has not seen the row's fold (unseen.py).
     counts : (resamples, n) how often each resample holds a row.
-    fade : (n,) what is left of a correction at each row by a model that has not seen its fold (fade.py).
+    nearness : (n,) what is left of a correction at each row that was fitted without its fold (trained_region.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
-    factors : (resamples, m + 1, m + 1), fold_factors likewise, and full_factor (m + 1, m + 1): F with
-    F' F = [Theta y]' W [Theta y], W the row weights times the counts.
+    factors : (resamples, any, m + 1), fold_factors likewise, and full_factor (any, m + 1): F with
+    F' F = [Theta y]' W [Theta y], W the row weights times the counts; y is the target, or of a fold its own.
     notes : what was left out of the library, and why, one sentence each.
     """
 
@@ -113,22 +116,32 @@ class Problem:
     error: Array
     inputs: Array
     target: Array
+    unseen_error: Array
+    unseen_target: Array
     soc: Array
     region: TrainedRegion
     counts: CountArray
     row_weights: Array
     restart: BoolArray
     folds: tuple[Span, ...]
-    fade: Array
+    nearness: Array
     factors: Array
     fold_factors: Array
     full_factor: Array
     notes: tuple[str, ...] = ()
 
     @classmethod
-    def build(cls, split: Split, options: Options | None = None, library: Library | None = None) -> Problem:
+    def build(
+        cls,
+        split: Split,
+        options: Options | None = None,
+        library: Library | None = None,
+        left_out: Sequence[HeldOutDrive] = (),
+    ) -> Problem:
         """Set up a search over the training records of `split`; `split.test` is not looked at.
 
+        left_out : the training records under physics that was fitted without each fold, where there is such a one:
+        then what is learnt without a fold, and judged on it, is the error of that physics.
         Raises DataError where there is nothing to learn from: no records, records of different sampling, an
         error or all inputs constant, NaN, or fewer rows than library terms.
         """
@@ -157,12 +170,20 @@ class Problem:
         block = options.block or default_block(n)
         cut = left_out_pieces(spans, options.fold, options.cuts)
         soc = np.concatenate([record.soc[:-1] for record in train])
-        region = TrainedRegion.of(rows[:, 1:], soc, farthest_left_out(soc, cut))
+        region = TrainedRegion.of(rows[:, 1:], soc)
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
-        augmented = np.empty((n, len(library) + 1), order="F")
+        error = np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train])
+        if (
+            options.fold is not None or options.feedback
+        ):  # the folds are no drives, or the terms hold the error
+            left_out = ()
+        unseen = unseen_errors(left_out, scaling, error, target, cut)
+        m = len(library)
+        augmented = np.empty((n, m + 1 + len(unseen.targets)), order="F")
         for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
             augmented[:, j] = products[product] * error_functions[q]
-        augmented[:, -1] = target
+        augmented[:, m] = target
+        augmented[:, m + 1 :] = unseen.targets.T
         if not np.isfinite(augmented).all():
             raise DataError(not_finite(library, augmented))
         zero = float(scaling.error_to_scaled(np.array(0.0)))
@@ -180,19 +201,21 @@ class Problem:
             products=products,
             which=which,
             error_functions=error_functions,
-            error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
+            error=error,
             inputs=rows[:, 1:],
             target=target,
+            unseen_error=unseen.error,
+            unseen_target=unseen.target,
             soc=soc,
             region=region,
             counts=weights,
             row_weights=row_weights,
             restart=starts_mask(pieces(spans, options.horizon or block), n),
             folds=cut,
-            fade=fade_of_left_out(rows[:, 1:], soc, cut, region.tested),
-            factors=every[: len(weights)],
-            fold_factors=every[len(weights) :],
-            full_factor=r,
+            nearness=nearness_of_left_out(rows[:, 1:], soc, cut),
+            factors=every[: len(weights), :, : m + 1],
+            fold_factors=_of_own_target(every[len(weights) :], m, len(unseen.targets)),
+            full_factor=r[:, : m + 1],
             notes=notes,
         )
 
@@ -242,3 +265,10 @@ class Problem:
         return np.asarray(
             self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
         )
+
+
+def _of_own_target(factors: Array, m: int, targets: int) -> Array:
+    """(n_folds, any, m + 1) of factors whose columns are terms, the target, and the targets of the folds, if any."""
+    if not targets:
+        return factors[:, :, : m + 1]
+    return np.stack([factor[:, [*range(m), m + 1 + k]] for k, factor in enumerate(factors)])

@@ -36,13 +36,13 @@ def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
     return [(int(p), int(q)) for p, q in pairwise(edges)]
 
 
-def fade_of_left_out(inputs: Array, soc: Array, folds: Sequence[Span], tested: float) -> Array:
-    """(n,) what is left of a correction at each row (fade.py) by how remote it is from the rows of the other folds."""
+def nearness_of_left_out(inputs: Array, soc: Array, folds: Sequence[Span]) -> Array:
+    """(n,) what is left at each row (trained_region.py) of a correction fitted to the rows of the other folds."""
     parts = []
     for a, b in folds:
         fold = np.s_[a:b]
-        others = TrainedRegion.of(np.delete(inputs, fold, axis=0), np.delete(soc, fold), tested)
-        parts.append(1.0 / (1.0 + others.remoteness(inputs[fold], soc[fold])))
+        others = TrainedRegion.of(np.delete(inputs, fold, axis=0), np.delete(soc, fold))
+        parts.append(others.nearness(inputs[fold], soc[fold]))
     return np.concatenate(parts)
 
 

@@ -54,10 +54,11 @@ def test_a_small_sine_in_time_gives_the_same_impedance(effects):
 
 
 @pytest.mark.parametrize("model", ["espm", "dfn"])
-def test_a_rate_that_depends_on_stoichiometry_and_a_double_layer_of_the_file_are_in_both(model):
+def test_rates_and_films_over_stoichiometry_and_double_layers_of_the_file_are_in_both(model):
     slow = LookupTable((0.0, 0.3, 1.0), (3.0, 0.4, 0.2))
     cell = NMC.with_negative(rate_factor=slow, double_layer_f_m2=2.0)
-    cell = cell.with_positive(rate_factor=slow, double_layer_f_m2=0.5)
+    film = LookupTable((0.0, 0.5, 1.0), (1e-3, 5e-3, 3e-2))
+    cell = cell.with_positive(rate_factor=slow, double_layer_f_m2=0.5, film_ohm_m2=film, film_ea_j_mol=5e4)
     frequency = np.array([0.003, 0.1, 3.0])
     ours = impedance(cell, frequency, SOC, 10.0, model=model)
     assert np.abs(ours - impedance(NMC, frequency, SOC, 10.0, model=model)).max() > 0.05 * np.abs(ours).max()

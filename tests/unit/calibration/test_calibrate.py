@@ -34,7 +34,9 @@ def test_a_temperature_between_those_that_were_fitted_is_predicted(found, truth,
 
 
 def test_every_parameter_has_an_interval_and_a_source(found):
-    assert {"negative.rate_energy", "positive.diffusivity_energy", "film.energy"} <= set(found.parameters)
+    assert {"negative.rate_energy", "positive.diffusivity_energy", "positive.film_energy"} <= set(
+        found.parameters
+    )
     for interval in found.parameters.values():
         assert interval.low <= interval.value <= interval.high
         assert interval.source

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE, FreeRunBands
-from aesi.conformal.seen import LENGTH, Seen
+from aesi.conformal.seen import Seen
+from aesi.numerics.visited import LENGTH
 
 DT = 1.0
 N = 900

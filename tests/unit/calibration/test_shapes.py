@@ -1,0 +1,65 @@
+"""Corrected potentials fall everywhere, whatever a fit makes of them, and their slopes are those that a fit is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aesi.calibration.shapes import Shapes
+
+INNER = np.linspace(0.002, 0.998, 4001)
+
+
+@pytest.fixture(scope="module")
+def shapes(start):
+    return Shapes.over(start, span_k=20.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), size=st.floats(0.0, 4.0))
+def test_a_corrected_potential_falls_wherever_lithium_is_added(shapes, start, seed, size):
+    z = size * np.random.default_rng(seed).standard_normal(shapes.size)
+    cell = shapes.on(start, z)
+    for electrode in (cell.negative, cell.positive):
+        assert (np.diff(electrode.ocp(INNER)) < 0.0).all()
+
+
+def test_without_a_correction_the_potentials_are_those_of_the_file(shapes, start):
+    cell = shapes.on(start, np.zeros(shapes.size))
+    for ours, declared in ((cell.negative, start.negative), (cell.positive, start.positive)):
+        theta = np.linspace(declared.theta_min, declared.theta_max, 401)
+        assert np.abs(ours.ocp(theta) - declared.ocp(theta)).max() < 2e-3
+
+
+def test_the_slopes_are_those_of_the_voltage_at_rest(shapes, start):
+    rng = np.random.default_rng(2)
+    z = rng.standard_normal(shapes.size)
+    theta_n, theta_p, rise = (
+        rng.uniform(0.02, 0.95, 50),
+        rng.uniform(0.30, 0.83, 50),
+        rng.uniform(-25, 15, 50),
+    )
+
+    def volts(z):
+        cell = shapes.on(start, z)
+        n, p = cell.negative, cell.positive
+        return p.ocp(theta_p) + rise * p.entropic(theta_p) - n.ocp(theta_n)
+
+    columns = shapes.columns(z, theta_n, theta_p, rise)
+    assert columns.shape == (50, shapes.size)
+    for j in range(shapes.size):
+        step = np.zeros(shapes.size)
+        step[j] = 1e-4
+        slope = (volts(z + step) - volts(z - step)) / 2e-4
+        assert columns[:, j] == pytest.approx(slope, abs=1e-3 * np.abs(slope).max())  # of tables
+
+
+def test_a_potential_that_rises_in_the_start_file_falls_in_what_is_fitted(start):
+    wavy = replace(start.positive, ocp=type(start.positive.ocp)("4.2 - 0.8 * x + 0.1 * tanh(50 * (x - 0.5))"))
+    cell = replace(start, positive=wavy)
+    flat = Shapes.over(cell, 0.0)
+    ocp = flat.on(cell, np.zeros(flat.size)).positive.ocp(INNER)
+    assert (np.diff(wavy.ocp(INNER)) > 0.0).any()
+    assert (np.diff(ocp) < 0.0).all()
