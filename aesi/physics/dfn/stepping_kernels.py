@@ -32,6 +32,7 @@ LARGEST_GROWTH = 4.0
 @compiled
 def take_back(state, t):  # type: ignore[no-untyped-def]
     """The start of a step whose end was not found: `commit` alone changes the rest of the state."""
+    t.total[0], t.total[1] = t.before[0], t.before[1]
     for u in range(state.y.shape[0]):
         state.y[u] = t.y_back[u]
     for r in range(state.given.shape[0]):
@@ -93,15 +94,15 @@ def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
 
 @compiled
 def advance(  # type: ignore[no-untyped-def]
-    p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k,
-    last_try,
-):  # fmt: skip
-    """One step to the currents `total` (2,), which changed by `change` (2,); temperature t_k at its end.
+    p, s, e, state, t, newton, weights, slot, dt, last_dt, t_k, last_try
+):
+    """One step to the currents t.total, which changed by t.change; temperature t_k at its end.
 
-    last_dt : of the step before, 0 after a jump.  last_try : take the step although it solves nothing.
-    Returns as `solve_reaction`.
+    weights, slot : those of the step's length.  last_dt : of the step before, 0 after a jump.
+    last_try : take the step although it solves nothing.  Returns as `solve_reaction`.
     """
-    extrapolate(p, s, e, state, t, dt, last_dt, taken, change)
+    faster, w, w_salt, spread = t.faster, weights.particle[slot], weights.salt[slot], weights.spread[slot]
+    extrapolate(p, s, e, state, t, dt, last_dt, weights.taken[slot], t.change)
     varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
     if varies:
         calm_particles(p, state, t, faster, dt, w)
@@ -110,7 +111,7 @@ def advance(  # type: ignore[no-untyped-def]
     for _ in range(PASSES):
         calm_salt(s, state, t, faster[2], w_salt)
         calm_particles(p, state, t, faster, dt, w)
-        phi_n, phi_p, steps = find_reaction(p, s, e, state, t, newton, spread, total, t_k)
+        phi_n, phi_p, steps = find_reaction(p, s, e, state, t, newton, spread, t.total, t_k)
         end_salt(s, t, state.given, w_salt)
         if s.strength > 0.0:
             salt_forcing(s, t.c, t.forcing)
@@ -124,7 +125,7 @@ def advance(  # type: ignore[no-untyped-def]
         if settled:
             break
     if steps > 0 or last_try:
-        commit(p, s, e, state, t, dt, w, change, varies)
+        commit(p, s, e, state, t, dt, w, t.change, varies)
     return phi_n, phi_p, steps
 
 
