@@ -15,7 +15,7 @@ from aesi.physics.dfn.diffusion_kernels import (
     salt_forcing,
 )
 from aesi.physics.dfn.reaction_kernels import solve_reaction
-from aesi.physics.espm.electrode_kernels import end_weight
+from aesi.physics.espm.interface_kernels import end_weight
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup
 from aesi.physics.espm.transport_kernels import solid_forcing
 
