@@ -43,13 +43,14 @@ DISCOVERY_COLUMNS = (
 HOW_TO_READ = (
     "A run is one `aesi run`, and the table lists those alone: it loads a hundred rows at a time, which one run's "
     "candidates would fill. With the filter ``tags.`aesi.kind` = 'candidate'`` it lists candidates (the one that the "
-    "models come from is tagged `aesi.chosen`), with `'model'` the final models. `free_run/` is without any measured voltage after the first sample, `one_step/` and "
-    "`intervals/` are one step ahead. Sort candidates by `free_run/valid_mser_pct`: selection never meets the test "
-    "records."
+    "models come from is tagged `aesi.chosen`), with `'model'` the final models. `free_run/` is without any measured "
+    "voltage after the first sample, `one_step/` and `intervals/` are one step ahead. Sort candidates by "
+    "`free_run/valid_mser_pct`: selection never meets the test records."
 )
 HOW_TO_READ_DISCOVERIES = (
     "A run is one `aesi discover`, and the table lists those alone; without the filter it also lists the hypotheses "
-    "that were fitted, with what each says of unseen data (`gain_nats`). `finding` is the verdict in a line; the report is among the artifacts."
+    "that were fitted, with what each says of unseen data (`gain_nats`). `finding` is the verdict in a "
+    "line; the report is among the artifacts."
 )
 
 
