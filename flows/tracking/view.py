@@ -49,11 +49,9 @@ HOW_TO_READ = (
 )
 HOW_TO_READ_DISCOVERIES = (
     "A run is one `aesi discover`, and the table lists those alone; without the filter it also lists the hypotheses "
-    "that were fitted, with what each says of unseen data (`gain_nats`). `finding` is the verdict in a "
-    "line; the report is among the artifacts."
+    "that were fitted, with what each says of unseen data (`gain_nats`). `finding` is the verdict in a line; the "
+    "report is among the artifacts."
 )
-
-
 WHOLE_RUNS = "tags.`aesi.kind` = 'run'"
 
 
