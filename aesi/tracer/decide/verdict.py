@@ -13,8 +13,8 @@ import numpy as np
 
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V
-from aesi.tracer.search.fitted import ALIKE_NATS
 from aesi.tracer.search.path import Path, unseen_rmse_v
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3

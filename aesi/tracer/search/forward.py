@@ -16,14 +16,10 @@ from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import (
-    ALIKE_NATS,
-    as_declared,
-    base_of,
-    fitted_hypothesis,
-)
+from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.grown import promising, side_by_side
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, unseen_rmse_v
+from aesi.tracer.search.plausible import most_plausible
 
 FINALISTS = 6
 """Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
@@ -74,6 +70,7 @@ def searched(
         others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
     chosen = _pruned(problem, blocks, chosen, steps, archive, report)
+    chosen = _exchanged(problem, blocks, chosen, steps, slopes, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
 
 
@@ -104,6 +101,36 @@ def _pruned(
             break
         chosen = best
     return chosen
+
+
+def _exchanged(
+    problem: InverseProblem,
+    blocks: Blocks,
+    chosen: FittedHypothesis,
+    steps: list[Step],
+    slopes: Mapping[str, Array],
+    archive: Archive,
+    report: Report,
+) -> FittedHypothesis:
+    """The hypothesis with one of its effects exchanged for another, while that says more: what was added first stood
+    in for all that was missing then. The steps that this takes are added to `steps`."""
+    grown_from = {frozenset(parent.hypothesis) for step in steps for parent in step.parents}
+    while True:
+        rests = [tuple(other for other in chosen.hypothesis if other != name) for name in chosen.hypothesis]
+        new = [rest for rest in rests if frozenset(rest) not in grown_from]
+        others = []
+        for rest in new:
+            grown_from.add(frozenset(rest))
+            fit = fitted_hypothesis(problem, blocks, rest, chosen.placed, chosen.score.delta_v, archive)
+            if fit is None:
+                continue
+            step, _ = _step(problem, blocks, [fit], slopes, archive, report)
+            steps.append(step)
+            others += [] if step.admitted is None else [step.admitted]
+        best = most_plausible([chosen, *others], len(problem.competing()))
+        if best is None or best is chosen:
+            return chosen
+        chosen = best
 
 
 def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | None:
@@ -144,7 +171,8 @@ def _step(
             report(problem, fit, fit.score.total - best.score.total)
             fitted.append(fit)
     fitted.sort(key=lambda f: -f.score.total)
-    admitted = most_plausible([f for f in fitted if _admitted(blocks, best, f, least_nats)])
+    may = [f for f in fitted if _admitted(blocks, best, f, least_nats)]
+    admitted = most_plausible(may, len(problem.competing()))
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
 
@@ -176,15 +204,6 @@ def _finalists(ranked: Sequence[Grown], best: FittedHypothesis) -> list[Grown]:
     gains = [one.score.total - best.score.total for one in ranked[:FINALISTS]]
     least = max(FINALIST_SHARE * max(gains, default=0.0), 0.0)
     return [one for one, gain in zip(ranked, gains, strict=False) if gain > least]
-
-
-def most_plausible(admitted: Sequence[FittedHypothesis]) -> FittedHypothesis | None:
-    """Of those that say as much as the best one of unseen data, which do not tell them apart, the one with the largest
-    marginal likelihood: that with fewer and more usual values."""
-    if not admitted:
-        return None
-    most = max(fit.score.total for fit in admitted)
-    return max((f for f in admitted if f.score.total > most - ALIKE_NATS), key=lambda f: f.score.evidence)
 
 
 def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:

@@ -9,8 +9,9 @@ import numpy as np
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import ALIKE_NATS, fitted_hypothesis
+from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 NINETY = 1.645
 """Standard deviations either side of a 90 % interval."""
