@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from aesi.physics.espm.electrode_kernels import overpotential
+from aesi.physics.espm.interface_kernels import overpotential
 from aesi.physics.espm.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY
 
 SMALLEST_SLOPE = 1e-3

@@ -7,6 +7,7 @@ from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
+from aesi.physics.dfn.output_kernels import left_range, record, record_profile
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
 from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, compiled, lookup
 from aesi.physics.espm.layout import CACHE_SLOTS
@@ -22,9 +23,6 @@ from aesi.physics.espm.transport_kernels import (
 SHORTER, SHORTEST = 0.25, 0.25**6
 """Where no reaction is found at the end of a step, a quarter of it is tried, down to the shortest: at the edges of
 potentials, and where one rises with lithium, the end of a long step has several solutions or none in reach."""
-UNDERSHOOT = 0.02
-"""Of the rest concentration. The reaction leaves a place that runs dry, and the salt there stays at nought; its
-polynomial passes below by 0.8 % at worst before the cut-off (LG HG2 at -2 degC and 3.2C, 0.2 % with 20 points)."""
 FIRST_LENGTH = 0.25
 """Of a step, where double layers meet a current that has turned: whole steps of 1 s between edges of 0.1 s were 0.52 mV
 RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
@@ -194,16 +192,6 @@ def start_at_rest(p, s, e, state, t, half, theta0, t_k):  # type: ignore[no-unty
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def smallest(values):  # type: ignore[no-untyped-def]
-    """The smallest of (n,) values; not a number where one is not."""
-    low = values[0]
-    for value in values:
-        if not value >= low:
-            low = value
-    return low
-
-
-@njit(inline="always", fastmath=FASTMATH)
 def set_rates(e, t, t_k):  # type: ignore[no-untyped-def]
     """Arrhenius factors of everything that has an activation energy."""
     for i in range(8):
@@ -230,41 +218,3 @@ def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-unt
         level = equilibrium(e.ocp, e.entropic, side, t_k - e.reference_k, state.theta[u])[0]
         power += e.area * state.y[u] * (t_k * slope - level)
     return power
-
-
-@compiled
-def record(p, e, state, half, out, k):  # type: ignore[no-untyped-def]
-    """Averages of the electrodes, salt at the collectors, plated lithium."""
-    for row in range(1, 7):
-        out[row, k] = 0.0
-    for u in range(p.place.shape[0]):
-        side = 0 if p.place[u] < half else 1
-        out[1 + side, k] += p.share[u] * state.theta[u]
-        out[5 + side, k] += p.volume[u] * state.mean[u]
-    out[3, k], out[4, k] = state.c[0], state.c[state.c.shape[0] - 1]
-    out[8, k] = 0.0
-    for r in range(half):
-        out[8, k] += state.plated[r] * e.node_share[r]
-
-
-@compiled
-def record_profile(k, p, e, state, profile, salt_profile):  # type: ignore[no-untyped-def]
-    """What is told of each place, and the salt at each node."""
-    for r in range(state.given.shape[0]):
-        profile[k, 1, r] = state.given[r] / e.node_share[r]
-        profile[k, 2, r] = state.salt[r]
-        profile[k, 3, r] = state.psi[r]
-    for u in range(p.place.shape[0]):
-        profile[k, 0, p.place[u]] += state.theta[u] * p.share[u] / e.node_share[p.place[u]]
-    for i in range(state.c.shape[0]):
-        salt_profile[k, i] = state.c[i]
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def left_range(theta_n, theta_p, c, c0):  # type: ignore[no-untyped-def]
-    """What left its range: 1 the negative surfaces, 2 the positive, 3 the salt, 0 nothing."""
-    if not 0.0 <= theta_n <= 1.0:
-        return 1
-    if not 0.0 <= theta_p <= 1.0:
-        return 2
-    return 0 if smallest(c) >= -UNDERSHOOT * c0 else 3

@@ -15,7 +15,7 @@ from aesi.physics.dfn.diffusion_kernels import (
     salt_forcing,
 )
 from aesi.physics.dfn.reaction_kernels import solve_reaction
-from aesi.physics.espm.electrode_kernels import end_weight
+from aesi.physics.espm.interface_kernels import end_weight
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup
 from aesi.physics.espm.transport_kernels import solid_forcing
 
@@ -74,11 +74,12 @@ def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-un
 
 @compiled
 def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
-    """Double layers over a step as a conductance and a current; exact for one that relaxes by its own kinetics, as
-    they are at the start of the step: what the last solution left as the conductance of each place.
+    """Double layers over a step, each as a conductance `t.layer_c` and a current `t.layer_old`.
 
-    What a layer takes falls off faster than straight within a step, and the particles get the rest: `t.lag` is how much
-    more than a straight line from their current at the start, as a current at the start.
+    That is exact for a layer that relaxes by its own kinetics as they are at the start of the step: the conductance
+    that the last solution left at each place.
+    What a layer takes falls off faster than a straight line, and the particles get the rest. `t.lag` is what they get
+    beyond a straight line, as a current at the start of the step.
     """
     for r in range(e.capacity.shape[0]):
         kinetic = newton.conductance[r] - t.layer_c[r]

@@ -99,8 +99,10 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
 
 
 def _expected(p: Parameter, capacity_ah: float) -> float | None:
-    """Standard deviation of how far a parameter under test is from where it does nothing, None where that is not known:
-    of contacts, and of what every cell file declares, how far files of other cells of its make are off."""
+    """Standard deviation of how far a parameter under test is from where it does nothing, None where that is not known.
+
+    Of contacts, and of what every cell file declares, it is how far files of other cells of its make are off.
+    """
     if p.spread is not None and p.spread.loose is not None and p.neutral is not None:
         if p.spread.ohmic:
             return p.spread.loose / capacity_ah

@@ -169,8 +169,11 @@ def _with_confidence(verdict: Verdict) -> Verdict:
 def _recalibrated(
     problem: InverseProblem, tight: Path, archive: Archive
 ) -> tuple[InverseProblem, FittedHypothesis] | None:
-    """The declared model with its own parameters open as far as that carries over: of the fits that do no worse than
-    the declared ones on what they saw, the one that leaves least on parts left out; None where there is none."""
+    """The declared model with its own parameters open as far as that carries over.
+
+    Of the fits that do no worse than the declared parameters on what they saw, it is the one that leaves least on parts
+    left out; None where there is none.
+    """
     loose = replace(problem, trust="loose")
     base = base_of(loose, blocks_of(loose), archive)
     open_wide = [] if base is None else [(loose, base)]
@@ -212,8 +215,11 @@ def _best_carried(
     verdict: Verdict,
     recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
 ) -> Evidence:
-    """Nothing explains the data: what was named all the same, or else the model that leaves least on parts left out; if
-    it can be simulated over the declared range and is no worse on any part than the declared and recalibrated ones."""
+    """What is written where nothing explains the data: what was named all the same, or else what leaves least.
+
+    Least on parts left out. Either has to run over the declared range, and to be no worse on any part than the declared
+    and the recalibrated model.
+    """
     declared = Option(ModelState(path.problem), left_out_errors(path.problem, path.blocks, None), None)
     basic = [declared]
     other = declared.state

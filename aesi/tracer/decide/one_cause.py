@@ -19,8 +19,11 @@ from aesi.tracer.search.plausible import most_plausible
 
 
 def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
-    """The path with one effect for all of its effects, and the group of look-alikes that it heads; the path as it was
-    and no group where it names no several declared parameters, or no single cause says as much."""
+    """The path with one effect in the place of all of its effects, and the group of look-alikes that it heads.
+
+    The path as it was, and no group, where it does not name several declared parameters, or no single cause says as
+    much as they do.
+    """
     chosen = path.chosen
     effects = path.problem.effects
     if len(chosen.hypothesis) < 2 or not all(_tolerated(effects[name]) for name in chosen.hypothesis):

@@ -176,9 +176,10 @@ def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> flo
 def _rivals(
     path: Path, name: str, tried: Mapping[frozenset[str], Explanation]
 ) -> Iterator[tuple[Explanation, Explanation, str]]:
-    """Hypotheses with another effect in the place of one that was chosen, each with the one that it is held against
-    and the other effect: beside all that was chosen, or, where that was not tried, beside what there was when the
-    effect was admitted."""
+    """Hypotheses with another effect in the place of one that was chosen: rival, what it is held against, other effect.
+
+    Beside all else that was chosen, or, where that was not tried, beside what there was when the effect was admitted.
+    """
     named: set[str] = set()
     admitted = (
         s.admitted for s in path.steps if s.admitted is not None and s.admitted.hypothesis[-1] == name
