@@ -31,7 +31,6 @@ def run(
     prefect: options.PrefectOption = True,
 ) -> None:
     """The whole flow: data, physics, search, ensembles, intervals, tables, figures, report."""
-    typer.echo(f"Reading {experiment} ...", err=True)  # at once: what a run needs takes seconds to load
     from flows.jobs.start import start
 
     start(

@@ -173,9 +173,8 @@ class Problem:
         region = TrainedRegion.of(rows[:, 1:], soc)
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         error = np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train])
-        if (
-            options.fold is not None or options.feedback
-        ):  # the folds are no drives, or the terms hold the error
+        drives_left_out = options.fold is None and len(left_out) == len(cut)
+        if not drives_left_out or options.feedback:  # pieces of a single record, or terms that hold the error
             left_out = ()
         unseen = unseen_errors(left_out, scaling, error, target, cut)
         m = len(library)
