@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 from aesi.bench.left_out import LIMIT_S, judged, plan, summary, table
 from flows.benchmarks.cases import Cases, tracked
+from flows.benchmarks.page import write_between
 
 SHOWN = ("cell", "record", "verdict", "effects", "error")
 BEGIN, END = "<!-- table of aesi bench left_out -->", "<!-- end of left_out -->"
@@ -35,7 +35,4 @@ def run(
         yield row
     if write is not None:
         order = {case.name: k for k, case in enumerate(plan(only))}
-        lines = "\n".join(table(sorted(rows[:-1], key=lambda row: order[row["case"]])))
-        page = Path(write).read_text(encoding="utf-8")
-        before, after = page.split(BEGIN)[0], page.split(END)[1]
-        Path(write).write_text(f"{before}{BEGIN}\n{lines}\n{END}{after}", encoding="utf-8")
+        write_between(write, BEGIN, END, table(sorted(rows[:-1], key=lambda row: order[row["case"]])))
