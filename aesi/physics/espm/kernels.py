@@ -4,7 +4,10 @@ import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 from numba import njit
+
+from aesi.physics.espm.layout import CACHE_SLOTS
 
 FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
 _OPTIONS: Any = {"cache": True, "nogil": True, "fastmath": FASTMATH, "_nrt": False}
@@ -63,6 +66,19 @@ def step_weights(rate, dt):  # type: ignore[no-untyped-def]
         whole = -math.expm1(-z) / rate
         end = (1.0 - whole / dt) / rate
     return decay, whole - end, end
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def slot_of(dt, keys):  # type: ignore[no-untyped-def]
+    """Where the weights of a step of dt s stand, and whether they are still to be made there.
+
+    keys : (slots,) nanoseconds of the steps whose weights are kept; that of this one is entered.
+    """
+    key = np.int64(dt * NANOSECONDS + 0.5)
+    slot = key % CACHE_SLOTS
+    missing = keys[slot] != key
+    keys[slot] = key
+    return slot, missing
 
 
 @njit(inline="always", fastmath=FASTMATH)
