@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.physics.espm.layout import CACHE_SLOTS
 
 FASTMATH = {"reassoc", "contract", "arcp", "nsz"}
-_OPTIONS: Any = {"cache": True, "nogil": True, "fastmath": FASTMATH, "_nrt": False}
-compiled: Callable[[Any], Any] = njit(**_OPTIONS)
+compiled: Callable[[Any], Any] = kept_njit(nogil=True, fastmath=FASTMATH, _nrt=False)
 """Of every function that is not inlined. numba counts the references to each array that it takes out of a named tuple,
 one atomic instruction at each use: without (nothing here allocates) a sample of the porous electrode takes 2.5 us
 instead of 8.4."""
