@@ -8,6 +8,7 @@ CaseRow = dict[str, Any]
 BENCHMARKS = {
     "espm": "aesi.bench.physics.espm",
     "dfn": "aesi.bench.physics.dfn",
+    "start": "aesi.bench.physics.start",
     "ensemble": "aesi.bench.hybrid.ensemble",
     "design": "aesi.bench.hybrid.design",
     "spci": "aesi.bench.intervals.spci",

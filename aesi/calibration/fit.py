@@ -49,15 +49,19 @@ def calibrate(
     temperatures_degc: Mapping[str, float] | None = None,
     evaluations: int = EVALUATIONS,
     physics: ModelName = "espm",
+    same_cell: bool = False,
 ) -> Calibration:
     """Capacities, stoichiometry windows, potential, diffusion, kinetics, electrolyte and contacts, with temperature.
 
     records : at least one, of any temperatures: their column, or `temperatures_degc` by name, or the cell file's.
     soc0 : of every record that its voltage does not contradict.  physics : the model that is fitted.
+    same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
+    charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
+    of a full discharge.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
-    model, notes = problem(cell, records, soc0, temperatures_degc or {}, physics)
+    model, notes = problem(cell, records, soc0, temperatures_degc or {}, physics, same_cell)
     x = descended(model, evaluations)
     jacobian, errors = model.jacobian(x), model.errors(x)
     weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
@@ -93,13 +97,14 @@ def problem(
     soc0: float | None,
     temperatures_degc: Mapping[str, float],
     physics: ModelName = "espm",
+    same_cell: bool = False,
 ) -> tuple[Model, tuple[str, ...]]:
     """What is fitted, and sentences on how it was set up."""
     if not records:
         raise DataError("give at least one record to calibrate with.")
     for record in records:
         check_voltage(cell, record)
-    start, notes = sized(cell, records)
+    start, notes = (cell, ()) if same_cell else sized(cell, records)
     kept = [one_branch(start, data) for data in records]
     placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
     start, typical = with_activation(start)
@@ -110,7 +115,7 @@ def problem(
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
     start = with_films(start)
-    model = Model(start, ready, free_parameters(start, span), Shapes.over(start, span), physics)
+    model = Model(start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), physics)
     starts = tuple(r.start.sentence for r in ready)
     return model, (*notes, *(n for _, more in kept for n in more), *told, *typical, *starts)
 

@@ -153,9 +153,7 @@ def undetermined(model: Model, jacobian: Array) -> tuple[Open, ...]:
             break
         vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
         order = np.argsort(-np.abs(vector))
-        heavy = [j for j in order if abs(vector[j]) > 0.3] or order[
-            :1
-        ].tolist()  # of many, none need stand out
+        heavy = [j for j in order if abs(vector[j]) > 0.3] or [order[0]]  # of many, none need stand out
         weights = tuple((model.free[j].name, float(vector[j])) for j in heavy)
         out.append(Open(weights, float(1.0 / np.sqrt(1.0 + max(value, 0.0)))))
     return tuple(out)

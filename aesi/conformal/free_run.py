@@ -1,7 +1,7 @@
 """Prediction bands of a free run by horizon, the time since the last measured voltage: CV+ over pieces of drives.
 
 Errors of a free run are autocorrelated over minutes, so the exchangeable unit is a piece of a drive and not a sample.
-The errors of piece i are normalised, |error| / s_i, by a scale that depends on current, state of charge, leverage and
+The errors of piece i are normalised, |error| / s_i, by a scale that depends on current, leverage and
 distance from the fitted states of charge (`local_scale`) and is fitted to the other pieces. The half-width k h at a
 sample solves
 
@@ -41,7 +41,7 @@ from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.records import ErrorSeries, FreeRun
 
-SCHEMA = "aesi.free_run_bands/4"
+SCHEMA = "aesi.free_run_bands/5"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,6 @@ class FreeRunBands:
         errors_by_horizon: Mapping[float, Sequence[Array]],
         dt_s: float,
         current_a: Sequence[Array],
-        soc: Sequence[Array],
         alpha: float = 0.1,
         inside: Sequence[BoolArray] | None = None,
         excess: Sequence[Array | None] | None = None,
@@ -74,7 +73,7 @@ class FreeRunBands:
         errors_by_horizon : horizon in s (WHOLE_DRIVE: from the start of the record) -> one (n_i,) array a
         continuous record, V, measured minus predicted at that sample from a measurement `horizon` earlier;
         NaN where there is no such prediction.  dt_s : s.
-        current_a, soc : one (n_i,) array a record, A and 1.
+        current_a : one (n_i,) array a record, A.
         inside : one (n_i,) array a record, True inside the trained range of the model that predicted; None for
         everywhere.
         excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it keeps no leverage.
@@ -84,10 +83,8 @@ class FreeRunBands:
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
-        beyond, apart = excess or [None] * len(soc), gap or [None] * len(soc)
-        columns = [
-            covariates(i, s, dt_s, x, g) for i, s, x, g in zip(current_a, soc, beyond, apart, strict=True)
-        ]
+        beyond, apart = excess or [None] * len(current_a), gap or [None] * len(current_a)
+        columns = [covariates(i, dt_s, x, g) for i, x, g in zip(current_a, beyond, apart, strict=True)]
         usable = inside or [np.ones(len(c), dtype=bool) for c in columns]
         bands = [
             calibrated_band(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s)
@@ -108,7 +105,7 @@ class FreeRunBands:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time.  reach_v : (n,) what to add to it, how far the
         prediction would move if the model went on beyond its trained range."""
-        columns = covariates(current_a, soc, dt_s, excess, self._gap(soc))
+        columns = covariates(current_a, dt_s, excess, self._gap(soc))
         return self._around(np.full(len(soc), horizon_s), columns, reach_v, temperature_degc)
 
     def along(
@@ -126,7 +123,7 @@ class FreeRunBands:
         whole drive.  reach_v : as for `at`.
         """
         elapsed = dt_s * np.arange(len(soc), dtype=np.float64)
-        columns = covariates(current_a, soc, dt_s, excess, self._gap(soc))
+        columns = covariates(current_a, dt_s, excess, self._gap(soc))
         return self._around(elapsed, columns, reach_v, temperature_degc)
 
     def intervals(

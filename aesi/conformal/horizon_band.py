@@ -19,12 +19,13 @@ WHOLE_DRIVE = math.inf
 """The horizon of a prediction from the start of a record to its end."""
 N_PIECES = 8
 """Records that hold more than an eighth of the usable rows are cut into pieces of about that length, so that each piece
-can be scored by a scale fitted to the others."""
+can be scored by a scale fitted to the others. Over the development splits of the NMC drive in `aesi bench splits`, with
+one term more in the scale, the bands of AESI I cover 97.9 % with 4, 90.6 % with 8, 82.2 % with 16."""
 MIN_PIECES = 3
 """Fewer pieces cannot say how much one differs from the next: where the rows inside the trained range make fewer, all
 rows are used and the band says so; where even these do, there is none."""
 MIN_ROWS = 30
-"""Rows from which a piece counts."""
+"""Rows from which a piece counts. With 10 or 100 no figure of those splits changes."""
 FORGOTTEN = 100
 """Errors this many horizons apart count as independent. A convention; with it the bands cover 90.1 % at 1 s and 91.0 %
 over a whole drive, nominal 90 %, on the 120 virtual cells of `aesi bench bands` (docs/theory/conformal.md)."""

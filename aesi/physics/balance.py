@@ -62,7 +62,8 @@ def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
     """State of charge in the windows of `aged` at which it rests where `declared` rests at `soc`.
 
     By the potentials of `aged` on both sides: an open-circuit potential that is off does not move a state of charge
-    that is known, and windows that are the same leave it the same. Beyond both ends of the new windows the nearer end.
+    that is known, and windows that are the same leave it the same. Beyond both ends of the new windows the nearer end;
+    where a potential that turns beyond its window rests there twice, the nearer to `soc`.
     """
     if _windows(declared) == _windows(aged):
         return soc
@@ -73,11 +74,13 @@ def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
         return float(aged.rest_voltage_v(z)[0]) - voltage
 
     low, high = aged_range(aged)
-    if excess(low) >= 0.0:
-        return low
-    if excess(high) <= 0.0:
-        return high
-    return float(brentq(excess, low, high, xtol=1e-13))
+    grid = np.linspace(low, high, GRID)
+    above = aged.rest_voltage_v(grid) >= voltage
+    crossed = np.flatnonzero(above[1:] & ~above[:-1])  # a rest voltage rises with the charge
+    if not len(crossed):
+        return low if above[0] else high
+    k = crossed[np.argmin(np.abs(grid[crossed] - soc))]
+    return float(brentq(excess, grid[k], grid[k + 1], xtol=1e-13))
 
 
 def aged_range(cell: Cell) -> tuple[float, float]:

@@ -33,13 +33,19 @@ from aesi.records import Hold, Measurement
 __all__ = ["Basis", "InitialState", "initial_state"]
 
 REST_C_RATE = 1.0 / 50.0
-"""Below this current a cell rests: the drop at C/50 is within what the potentials are uncertain by."""
+"""Below this current a cell rests: the drop at C/50 is within what the potentials are uncertain by. With half of it
+`aesi bench start --set cuts=16` reads all 48 rows the same. With twice, four loads more pass for rests, which it does
+not read worse: 1.32 points of charge RMS at rest and 1.27 under load, instead of 1.39 and 1.20."""
 MOVING_V = 4e-3
-"""A voltage that moves more than this over the rest before the current is not yet that of a rest. A convention."""
+"""A voltage that moves more than this over the rest before the current is not yet that of a rest. With half of it
+`aesi bench start --set cuts=16` reads all 48 rows the same; with twice, rests are off by 1.51 points RMS instead of
+1.39, and one of 48 states that were given right is contradicted instead of none."""
 OTHER_STATE = 0.05
 OTHER_STATE_LOADED = 0.15
 """A given state of charge further than this from that of a record's voltage is contradicted by it, at rest and under
-load. Conventions."""
+load. In `aesi bench start --set cuts=16`, of 48 states given right (within 2 points) and 48 given 20 points wrong, none
+of the right ones are contradicted and 65 % of the wrong ones; with half of both numbers 6 and 98 %, with twice 0 and
+40 %. What is right should not be contradicted. At rest all wrong ones are; those that pass start under load."""
 
 
 def initial_state(

@@ -33,7 +33,7 @@ class Request:
 
     temperatures_degc : by record name.  impedance : spectra to hold the result against.  posterior : steps of each
     walker, 0 for none.  title : name of the cell that is written.  model : that is fitted, "espm" or "dfn"; None takes
-    that of a saved model, else "espm".
+    that of a saved model, else "espm".  same_cell : the file is of this very cell, see there.
     """
 
     soc0: float | None = None
@@ -43,6 +43,7 @@ class Request:
     seed: int = 0
     title: str | None = None
     model: ModelName | None = None
+    same_cell: bool = False
 
 
 def calibrate_files(
@@ -62,6 +63,7 @@ def calibrate_files(
         soc0=asked.soc0,
         temperatures_degc=asked.temperatures_degc,
         physics=model,
+        same_cell=asked.same_cell,
     )
     name = declared.name if asked.title is None else asked.title
     described = replace(found.cell, name=name, description=_made_from(found), fitted_with=found.model.physics)

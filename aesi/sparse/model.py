@@ -109,8 +109,11 @@ class SparseModel:
         return self._ahead(self._drive(self._variables(series), series.soc), series.error_v, steps)
 
     def reach(self, series: ErrorSeries, steps: int | None = None, error0_v: float | None = None) -> Array:
-        """(n,) V, >= 0: how far a prediction would move if the terms went on beyond the trained range of the inputs
-        with the slope that they have at its edge; `steps` ahead (`k_step`), or None for a `free_run`."""
+        """(n,) V, >= 0: how much a prediction leaves open by holding inputs at the edge of their trained range.
+
+        It is how far the prediction would move if the terms went on beyond the edge with the slope they have there.
+        steps : of a prediction so far ahead (`k_step`), or None for a `free_run`.
+        """
         variables = self._variables(series)
         further = self.scaling.cut_off(variables)
         if not further[:, 1:].any():

@@ -240,7 +240,8 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, .
 
 
 WORSE_SHARE = 1.05
-"""The model that is written is said to do worse on the test part where it leaves so many times as much."""
+"""The model that is written is said to do worse on the test part where it leaves so many times as much. A convention,
+as in `decide.carry_over`; it decides a warning alone."""
 
 
 def _warnings(files: Sequence[FileOutcome]) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ BENCHMARKS = OF_THE_PACKAGE | {
     "cells": "flows.benchmarks.cells",
     "splits": "flows.benchmarks.splits",
     "real": "flows.benchmarks.real",
+    "left_out": "flows.benchmarks.left_out",
     "tracking": "flows.benchmarks.tracking",
     "scale": "flows.benchmarks.scale",
 }

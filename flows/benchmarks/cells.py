@@ -15,6 +15,7 @@ from aesi.bench.hybrid.splits import judged
 from aesi.bench.physics import cells as physics
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import read_experiment
+from flows.benchmarks.page import write_between
 from flows.benchmarks.splits import BLOCK_S, CHEAP, QUICK, search_and_fit
 
 EXPERIMENTS = {physics.NCR: "panasonic_ncr18650pf.yaml", physics.HG2: "lg_18650hg2.yaml"}
@@ -42,10 +43,7 @@ def run(
         rows.append(row)
         yield row
     if write is not None:
-        page = Path(write).read_text(encoding="utf-8")
-        before, after = page.split(BEGIN)[0], page.split(END)[1]
-        table = "\n".join(physics.table(rows[:-1]))
-        Path(write).write_text(f"{before}{BEGIN}\n{table}\n{END}{after}", encoding="utf-8")
+        write_between(write, BEGIN, END, physics.table(rows[:-1]))
 
 
 def _hybrid(experiments: Path, cell: str, record: str) -> dict[str, Any]:

@@ -17,6 +17,8 @@ from flows.tracking.store import KIND, Store
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
 """What tables show with the range over seeds."""
+COUNTED = ("diverged",)
+"""What runs have together: a mean of them would say nothing."""
 
 
 def tables_of(
@@ -63,6 +65,7 @@ def _mean_value(values: Sequence[Any]) -> Any:
     if isinstance(first, Mapping):
         keys = dict.fromkeys(key for value in present for key in value)
         mean = {key: _mean_value([value.get(key) for value in present]) for key in keys}
+        mean |= {key: sum(value.get(key) or 0 for value in present) for key in keys if key in COUNTED}
         spread = {key: _ends([value.get(key) for value in present]) for key in keys if key in RANGED}
         return mean | ({"spread": spread} if spread else {})
     if isinstance(first, (int, float)) and not isinstance(first, bool):
@@ -128,9 +131,11 @@ def _footer(name: str, runs: Sequence[Any], format: str) -> str:
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {ids}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
-    note = runs[0].data.tags.get("mlflow.note.content", "")
-    if note:
-        text = f"{text} {note.rstrip('.')}."
+    about = (runs[0].data.tags.get("mlflow.note.content", "").splitlines() or [""])[
+        0
+    ]  # below: what came of that run
+    if about:
+        text = f"{text} {about.rstrip('.')}."
     for run in runs:
         if "aesi.fallback" in run.data.tags:
             text = f"{text} {run.data.tags['aesi.fallback']}"

@@ -115,16 +115,10 @@ class PublishedStudy:
             "free run on validation, MSER in %": one.free_run_valid_mser_pct,
             "coverage on validation, %": outcome.coverage_pct,
         }
-        needed = self._constraints
         return create_trial(
             values=list(one.losses),
             user_attrs=noted,
-            constraints={
-                f"correlation on training above {needed.pearson_train:g}": needed.pearson_train
-                - one.pearson_train,
-                f"correlation on validation above {needed.pearson_valid:g}": needed.pearson_valid
-                - one.pearson_valid,
-            },
+            constraints=self._constraints.violations(one),
             **common,
         )
 

@@ -106,7 +106,8 @@ def run_study(
         done, total = len(scored), config.search.candidates
         if on_generation is not None and (done % config.search.population == 0 or done == total):
             on_generation(done, total)
-        console.progress("candidates", len(scored), config.search.candidates, started, _best(scored))
+        told = _best(scored, constraints)
+        console.progress("candidates", len(scored), config.search.candidates, started, told)
 
     try:
         result = search(
@@ -154,6 +155,7 @@ def study_key(problem: Problem, config: ExperimentConfig) -> str:
     )
 
 
-def _best(scored: dict[int, ScoredCandidate | Failed]) -> str:
-    values = [one.candidate.fitness for one in scored.values() if isinstance(one, ScoredCandidate)]
-    return f"best fitness {max(values):.3f}" if values else "none feasible yet"
+def _best(scored: dict[int, ScoredCandidate | Failed], constraints: Constraints) -> str:
+    candidates = [one.candidate for one in scored.values() if not isinstance(one, Failed)]
+    values = [one.fitness for one in candidates if max(constraints.violations(one).values()) <= 0.0]
+    return f"best fitness {max(values):.3f}" if values else "none meets the constraints yet"

@@ -41,20 +41,23 @@ DISCOVERY_COLUMNS = (
     "metrics.`confidence`",
 )
 HOW_TO_READ = (
-    "A run is one `aesi run`; below it are its candidates (the one that the models come from is tagged `aesi.chosen`) "
-    "and its final models. `free_run/` is without any measured voltage after the first sample, `one_step/` and "
-    "`intervals/` are one step ahead. Sort candidates by `free_run/valid_mser_pct`: selection never meets the test "
-    "records."
+    "A run is one `aesi run`, and the table lists those alone: it loads a hundred rows at a time, which one run's "
+    "candidates would fill. With the filter ``tags.`aesi.kind` = 'candidate'`` it lists candidates (the one that the "
+    "models come from is tagged `aesi.chosen`), with `'model'` the final models. `free_run/` is without any measured "
+    "voltage after the first sample, `one_step/` and `intervals/` are one step ahead. Sort candidates by "
+    "`free_run/valid_mser_pct`: selection never meets the test records."
 )
 HOW_TO_READ_DISCOVERIES = (
-    "A run is one `aesi discover`; below it are the hypotheses that were fitted, with what each says of unseen data "
-    "(`gain_nats`). `finding` is the verdict in a line; the report is among the artifacts."
+    "A run is one `aesi discover`, and the table lists those alone; without the filter it also lists the hypotheses "
+    "that were fitted, with what each says of unseen data (`gain_nats`). `finding` is the verdict in a line; the "
+    "report is among the artifacts."
 )
+WHOLE_RUNS = "tags.`aesi.kind` = 'run'"
 
 
 def experiment_tags(note: str, columns: Sequence[str]) -> dict[str, str]:
-    """Tags of an experiment: its description in Markdown, its kind, and the view that shows the columns."""
-    state = {"selectedColumns": list(columns)}
+    """Tags of an experiment: its description in Markdown, its kind, and the view that shows whole runs' columns."""
+    state = {"selectedColumns": list(columns), "searchFilter": WHOLE_RUNS}
     return {NOTE: note, f"mlflow.sharedViewState.{VIEW}": json.dumps(state), **KIND_OF_EXPERIMENT}
 
 

@@ -19,7 +19,7 @@ NEAR_SHARE = 0.15
 HALVED = 0.5
 """Of the recalibrated error."""
 WORSE = 1.05
-"""Of the declared error."""
+"""Of the declared error; as where the tracer warns."""
 NO_ANSWER = ("error", "out of time")
 SOC0 = "wrong_soc0"
 

@@ -37,12 +37,12 @@ DOUBLE_LAYERS = {side: f"{side} electrode double-layer capacity [F.m-2]" for sid
 class Electrode:
     """A porous electrode of one active material.
 
-    Lengths in m, concentrations in mol/m3, diffusivity in m2/s at stoichiometry x, open-circuit potential in
-    V against Li/Li+, entropic coefficient in V/K, effective solid conductivity in S/m, rate constant in
-    mol/(m2 s) so that the exchange current density is F K f(x) sqrt(c_e/c_e0 x (1 - x)) with f the rate factor at
-    stoichiometry x, activation energies in J/mol, capacity of the double layer in F per m2 of reactive surface,
-    resistance of the film between the reaction and the electrolyte in ohm m2 of reactive surface at stoichiometry x
-    and the reference temperature.
+    Relations are of the stoichiometry x, at the reference temperature.
+    ocp : V against Li/Li+.  entropic : V/K.  diffusivity : m2/s.  conductivity_s_m : effective, of the solid.
+    rate_constant K, rate_factor f : mol/(m2 s) and 1; the exchange current density is
+    F K f(x) sqrt(c_e / c_e0 x (1 - x)).
+    film_ohm_m2 : ohm m2 of reactive surface, between reaction and electrolyte.
+    double_layer_f_m2 : F per m2 of reactive surface.
     """
 
     thickness_m: float
@@ -99,11 +99,11 @@ class Electrolyte:
 class CellParameters:
     """Everything a simulation needs to know about a cell; `aesi.Cell` adds how it is read and written.
 
-    Area in m2 of one electrode pair, temperatures in K, heat capacity in J/K (None where the file has no thermal data),
-    contact resistance in ohm in series with the whole cell; it is that of metal, the same at any temperature.
-    fitted_with : the model whose parameters these are,
-    "espm" or "dfn", where they were fitted.  capacity_shares : (record, share of this capacity that the cell had then)
-    of the records that they were fitted to.
+    electrode_area_m2 : of one electrode pair.
+    density_kg_m3 to heat_transfer_w_m2_k : None where the file has no thermal data.
+    contact_resistance_ohm : in series with the whole cell; that of metal, the same at any temperature.
+    fitted_with : "espm" or "dfn", the model that the parameters were fitted with, where they were.
+    capacity_shares : (record, share of this capacity that the cell had then), of the records of that fit.
     """
 
     negative: Electrode

@@ -1,7 +1,7 @@
 """Compiled Newton direction of the reaction at all places; see `reaction_kernels` for the equations."""
 
 from aesi.physics.dfn.local_kernels import salt_logarithm
-from aesi.physics.espm.electrode_kernels import bounded_exp
+from aesi.physics.espm.interface_kernels import bounded_exp
 from aesi.physics.espm.kernels import compiled
 
 UPDATE_TOLERANCE_V = 5e-5

@@ -4,7 +4,7 @@ import math
 
 from numba import njit
 
-from aesi.physics.espm.electrode_kernels import overpotential
+from aesi.physics.espm.interface_kernels import overpotential
 from aesi.physics.espm.kernels import BEYOND_RANGE_V, FASTMATH, SMALLEST_OCCUPANCY
 
 SMALLEST_SLOPE = 1e-3
@@ -56,24 +56,13 @@ def occupancy(theta):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def rate_course(rate, side, theta):  # type: ignore[no-untyped-def]
-    """Factor of the rate constant at a surface stoichiometry, and the slope of its logarithm."""
-    last = rate.shape[1] - 1
+def value_and_slope(table, side, theta):  # type: ignore[no-untyped-def]
+    """Of an electrode's row of a table over stoichiometry: its value at a surface stoichiometry, and its slope."""
+    last = table.shape[1] - 1
     s = min(max(theta, 0.0), 1.0) * last
     i = min(int(s), last - 1)
-    step = rate[side, i + 1] - rate[side, i]
-    value = rate[side, i] + (s - i) * step
-    return value, step * last / value
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def film_course(film, side, theta):  # type: ignore[no-untyped-def]
-    """Ohm m2 of the film at a surface stoichiometry, and its slope."""
-    last = film.shape[1] - 1
-    s = min(max(theta, 0.0), 1.0) * last
-    i = min(int(s), last - 1)
-    step = film[side, i + 1] - film[side, i]
-    return film[side, i] + (s - i) * step, step * last
+    step = table[side, i + 1] - table[side, i]
+    return table[side, i] + (s - i) * step, step * last
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -89,15 +78,16 @@ def unit_potential(e, side, exchange, film, surface, give, y, s, thermal, rise):
     """Potential of a unit at a current y, its slope in y and in the salt s, the kinetic part of the slope, and the
     exchange current as it is there.  film : factor on the film's ohm m2, of temperature over reactive surface."""
     room, d_room = occupancy(surface)
-    quicker, d_quicker = rate_course(e.rate, side, surface)
+    quicker, d_quicker = value_and_slope(e.rate, side, surface)
     scale = exchange * quicker * math.sqrt(s * room)
     eta, d_eta = kinetic_drop(y, scale, e.alpha[side], thermal)
     level, falls = equilibrium(e.ocp, e.entropic, side, rise, surface)
-    ohm, d_ohm = film_course(e.film, side, surface)
+    ohm, d_ohm = value_and_slope(e.film, side, surface)
     moved = -0.5 * y * d_eta  # with the logarithm of the salt, or of the occupancy, in the exchange current
     resistance = film * ohm
     slope = d_eta + resistance
     slope = max(
-        slope - give * (falls + moved * (d_room + 2.0 * d_quicker) + film * d_ohm * y), SMALLEST_SLOPE * slope
+        slope - give * (falls + moved * (d_room + 2.0 * d_quicker / quicker) + film * d_ohm * y),
+        SMALLEST_SLOPE * slope,
     )
     return level + eta + resistance * y, slope, moved / s, d_eta, scale

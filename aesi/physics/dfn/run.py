@@ -10,7 +10,7 @@ from aesi.numerics.modes.galerkin import gauss_lobatto
 from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
-from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS
+from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS, Drive
 from aesi.physics.model import EspmModel
 from aesi.records import Hold
 
@@ -43,11 +43,12 @@ def run_porous_electrode(
     kept = 0 if profiles is None else len(time)
     profile = np.zeros((kept, 4, len(electrodes.node_share)))
     salt_profile = np.zeros((kept, len(stack.to_nodes)))
+    substep_s = LONGER_STEPS * model.substep_s
+    drive = Drive(time, current, kelvin, given, hold == "backward", substep_s, model.most_substeps)
+    theta0 = np.array(model.cell.stoichiometries(soc0))
     fault_at, fault = run_porous(
-        time, current, kelvin, given, hold == "backward", LONGER_STEPS * model.substep_s, model.most_substeps,
-        np.array(model.cell.stoichiometries(soc0)), particles, stack, electrodes, state, trial, newton, weights,
-        out, profile, salt_profile,
-    )  # fmt: skip
+        drive, theta0, particles, stack, electrodes, state, trial, newton, weights, out, profile, salt_profile
+    )
     extra = {"temperature_k": out[7]}
     if model.negative.plating is not None:
         extra["plated_mol_m3"] = out[8]

@@ -15,7 +15,7 @@ from aesi.physics.dfn.diffusion_kernels import (
     salt_forcing,
 )
 from aesi.physics.dfn.reaction_kernels import solve_reaction
-from aesi.physics.espm.electrode_kernels import end_weight
+from aesi.physics.espm.interface_kernels import end_weight
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup
 from aesi.physics.espm.transport_kernels import solid_forcing
 
@@ -32,6 +32,7 @@ LARGEST_GROWTH = 4.0
 @compiled
 def take_back(state, t):  # type: ignore[no-untyped-def]
     """The start of a step whose end was not found: `commit` alone changes the rest of the state."""
+    t.total[0], t.total[1] = t.before[0], t.before[1]
     for u in range(state.y.shape[0]):
         state.y[u] = t.y_back[u]
     for r in range(state.given.shape[0]):
@@ -73,11 +74,12 @@ def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-un
 
 @compiled
 def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
-    """Double layers over a step as a conductance and a current; exact for one that relaxes by its own kinetics, as
-    they are at the start of the step: what the last solution left as the conductance of each place.
+    """Double layers over a step, each as a conductance `t.layer_c` and a current `t.layer_old`.
 
-    What a layer takes falls off faster than straight within a step, and the particles get the rest: `t.lag` is how much
-    more than a straight line from their current at the start, as a current at the start.
+    That is exact for a layer that relaxes by its own kinetics as they are at the start of the step: the conductance
+    that the last solution left at each place.
+    What a layer takes falls off faster than a straight line, and the particles get the rest. `t.lag` is what they get
+    beyond a straight line, as a current at the start of the step.
     """
     for r in range(e.capacity.shape[0]):
         kinetic = newton.conductance[r] - t.layer_c[r]
@@ -93,15 +95,15 @@ def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
 
 @compiled
 def advance(  # type: ignore[no-untyped-def]
-    p, s, e, state, t, newton, faster, dt, last_dt, w, taken, w_salt, spread, total, change, t_k,
-    last_try,
-):  # fmt: skip
-    """One step to the currents `total` (2,), which changed by `change` (2,); temperature t_k at its end.
+    p, s, e, state, t, newton, weights, slot, dt, last_dt, t_k, last_try
+):
+    """One step to the currents t.total, which changed by t.change; temperature t_k at its end.
 
-    last_dt : of the step before, 0 after a jump.  last_try : take the step although it solves nothing.
-    Returns as `solve_reaction`.
+    weights, slot : those of the step's length.  last_dt : of the step before, 0 after a jump.
+    last_try : take the step although it solves nothing.  Returns as `solve_reaction`.
     """
-    extrapolate(p, s, e, state, t, dt, last_dt, taken, change)
+    faster, w, w_salt, spread = t.faster, weights.particle[slot], weights.salt[slot], weights.spread[slot]
+    extrapolate(p, s, e, state, t, dt, last_dt, weights.taken[slot], t.change)
     varies = p.strength[0] > 0.0 or p.strength[1] > 0.0
     if varies:
         calm_particles(p, state, t, faster, dt, w)
@@ -110,7 +112,7 @@ def advance(  # type: ignore[no-untyped-def]
     for _ in range(PASSES):
         calm_salt(s, state, t, faster[2], w_salt)
         calm_particles(p, state, t, faster, dt, w)
-        phi_n, phi_p, steps = find_reaction(p, s, e, state, t, newton, spread, total, t_k)
+        phi_n, phi_p, steps = find_reaction(p, s, e, state, t, newton, spread, t.total, t_k)
         end_salt(s, t, state.given, w_salt)
         if s.strength > 0.0:
             salt_forcing(s, t.c, t.forcing)
@@ -124,7 +126,7 @@ def advance(  # type: ignore[no-untyped-def]
         if settled:
             break
     if steps > 0 or last_try:
-        commit(p, s, e, state, t, dt, w, change, varies)
+        commit(p, s, e, state, t, dt, w, t.change, varies)
     return phi_n, phi_p, steps
 
 

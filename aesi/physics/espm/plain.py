@@ -11,7 +11,8 @@ from aesi.numerics.modes.galerkin import StackModes, sphere_modes, stack_modes
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.relations import Constant, Relation, Scaled, Sum
-from aesi.physics.espm.layout import CACHE_SLOTS, PlainCell, PlainMemory, PlainSalt, PlainSolid
+from aesi.physics.espm.layout import CACHE_SLOTS
+from aesi.physics.espm.plain_layout import PlainCell, PlainMemory, PlainSalt, PlainSolid
 from aesi.physics.espm.tables import conductivity_table, electrolyte_diffusion, ocp_table
 from aesi.physics.model import EspmModel
 from aesi.records import Hold

@@ -28,7 +28,7 @@ from aesi.physics.espm.layout import CACHE_SLOTS
 def run_linear(time, current, backward, theta0, solid, salt, cell, memory, out):  # type: ignore[no-untyped-def]
     """Step all samples; the rows of `out`, (7, n), are those of `plain.run_plain`.
 
-    theta0 : (2,) stoichiometries at rest.  solid, salt, cell, memory : see `layout`.
+    theta0 : (2,) stoichiometries at rest.  solid, salt, cell, memory : see `plain_layout`.
     Returns the first sample at which a surface (1 negative, 2 positive) or the electrolyte (3) left its range.
     """
     c = memory.c

@@ -2,10 +2,12 @@
 
 import math
 
+import numpy as np
 from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights, wet
+from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, compiled, lookup, step_weights, wet
+from aesi.physics.espm.layout import CACHE_SLOTS
 
 TEMPERATURE_STEP_K = 0.01
 """Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
@@ -164,3 +166,65 @@ def heated(t_k, watts, dt, heat):  # type: ignore[no-untyped-def]
         return t_k + watts * dt / heat[0]
     settled = heat[2] + watts / heat[1]
     return settled + (t_k - settled) * math.exp(-heat[1] * dt / heat[0])
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def renew_rates(t_k, t_weights, cell, modes):  # type: ignore[no-untyped-def]
+    """Factors of temperature on diffusion, where it has moved since `t_weights`; returns that of which they are now."""
+    if abs(t_k - t_weights) <= TEMPERATURE_STEP_K:
+        return t_weights
+    modes.keys.fill(-1)
+    for i in range(3):
+        modes.faster[i] = arrhenius(cell.energies[DIFFUSIONS[i]], t_k, cell.reference_k)
+    return t_k
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def slot_of(dt, particles, electrolyte, modes):  # type: ignore[no-untyped-def]
+    """Where the weights of a step of this length stand; they are made where they do not."""
+    key = np.int64(dt * NANOSECONDS + 0.5)
+    slot = key % CACHE_SLOTS
+    if modes.keys[slot] != key:
+        modes.keys[slot] = key
+        renew_weights(
+            dt,
+            modes.faster,
+            particles.place,
+            particles.rates,
+            electrolyte.rates,
+            modes.w[slot],
+            modes.w_e[slot],
+        )
+    return slot
+
+
+@compiled
+def diffuse(  # type: ignore[no-untyped-def]
+    j0, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved
+):
+    """Salt and particles over a step of the cell's current density from j0 to j1, last deviations as they were.
+
+    last_step : of the step before, 0 for the first.
+    """
+    ahead = dt / last_step if last_step > 0.0 else 0.0
+    step_electrolyte(
+        j0, j1, memory.deviation, ahead, modes.faster[2], electrolyte, modes.w_e[slot], dissolved
+    )
+    scratch = modes.nodes, modes.force, modes.force_end
+    for u in range(modes.means.shape[0]):
+        side = particles.place[u, 0]
+        nominal = particles.share[u] if side == 0 else -particles.share[u]
+        modes.means[u], memory.give[u] = step_particle(
+            u, modes.means[u], modes.z[u], nominal * j0, nominal * j1, dt, modes.faster[side], particles,
+            modes.w[slot, u], scratch,
+        )  # fmt: skip
+
+
+@njit(inline="always", fastmath=FASTMATH)
+def predict(memory, modes):  # type: ignore[no-untyped-def]
+    """Surface stoichiometries if each unit carries its share."""
+    for u in range(modes.means.shape[0]):
+        surface = modes.means[u]
+        for j in range(modes.z.shape[1]):
+            surface += modes.z[u, j]
+        memory.pred[u] = surface

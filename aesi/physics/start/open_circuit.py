@@ -19,7 +19,9 @@ READING_V = 3e-3
 CHARGED_V = 0.03
 """How far a full cell's voltage falls at rest: 6 to 30 mV in the charged records of four measured cells."""
 BEYOND_V = 0.05
-"""A voltage this far beyond the declared full or empty still belongs to a full or an empty cell of this kind."""
+"""A voltage this far beyond the declared full or empty still belongs to a full or an empty cell of this kind. A
+convention: with half or twice as much `aesi bench start --set cuts=16` refuses none of 48 rows, and what it is to
+refuse, cells of another chemistry, lies hundreds of millivolts off."""
 GRID = 4001
 """States of charge at which potentials are looked up."""
 

@@ -104,7 +104,9 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
     }
     if job.specimen:
         calibrated = folder / "calibrated.bpx.json"
-        report = calibrate_files(job.cell, case.measurements, calibrated, Request(soc0=job.soc0))
+        report = calibrate_files(
+            job.cell, case.measurements, calibrated, Request(soc0=job.soc0, same_cell=True)
+        )
         for name, estimate in report["health"].items():
             row |= {name: estimate["value"], f"{name}_low": estimate["low"], f"{name}_high": estimate["high"]}
     return row | {"seconds": round(time.monotonic() - started, 1)}

@@ -75,9 +75,9 @@ def training_drives(
 def cuts(data: DataConfig) -> int:
     """Into how many parts a training drive is cut to be left out in turn.
 
-    Repeats of one record lie side by side in the state of charge. A test repeat lies between two of training, half a
-    repeat from either at most, and so does half a repeat from its other half; without a whole one, three repeats are
-    missing in a row, which asks for more than the test.
+    In two for repeats of one record, which lie side by side in the state of charge. A test repeat lies between two
+    repeats of training, so that no row of it is further than half a repeat from trained ones; that is as far as half a
+    training repeat is from its other half. To leave out whole repeats would ask for more than the test does.
     """
     return 2 if data.repeats is not None else 1
 

@@ -57,7 +57,7 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
         best=search.top_share,
         horizon=search.horizon,
         fold=search.fold,
-        cuts=cuts(config.data),
+        cuts=cuts(loaded.config.data),  # a fallback has drives of its own
         regime=search.regime,
         feedback=library.feedback,
         fade=library.fade,

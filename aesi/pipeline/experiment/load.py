@@ -62,8 +62,9 @@ class Loaded:
 def load(config: ExperimentConfig) -> Loaded:
     """Measurements, simulated and subtracted, by role.
 
-    Raises ConfigError or DataError naming the file and what to do; with a `fallback` section, data that cannot be
-    had are replaced by it, a note says so, and what the experiment says of itself, which is of those data, is left out.
+    With a `fallback` section, data that cannot be had are replaced by it. A note says so, and the experiment's own
+    note, which is about the data that were asked for, is left out.
+    Raises ConfigError or DataError naming the file and what to do.
     """
     if not config.data.has_roles:
         raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")

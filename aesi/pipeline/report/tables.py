@@ -74,7 +74,7 @@ def method_table(models: Sequence[Row]) -> Table:
     caption = (
         "Prediction intervals on the test set by method, calibrated on the same residuals. Regime: one step ahead, "
         "the measured voltage of the step before is given. Low minutes: minute-long windows with under 70 % coverage. "
-        f"{OWN_METHOD.capitalize()}: the method of the experiment, repeated from there."
+        f"Rows {OWN_METHOD} are of the experiment's own method."
     )
     return _table("interval-methods", caption + _brackets(models), _interval_columns("by_method"), rows)
 
@@ -189,7 +189,8 @@ def _test_mser(row: Row) -> str:
 def _ranged(row: Row, group: str, key: str) -> str:
     """A number to two digits with its range over seeds, where the row is of several."""
     text, ends = _number(row, f"{group}.{key}", 2), _find(row, f"{group}.spread.{key}")
-    return text if ends is None else f"{text} [{ends[0]:.2f}, {ends[1]:.2f}]"
+    low, high = ("", "") if ends is None else (_formatted(end, 2) for end in ends)
+    return text if low == high else f"{text} [{low}, {high}]"
 
 
 def _k_step_cell(horizon: str) -> Callable[[Row], str]:

@@ -99,8 +99,8 @@ class Problem:
     counts : (resamples, n) how often each resample holds a row.
     nearness : (n,) what is left of a correction at each row that was fitted without its fold (trained_region.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
-    factors : (resamples, any, m + 1), fold_factors likewise, and full_factor (any, m + 1): F with
-    F' F = [Theta y]' W [Theta y], W the row weights times the counts; y is the target, or of a fold its own.
+    factors : (resamples, any, m + 1), and fold_factors likewise.  full_factor : (any, m + 1).
+    A factor is an F with F' F = [Theta y]' W [Theta y]; W is row_weights times counts, y the target (or a fold's).
     notes : what was left out of the library, and why, one sentence each.
     """
 
@@ -173,9 +173,8 @@ class Problem:
         region = TrainedRegion.of(rows[:, 1:], soc)
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         error = np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train])
-        if (
-            options.fold is not None or options.feedback
-        ):  # the folds are no drives, or the terms hold the error
+        drives_left_out = options.fold is None and len(left_out) == len(cut)
+        if not drives_left_out or options.feedback:  # pieces of a single record, or terms that hold the error
             left_out = ()
         unseen = unseen_errors(left_out, scaling, error, target, cut)
         m = len(library)

@@ -20,8 +20,8 @@ STATE_OF_CHARGE = "soc0"
 """Owner of the parameters that shift a record's initial state of charge."""
 FURTHEST_SDS = 4.0
 """An own parameter may not leave this many of its standard deviations."""
-BOUND_SHARE = 0.02
-"""Share of the range next to a bound that counts as the bound."""
+TINY = 1e-6
+"""Of a standard deviation of the prior: closer to a bound is on it."""
 
 
 @dataclass(frozen=True)
@@ -75,9 +75,8 @@ class FreeParameter:
         if self.own or not (self.amplitude or self.log):
             return False
         low, high = self.bounds
-        near = BOUND_SHARE * (high - low)
-        below = x - low < near and abs(low) > near and not self.low_is_limit
-        return below or (high - x < near and abs(high) > near)
+        below = x - low < TINY and abs(low) > TINY and not self.low_is_limit
+        return below or (high - x < TINY and abs(high) > TINY)
 
 
 def of_effect(effect: str, parameters: Mapping[str, Parameter], capacity_ah: float) -> list[FreeParameter]:
@@ -100,8 +99,10 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
 
 
 def _expected(p: Parameter, capacity_ah: float) -> float | None:
-    """Standard deviation of how far a parameter under test is from where it does nothing, None where that is not known:
-    of contacts, and of what every cell file declares, how far files of other cells of its make are off."""
+    """Standard deviation of how far a parameter under test is from where it does nothing, None where that is not known.
+
+    Of contacts, and of what every cell file declares, it is how far files of other cells of its make are off.
+    """
     if p.spread is not None and p.spread.loose is not None and p.neutral is not None:
         if p.spread.ohmic:
             return p.spread.loose / capacity_ah

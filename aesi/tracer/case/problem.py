@@ -37,7 +37,8 @@ INDEPENDENT_S, INDEPENDENT_CHARGE = 200.0, 0.05
 45 to 670 s on eight development records of `aesi bench real`, geometric mean 140 s about the mean and 260 s about
 nought; over charge 1 to 18 %."""
 EXACT_SHARE = 0.1
-"""Of the tight spread of a declared parameter, where the file is believed exactly."""
+"""Of the tight spread of a declared parameter, where the file is believed exactly. A convention: not nought, so that
+what the numerics round off is no evidence for an effect."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""

@@ -19,7 +19,8 @@ from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 
 WORSE = 1.05
-"""A hypothesis may leave so much more than the better of the declared and the recalibrated model on a part left out."""
+"""A hypothesis may leave so much more than the better of the declared and the recalibrated model on a part left out. A
+convention: within 5 % two models do as well."""
 ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)
 """Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""

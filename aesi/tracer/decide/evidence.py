@@ -27,18 +27,15 @@ from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import ALIKE_NATS, base_of
+from aesi.tracer.search.fitted import base_of
 from aesi.tracer.search.forward import refitted, searched
 from aesi.tracer.search.path import Path, Report, unseen_rmse_v
+from aesi.tracer.search.plausible import most_plausible
 from aesi.tracer.search.wrong_parameters import with_wrong_parameters
 
-AS_DECLARED_NATS = 5.0
-"""Own parameters as declared are believed where freeing them says no more than this."""
 MEASURED_EFFECTS = 1
 """Named beside `unknown`: what is left after one is mostly no larger than what models of measured cells leave, and of
 eight second names on development records of `aesi bench real` one was right. From the written model one can look on."""
-AS_MUCH_NATS = 0.5
-"""Two hypotheses within this of each other say as much of unseen data."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +89,13 @@ def gathered(
         if wrong is not path:
             path, verdict = wrong, judged(wrong, thresholds)
     if verdict.word == "found":
-        path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
         path, verdict = _with_one_cause(path, verdict, archive, thresholds)
+        path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
     elif verdict.word == "none" and not _as_declared(replace(problem, trust="exact"), path, archive):
         exact = path_of("exact")
-        path, verdict = _believed(exact, judged(exact, thresholds), path, verdict)
+        found = exact, judged(exact, thresholds)
+        if believed((path, verdict), found):
+            path, verdict = found
     recalibrated = _recalibrated(problem, paths["tight"], archive)
     if verdict.word != "unknown":
         return _adopted(path, paths, _with_confidence(verdict), recalibrated)
@@ -119,24 +118,22 @@ def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks
     return enough
 
 
-def _believed(exact: Path, first: Verdict, tight: Path, second: Verdict) -> tuple[Path, Verdict]:
-    """Which of two searches is to be believed: one that explains the data before one that does not, then the one that
-    says more; where both say as much, the one with the larger marginal likelihood, of an effect less the logarithm of
-    how many might have been named: an effect with all else as declared, or own parameters that all moved a little."""
-    if (first.word == "unknown") != (second.word == "unknown"):
-        return (tight, second) if first.word == "unknown" else (exact, first)
-    one, other = exact.chosen.score, tight.chosen.score
-    ahead = one.total - other.total
-    if abs(ahead) < ALIKE_NATS:
-        more_names = len(exact.chosen.hypothesis) - len(tight.chosen.hypothesis)
-        ahead = one.evidence - other.evidence - more_names * np.log(len(exact.problem.competing()))
-    return (exact, first) if ahead > 0.0 else (tight, second)
+def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
+    """Is the second of two searches believed rather than the first? One that explains the data before one that does
+    not, then by what they chose."""
+    unknown = [verdict.word == "unknown" for _, verdict in (one, other)]
+    if unknown[0] != unknown[1]:
+        return unknown[0]
+    chosen = other[0].chosen
+    return most_plausible([one[0].chosen, chosen], len(one[0].problem.competing())) is chosen
 
 
 def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:
-    """Does the model say as much with its parameters all but as declared? Then no effect can stand in for them."""
+    """Is the model with its parameters all but as declared the more plausible one? Then no effect can stand in for what
+    they were moved by."""
     base = base_of(exact, blocks_of(exact), archive)
-    return base is not None and base.score.total > tight.chosen.score.total - AS_DECLARED_NATS
+    fits = [tight.chosen] if base is None else [tight.chosen, base]
+    return most_plausible(fits, len(exact.competing())) is base
 
 
 def _sharpened(
@@ -145,7 +142,9 @@ def _sharpened(
     """The same finding with the own parameters believed exactly, where that says as much of unseen data."""
     exact = replace(problem, trust="exact")
     found = refitted(exact, path, archive)
-    if found is None or found.chosen.score.total < path.chosen.score.total - AS_MUCH_NATS:
+    if found is None:
+        return path, verdict
+    if most_plausible([path.chosen, found.chosen], len(problem.competing())) is path.chosen:
         return path, verdict
     left, allowed = structured_v(found, found.chosen), tolerance_v(noise_v(found), thresholds)
     return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
@@ -170,8 +169,11 @@ def _with_confidence(verdict: Verdict) -> Verdict:
 def _recalibrated(
     problem: InverseProblem, tight: Path, archive: Archive
 ) -> tuple[InverseProblem, FittedHypothesis] | None:
-    """The declared model with its own parameters open as far as that carries over: of the fits that do no worse than
-    the declared ones on what they saw, the one that leaves least on parts left out; None where there is none."""
+    """The declared model with its own parameters open as far as that carries over.
+
+    Of the fits that do no worse than the declared parameters on what they saw, it is the one that leaves least on parts
+    left out; None where there is none.
+    """
     loose = replace(problem, trust="loose")
     base = base_of(loose, blocks_of(loose), archive)
     open_wide = [] if base is None else [(loose, base)]
@@ -213,8 +215,11 @@ def _best_carried(
     verdict: Verdict,
     recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
 ) -> Evidence:
-    """Nothing explains the data: what was named all the same, or else the model that leaves least on parts left out; if
-    it can be simulated over the declared range and is no worse on any part than the declared and recalibrated ones."""
+    """What is written where nothing explains the data: what was named all the same, or else what leaves least.
+
+    Least on parts left out. Either has to run over the declared range, and to be no worse on any part than the declared
+    and the recalibrated model.
+    """
     declared = Option(ModelState(path.problem), left_out_errors(path.problem, path.blocks, None), None)
     basic = [declared]
     other = declared.state

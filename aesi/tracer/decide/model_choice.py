@@ -1,10 +1,10 @@
 """Single particle or porous electrode: settled before an effect is blamed on the cell.
 
 Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
-not where the single particle cannot explain the data and the fuller one, with the same effects, leaves as much: what is
-missing is something else then, and a search takes ten times as long.
-What was measured may still be a single particle's (a thin electrode, a file made with one): where that says more of
-the data as declared, it is kept if it explains them to the noise and says more there as well.
+not where the single particle cannot explain the data and the fuller one says no more, with no effects, and leaves as
+much with the same ones: what is missing is something else then, and a search takes ten times as long.
+What was measured may still be a single particle's (a thin electrode, a file made with one): what the two searches end
+with is weighed as any two hypotheses are.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
-from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
-from aesi.tracer.decide.evidence import Evidence
+from aesi.tracer.decide.evidence import Evidence, believed
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis
 from aesi.tracer.search.forward import HOPELESS_SHARE
 from aesi.tracer.search.path import Path, beyond_noise
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
@@ -60,15 +60,21 @@ def with_model(
     if reduction is None or not reduction.notable:
         return told(first, "espm")
     full = fine("dfn")
-    if first.verdict.word == "unknown" and not _takes_off(full, first.paths["tight"], kept):
-        return told(first, "espm", ", what it leaves is not taken off by the other one")
+    tight = first.paths["tight"]
+    if first.verdict.word == "unknown" and not (
+        _says_more(full, tight, kept) or _takes_off(full, tight, kept)
+    ):
+        return told(first, "espm", ", what it leaves the other one leaves as well")
     second = search(full, kept(full))
-    if _believed(first, second) and _says_more(single, full, kept):
-        ahead = first.path.chosen.score.total - second.path.chosen.score.total
-        return told(
-            first, "espm", f", which explains these data to the noise and says {ahead:.0f} nats more of them"
-        )
+    if believed((second.path, second.verdict), (first.path, first.verdict)):
+        return told(first, "espm", ", with which less or more usual things have to be missing")
     return told(second, "dfn")
+
+
+def _says_more(full: InverseProblem, path: Path, kept: Kept) -> bool:
+    """Does the porous electrode say more of unseen data with nothing but its own parameters moved?"""
+    base = base_of(full, path.blocks, kept(full))
+    return base is not None and base.score.total > path.base.score.total + ALIKE_NATS
 
 
 def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
@@ -82,20 +88,3 @@ def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
     return beyond_noise(full, path.blocks, fit) < HOPELESS_SHARE * beyond_noise(
         path.problem, path.blocks, chosen
     )
-
-
-def _believed(single: Evidence, full: Evidence) -> bool:
-    """Does the single particle explain the data, and with less, or say more of them where both do?"""
-    if single.verdict.word == "unknown":
-        return False
-    chosen, other = single.path.chosen, full.path.chosen
-    says_more = chosen.score.total > other.score.total
-    return says_more or len(chosen.hypothesis) < len(other.hypothesis) or full.verdict.word == "unknown"
-
-
-def _says_more(single: InverseProblem, full: InverseProblem, kept: Kept) -> bool:
-    """Does the single particle as declared, but for its own parameters, say more than the porous electrode?"""
-    alone, fuller = (base_of(one, blocks_of(one), kept(one)) for one in (single, full))
-    if alone is None:
-        return False
-    return fuller is None or alone.score.total > fuller.score.total

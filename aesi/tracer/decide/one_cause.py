@@ -13,13 +13,17 @@ from dataclasses import replace
 from aesi.physics.effect import Effect
 from aesi.tracer.decide.verdict import GROUP_SIZE
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import ALIKE_NATS, fitted_hypothesis
+from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
+from aesi.tracer.search.plausible import most_plausible
 
 
 def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
-    """The path with one effect for all of its effects, and the group of look-alikes that it heads; the path as it was
-    and no group where it names no several declared parameters, or no single cause says as much."""
+    """The path with one effect in the place of all of its effects, and the group of look-alikes that it heads.
+
+    The path as it was, and no group, where it does not name several declared parameters, or no single cause says as
+    much as they do.
+    """
     chosen = path.chosen
     effects = path.problem.effects
     if len(chosen.hypothesis) < 2 or not all(_tolerated(effects[name]) for name in chosen.hypothesis):
@@ -31,11 +35,10 @@ def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
         )
         for cause in causes
     ]
-    enough = chosen.score.total - ALIKE_NATS
-    said = [fit for fit in fits if fit is not None and fit.score.total > enough and not fit.at_bounds]
-    if not said:
+    inside = [fit for fit in fits if fit is not None and not fit.at_bounds]
+    best = most_plausible([chosen, *inside], len(path.problem.competing()))
+    if best is None or best is chosen:
         return path, ()
-    best = max(said, key=lambda fit: fit.score.total)
     step = Step((path.base,), (), (best,), best)
     return replace(path, steps=(*path.steps, step), chosen=best), _group(best.hypothesis, chosen.hypothesis)
 

@@ -13,8 +13,8 @@ import numpy as np
 
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V
-from aesi.tracer.search.fitted import ALIKE_NATS
 from aesi.tracer.search.path import Path, unseen_rmse_v
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
@@ -28,9 +28,10 @@ class Thresholds:
     """What decides a verdict.
 
     noise_share, solver_v : what a right hypothesis may leave on unseen data beyond the noise: this share of the noise
-    (which is itself estimated) and this much (V), added as squares.
+    (which is itself estimated) and this much (V), added as squares. The share is a convention: 0.45 of the noise lifts
+    an error by a tenth of it. On development cases right hypotheses left at most 0.4 mV.
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
-    fewer nats, are not told apart.
+    fewer nats, are not told apart. 1.64 is 95 % of a normal distribution, to one side.
     """
 
     noise_share: float = 0.45
@@ -175,9 +176,10 @@ def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> flo
 def _rivals(
     path: Path, name: str, tried: Mapping[frozenset[str], Explanation]
 ) -> Iterator[tuple[Explanation, Explanation, str]]:
-    """Hypotheses with another effect in the place of one that was chosen, each with the one that it is held against
-    and the other effect: beside all that was chosen, or, where that was not tried, beside what there was when the
-    effect was admitted."""
+    """Hypotheses with another effect in the place of one that was chosen: rival, what it is held against, other effect.
+
+    Beside all else that was chosen, or, where that was not tried, beside what there was when the effect was admitted.
+    """
     named: set[str] = set()
     admitted = (
         s.admitted for s in path.steps if s.admitted is not None and s.admitted.hypothesis[-1] == name

@@ -145,7 +145,7 @@ class HypothesisFitter:
         jacobian = None if e is None else self.jacobian(x, e)
         if e is None or jacobian is None:
             return None
-        point = Linearised(x, e, jacobian)
+        point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]))
         return FittedHypothesis(self.hypothesis, self.free, point, self.scored(point), self.simulations)
 
     def scored(self, point: Linearised) -> PredictiveScore:
@@ -159,7 +159,7 @@ def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> Predic
     for delta_v in prior.sizes_v:
         white, log_det = whitened(problem, blocks, table, delta_v)
         sums = block_sums(blocks, white, log_det)
-        out.append(score_at(blocks, sums, point.x, delta_v, prior.log_density(delta_v)))
+        out.append(score_at(blocks, sums, point.x, point.bounds, delta_v, prior.log_density(delta_v)))
     return best_over_sizes(out)
 
 

@@ -8,6 +8,9 @@ With whitened residual r and sensitivities J, a set S of blocks has the marginal
 
 and what is said of blocks F by those outside is log p(y_F | y_-F) = log p(y) - log p(y_-F).
 Bishop, Pattern Recognition and Machine Learning (2006), section 3.5.
+
+Parameters have bounds, which (1) does not know. Those that all data together push onto a bound are held there, and (2)
+is of the rest.
 """
 
 from __future__ import annotations
@@ -17,9 +20,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.free_parameter import TINY
 from aesi.tracer.likelihood.model_error import LOG_2PI
 
 
@@ -45,6 +50,12 @@ class BlockSums:
             self.log_det,
             self.rows,
         )
+
+    def moved(self, z: Array) -> BlockSums:
+        """The same about a point that lies z (m,) further."""
+        along = self.gram @ z
+        square = self.square - 2.0 * self.moment @ z + along @ z
+        return BlockSums(square, self.moment - along, self.gram, self.log_det, self.rows)
 
 
 def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
@@ -128,11 +139,13 @@ class Posterior:
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """A hypothesis about a point: coordinates (m,), residual (n,) V and sensitivities of the model (n, m) V."""
+    """A hypothesis about a point: coordinates (m,), residual (n,) V, sensitivities of the model (n, m) V, and bounds
+    (m, 2) of the coordinates."""
 
     x: Array
     residual_v: Array
     jacobian_v: Array
+    bounds: Array
 
     def table(self) -> Array:
         """(n, 1 + m)."""
@@ -160,19 +173,44 @@ class PredictiveScore:
     covariance: Array
 
 
-def score_at(blocks: Blocks, sums: BlockSums, x: Array, delta_v: float, log_prior: float) -> PredictiveScore:
-    """The score of a hypothesis at one size of the model error."""
+def held_at_bounds(sums: BlockSums, x: Array, bounds: Array) -> tuple[Array, BoolArray]:
+    """Change (m,) that takes those parameters to their bounds that all data together push there, zero for the others,
+    and which (m,) are held."""
+    low, high = bounds[:, 0] - x, bounds[:, 1] - x
+    root = np.linalg.cholesky(sums.gram.sum(axis=0) + np.eye(len(x)))
+    half = np.linalg.solve(root, sums.moment.sum(axis=0) - x)
+    best = np.linalg.solve(root.T, half)
+    if np.all((low < best) & (best < high)):
+        return np.zeros(len(x)), np.zeros(len(x), dtype=bool)
+    ends = np.maximum(high, low + TINY)
+    inside = lsq_linear(root.T, half, (low, ends), method="bvls").x
+    held = (inside <= low + TINY) | (inside >= ends - TINY)
+    return np.where(held, inside, 0.0), held
+
+
+def score_at(
+    blocks: Blocks, sums: BlockSums, x: Array, bounds: Array, delta_v: float, log_prior: float
+) -> PredictiveScore:
+    """The score of a hypothesis at one size of the model error.
+
+    x : (m,) the point.  bounds : (m, 2) of the coordinates.
+    """
     names = list(blocks.folds)
     folds = tuple(fold for name in names for fold in blocks.folds[name])
-    posterior = Posterior(sums, x, folds)
+    to_bounds, held = held_at_bounds(sums, x, bounds)
+    free = np.flatnonzero(~held)
+    posterior = Posterior(sums.moved(to_bounds).take(free), x[free], folds)
     ends = np.cumsum([len(blocks.folds[name]) for name in names])[:-1]
     parts = dict(zip(names, np.split(posterior.log_density, ends), strict=True))
     conditions = [float(parts[name].sum()) for name in PARTITIONS_OF_CONDITIONS if name in parts]
     total = 0.5 * float(parts["block"].sum()) + 0.5 * float(np.mean(conditions)) + log_prior
-    shifts = dict(zip(names, np.split(posterior.shifts, ends), strict=True))
-    return PredictiveScore(
-        delta_v, parts, total, posterior.evidence, shifts, posterior.shift, posterior.covariance
-    )
+    whole = np.tile(to_bounds, (len(folds), 1))
+    whole[:, free] = posterior.shifts
+    shift, covariance = to_bounds.copy(), np.zeros((len(x), len(x)))
+    shift[free], covariance[np.ix_(free, free)] = posterior.shift, posterior.covariance
+    evidence = posterior.evidence - 0.5 * float(np.sum((x + to_bounds)[held] ** 2))
+    shifts = dict(zip(names, np.split(whole, ends), strict=True))
+    return PredictiveScore(delta_v, parts, total, evidence, shifts, shift, covariance)
 
 
 def best_over_sizes(scores: Sequence[PredictiveScore]) -> PredictiveScore:

@@ -188,8 +188,9 @@ def promise(parent: Parent, slopes_v: Array, delta_v: float) -> float:
     new, _ = whitened(parent.problem, parent.blocks, own, delta_v)
     table = np.column_stack([new[:, :1], known, new[:, 1:]])
     x = np.concatenate([fit.point.x, np.zeros(slopes_v.shape[1])])
+    open_ends = np.tile([-np.inf, np.inf], (slopes_v.shape[1], 1))
     sums = block_sums(parent.blocks, table, log_det)
-    return score_at(parent.blocks, sums, x, delta_v, 0.0).total
+    return score_at(parent.blocks, sums, x, np.vstack([fit.point.bounds, open_ends]), delta_v, 0.0).total
 
 
 def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
@@ -197,16 +198,20 @@ def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
     inside = (u > growth.low + 1e-9) & (u < growth.high - 1e-9)  # a linear form cannot see a bound
     x = np.concatenate([fit.point.x[growth.rest], u[inside]])
     prior, out = PRIORS[growth.problem.trust], []
+    bounds = np.vstack(
+        [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
+    )
     own_columns = np.column_stack([e, jacobian[:, inside]])
     for delta in prior.sizes_v:
         known, _ = parent.white[delta]
         new, log_det = whitened(growth.problem, parent.blocks, own_columns, delta)
         table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
         sums = block_sums(parent.blocks, table, log_det)
-        out.append(score_at(parent.blocks, sums, x, delta, prior.log_density(delta)))
+        out.append(score_at(parent.blocks, sums, x, bounds, delta, prior.log_density(delta)))
     hypothesis = (*fit.hypothesis, growth.effect)
     free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
-    point = Linearised(x, e, np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]]))
+    slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
+    point = Linearised(x, e, slopes, bounds)
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
     return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations, on_bounds, u, jacobian)
 

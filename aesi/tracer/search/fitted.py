@@ -17,8 +17,6 @@ from aesi.tracer.search.archive import Archive, fit_name
 FIT_STEPS = 8
 """At most; a fit that gains nothing more ends before. Measured on a blind case (asymmetric kinetics, seed 12): after
 three steps a parameter was on its bound, after six it was where the truth is."""
-ALIKE_NATS = 3.0
-"""Hypotheses within this of each other say as much."""
 MOVED_SDS = 1.0
 """Of its spread: what is to first order about a declared parameter that moved further may be far off where it is not.
 Measured on a blind case (leakage and a contact, seed 0): growth of the contact said 1 nat more, its fit 52."""

@@ -13,7 +13,8 @@ from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive, fit_name
 
 PROMISING = 9
-"""Effects that are grown on a hypothesis with effects: those that say most to first order."""
+"""Effects that are grown on a hypothesis with effects: those that say most to first order. A convention that saves
+time: of these, `FINALISTS` are fitted, so that three more than are needed are looked at."""
 
 
 def promising(parent: Parent, slopes: Mapping[str, Array]) -> list[str]:

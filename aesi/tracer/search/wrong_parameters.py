@@ -9,13 +9,15 @@ import numpy as np
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import ALIKE_NATS, fitted_hypothesis
+from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.path import Path, Step
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 NINETY = 1.645
 """Standard deviations either side of a 90 % interval."""
 WRONG_SDS = 2.0
-"""Of its spread: a declared parameter that the data put further off, with 95 % probability, is wrong and is named."""
+"""Of its spread: a declared parameter that the data put further off, with 95 % probability, is wrong and is named. A
+convention: of values that scatter as the spread says, one in twenty lies further off."""
 
 
 def with_wrong_parameters(path: Path, archive: Archive) -> Path:

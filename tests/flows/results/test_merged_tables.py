@@ -10,7 +10,7 @@ def run(mser: float, coverage: float, forest: float | None):
     return [
         {
             "name": "ESPM + AESI I",
-            "free_run": {"test_mser_pct": mser, "test_rmse_mv": 2.0},
+            "free_run": {"test_mser_pct": mser, "test_rmse_mv": 2.0, "diverged": int(mser < 0)},
             "intervals": {"coverage_pct": coverage},
             "intervals_by_method": by_method,
         }
@@ -29,3 +29,8 @@ def test_means_stand_with_the_range_over_seeds():
 def test_a_lone_run_stays_as_it_is():
     rows = run(30.0, 90.0, None)
     assert merged([rows]) == rows
+
+
+def test_records_that_diverged_are_counted_over_the_seeds():
+    (row,) = merged([run(30.0, 90.0, None), run(-45.0, 91.0, None), run(-36.0, 90.5, None)])
+    assert row["free_run"]["diverged"] == 2

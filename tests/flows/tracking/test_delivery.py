@@ -86,5 +86,7 @@ def test_what_a_person_wrote_about_an_experiment_stays(store):
     deliver(store, {"kind": "experiment", "experiment_id": number, "tags": tags}, again=False)
     there = store.client.get_experiment(number).tags
     assert there[NOTE] == "mine"
-    columns = json.loads(there[f"mlflow.sharedViewState.{VIEW}"])["selectedColumns"]
+    view = json.loads(there[f"mlflow.sharedViewState.{VIEW}"])
+    assert view["searchFilter"] == f"tags.`{KIND}` = 'run'"  # the candidates of one run would fill the table
+    columns = view["selectedColumns"]
     assert "metrics.`free_run/test_rmse_mv`" in columns

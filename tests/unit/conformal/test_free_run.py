@@ -24,9 +24,9 @@ def drive(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def fitted(size: float = 1.0) -> FreeRunBands:
-    errors, currents, socs = zip(*(drive(seed) for seed in range(4)), strict=True)
+    errors, currents, _ = zip(*(drive(seed) for seed in range(4)), strict=True)
     return FreeRunBands.fit(
-        {10.0: [0.5 * e for e in errors], WHOLE_DRIVE: [size * e for e in errors]}, DT, currents, socs
+        {10.0: [0.5 * e for e in errors], WHOLE_DRIVE: [size * e for e in errors]}, DT, currents
     )
 
 
@@ -75,7 +75,7 @@ def test_survives_json() -> None:
 
 
 def test_bands_of_an_earlier_schema_are_refused() -> None:
-    with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/4.*run the experiment again"):
+    with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/5.*run the experiment again"):
         FreeRunBands.from_dict(fitted().to_dict() | {"schema": "aesi.free_run_bands/2"})
 
 
@@ -107,7 +107,7 @@ def test_each_piece_is_scored_with_the_scale_of_the_others() -> None:
     rng = np.random.default_rng(0)
     errors = [(10.0 if i == 3 else 1.0) * 1e-3 * rng.standard_normal(400) for i in range(8)]
     flat = [np.zeros(400)] * 8
-    (band,) = FreeRunBands.fit({1.0: errors}, DT, flat, flat).horizons
+    (band,) = FreeRunBands.fit({1.0: errors}, DT, flat).horizons
     assert len(band.by_piece) == 8
     assert np.argmin(band.by_piece) == 3
     assert band.by_piece[3] < 0.6
@@ -118,7 +118,7 @@ def test_equal_scales_give_the_quantile_of_all_errors() -> None:
     rng = np.random.default_rng(3)
     errors = [rng.permutation(np.linspace(1e-4, 1e-3, 1000)) for _ in range(5)]
     flat = [np.zeros(1000)] * 5
-    bands = FreeRunBands.fit({1.0: errors}, DT, flat, flat)
+    bands = FreeRunBands.fit({1.0: errors}, DT, flat)
     # 90 % of numbers evenly spread from 0.1 to 1 mV lie below 0.91 mV; each record is ten stretches of a hundred
     # horizons, and Student's t of 49 degrees of freedom is 1.0193 times as wide as the normal at 95 %.
     assert bands.at(1.0, DT, flat[0], flat[0])[1][0] == pytest.approx(1.0193 * 0.91e-3, rel=0.005)
@@ -128,7 +128,7 @@ def test_few_pieces_widen_the_band_as_student_t_does() -> None:
     rng = np.random.default_rng(3)
     errors = [rng.permutation(np.linspace(1e-4, 1e-3, 1000)) for _ in range(5)]
     flat = [np.zeros(1000)] * 5
-    bands = FreeRunBands.fit({1.0: errors, WHOLE_DRIVE: errors}, DT, flat, flat)
+    bands = FreeRunBands.fit({1.0: errors, WHOLE_DRIVE: errors}, DT, flat)
     short, whole = (bands.at(h, DT, flat[0], flat[0])[1][0] for h in (1.0, WHOLE_DRIVE))
     # Each record is cut in two pieces: 1.8331 at 9 degrees of freedom, 1.6766 at 49.
     assert whole / short == pytest.approx(1.8331 / 1.6766, rel=1e-3)
@@ -139,7 +139,7 @@ def test_the_band_is_wide_far_from_the_fitted_rows() -> None:
     flat = [np.zeros(1000)] * 6
     excess = [np.where(np.arange(1000) < 100, 4.0, 0.0)] * 6
     errors = [1e-3 * (1 + x) * rng.standard_normal(1000) for x in excess]
-    bands = FreeRunBands.fit({WHOLE_DRIVE: errors}, DT, flat, flat, excess=excess)
+    bands = FreeRunBands.fit({WHOLE_DRIVE: errors}, DT, flat, excess=excess)
     high = bands.at(WHOLE_DRIVE, DT, flat[0], flat[0], excess[0])[1]
     # Errors five times as large; six pieces of 100 such rows know their 90 % point to about 10 %.
     assert high[0] / high[-1] == pytest.approx(5.0, rel=0.25)
@@ -152,27 +152,27 @@ def test_rows_outside_the_trained_range_do_not_count() -> None:
     errors = [1e-3 * rng.standard_normal(600) for _ in range(4)]
     flat, inside = [np.zeros(600)] * 4, [np.arange(600) >= 200] * 4
     wild = [np.where(i, e, 50 * e) for e, i in zip(errors, inside, strict=True)]
-    band = FreeRunBands.fit({1.0: wild}, DT, flat, flat, inside=inside)
-    only = FreeRunBands.fit({1.0: [e[200:] for e in errors]}, DT, *[[np.zeros(400)] * 4] * 2)
+    band = FreeRunBands.fit({1.0: wild}, DT, flat, inside=inside)
+    only = FreeRunBands.fit({1.0: [e[200:] for e in errors]}, DT, [np.zeros(400)] * 4)
     assert band.at(1.0, DT, flat[0], flat[0])[1][0] == only.at(1.0, DT, flat[0], flat[0])[1][0]
     assert not band.horizons[0].extrapolated
-    nowhere = FreeRunBands.fit({1.0: wild}, DT, flat, flat, inside=[np.zeros(600, dtype=bool)] * 4)
+    nowhere = FreeRunBands.fit({1.0: wild}, DT, flat, inside=[np.zeros(600, dtype=bool)] * 4)
     assert nowhere.horizons[0].extrapolated
 
 
 def test_too_few_pieces_are_refused() -> None:
     with pytest.raises(FitError, match="at least 3 are needed; give longer records"):
-        FreeRunBands.fit({1.0: [np.ones(70)]}, DT, [np.zeros(70)], [np.zeros(70)])
+        FreeRunBands.fit({1.0: [np.ones(70)]}, DT, [np.zeros(70)])
 
 
 def test_errors_that_are_all_zero_are_refused() -> None:
     with pytest.raises(FitError, match="are zero"):
-        FreeRunBands.fit({1.0: [np.zeros(3000)]}, DT, [np.zeros(3000)], [np.zeros(3000)])
+        FreeRunBands.fit({1.0: [np.zeros(3000)]}, DT, [np.zeros(3000)])
 
 
 def test_constant_errors_get_a_band_of_their_size() -> None:
     flat = [np.zeros(3000)]
-    bands = FreeRunBands.fit({1.0: [np.full(3000, 2e-3)]}, DT, flat, flat)
+    bands = FreeRunBands.fit({1.0: [np.full(3000, 2e-3)]}, DT, flat)
     (band,) = bands.horizons
     assert bands.at(1.0, DT, flat[0], flat[0])[1] == pytest.approx(
         np.full(3000, 2e-3 * band.widening), rel=0.02
@@ -181,14 +181,14 @@ def test_constant_errors_get_a_band_of_their_size() -> None:
 
 def test_covariates_of_another_length_are_refused() -> None:
     with pytest.raises(InputError, match="differ in length"):
-        FreeRunBands.fit({1.0: [np.ones(3000)]}, DT, [np.ones(10)], [np.ones(10)])
+        FreeRunBands.fit({1.0: [np.ones(3000)]}, DT, [np.ones(10)])
 
 
 def test_missing_predictions_are_left_out() -> None:
-    error, current, soc = drive(1)
+    error, current, _ = drive(1)
     late = error.copy()
     late[:60] = np.nan
-    bands = FreeRunBands.fit({60.0: [late]}, DT, [current], [soc])
+    bands = FreeRunBands.fit({60.0: [late]}, DT, [current])
     inside = np.arange(N) >= 60
-    other = FreeRunBands.fit({60.0: [error]}, DT, [current], [soc], inside=[inside])
+    other = FreeRunBands.fit({60.0: [error]}, DT, [current], inside=[inside])
     np.testing.assert_array_equal(bands.horizons[0].scores, other.horizons[0].scores)

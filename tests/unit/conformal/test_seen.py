@@ -23,9 +23,9 @@ def pieces() -> tuple[list[np.ndarray], list[np.ndarray], list[np.ndarray]]:
 
 
 def bands() -> FreeRunBands:
-    errors, gaps, soc = pieces()
+    errors, gaps, _ = pieces()
     seen = Seen.of([np.linspace(1.0, 0.8, N), np.linspace(0.2, 0.1, N)], [ROOM_DEGC, ROOM_DEGC + 5.0])
-    return FreeRunBands.fit({WHOLE_DRIVE: errors}, DT, [np.zeros(N)] * 5, soc, gap=gaps, seen=seen)
+    return FreeRunBands.fit({WHOLE_DRIVE: errors}, DT, [np.zeros(N)] * 5, gap=gaps, seen=seen)
 
 
 def test_a_gap_is_nothing_on_visited_charges_and_one_far_from_them() -> None:

@@ -2,13 +2,16 @@
 
 import numpy as np
 import pytest
-from small_experiment import NOISE_V, experiment, write_record
+from small_experiment import BPX, NOISE_V, SOC0, experiment, write_record
 
+from aesi.physics import Cell
+from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.experiment.fit import Fitted, build_problem
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.judging.validation import validation_mser
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES, RECALIBRATED
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.sparse import Candidate, Genome, evaluate
 from aesi.sparse.yardsticks import Bare
 
@@ -73,3 +76,16 @@ def test_validation_comes_from_drives_that_chose_nothing(loaded, config):
 def test_a_found_model_may_be_named_as_the_cell(config):
     content = config.model_dump(mode="json") | {"cell": "found/model"}
     assert type(config).model_validate({**content, "base": config.base}).cell.bpx == "found/model"
+
+
+@pytest.mark.parametrize("start", ["declared", "recalibrated"])
+def test_a_correction_starts_from_the_effects_of_a_found_model(config, tmp_path, start):
+    found = CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)
+    folder = HybridModel(Cell.from_bpx(BPX), (found,), soc0=SOC0).save(tmp_path / "found" / "model")
+    cell = {"bpx": str(folder), "soc0": SOC0, "start": start}
+    loaded = load(config.model_copy(update={"cell": type(config.cell).model_validate(cell)}))
+    assert loaded.effects == (found,)
+    for series in (*loaded.split.train, *loaded.split.test):
+        assert rms(series.left_by(DECLARED)) < 1.2 * NOISE_V  # that contact is all the file lacked
+        assert rms(series.error_v) < 1.2 * NOISE_V
+    assert loaded.cell.contact_resistance_ohm == pytest.approx(0.0, abs=2e-4)

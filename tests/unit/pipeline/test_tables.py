@@ -71,6 +71,11 @@ def test_coverage_of_several_seeds_stands_with_its_range():
     assert "lowest and highest of 3 seeds" in table.caption
 
 
+def test_seeds_that_agree_need_no_range():
+    row = {**HYBRID, "free_run": {"test_mser_pct": 58.731, "spread": {"test_mser_pct": [58.731, 58.732]}}}
+    assert row_of(tables.free_run_table([row]), "ESPM + AESI I")["MSER test, %"] == "58.73"
+
+
 def test_the_table_of_methods_holds_the_experiments_own_too():
     forest = {"coverage_pct": 87.5, "average_width_v": 0.014, "nominal_pct": 90}
     table = tables.method_table([{**HYBRID, "intervals_by_method": {"spci_refitted": forest}}])

@@ -5,7 +5,7 @@ import pytest
 
 from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, whiten
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums
+from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums, held_at_bounds, score_at
 
 RNG = np.random.default_rng(4)
 N, M = 60, 3
@@ -13,7 +13,7 @@ TIME = np.cumsum(RNG.uniform(0.5, 20.0, N))
 STARTS = np.array([0, 15, 30, 45, N])
 AMPLITUDE = RNG.uniform(0.5, 2.0, N)
 WHITE = RNG.uniform(0.3, 0.6, N)
-BLOCKS = Blocks(STARTS, np.zeros(4, dtype=int), {"block": ((0,), (1,), (2,), (3,))})
+BLOCKS = Blocks(STARTS, np.zeros(4, dtype=int), {"block": ((0,), (1,), (2,), (3,)), "rate": ((0, 1), (2, 3))})
 
 
 def covariance():
@@ -59,6 +59,26 @@ def test_the_shift_without_a_block_is_that_of_a_refit():
     design = np.vstack([table[kept, 1:], np.eye(M)])
     target = np.concatenate([table[kept, 0], -x])
     assert posterior.shifts[0] == pytest.approx(np.linalg.lstsq(design, target, rcond=None)[0], rel=1e-8)
+
+
+def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_were_known():
+    jacobian = RNG.normal(size=(N, M))
+    residual = jacobian @ [3.0, 0.2, -0.1] + 0.1 * RNG.normal(size=N)
+    table, log_det = whiten(np.column_stack([residual, jacobian]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    sums, x, bounds = block_sums(BLOCKS, table, log_det), np.zeros(M), np.tile([-1.0, 1.0], (M, 1))
+    to_bounds, held = held_at_bounds(sums, x, bounds)
+    assert held.tolist() == [True, False, False]
+    assert to_bounds == pytest.approx([1.0, 0.0, 0.0])
+
+    score = score_at(BLOCKS, sums, x, bounds, 1.0, 0.0)
+    known = np.column_stack([residual - jacobian[:, 0], jacobian[:, 1:]])
+    table, log_det = whiten(known, TIME, STARTS[:-1], AMPLITUDE, WHITE)
+    two = Posterior(block_sums(BLOCKS, table, log_det), np.zeros(2), BLOCKS.folds["block"])
+    assert score.log_density["block"] == pytest.approx(two.log_density, rel=1e-9)
+    assert score.evidence == pytest.approx(two.evidence - 0.5)
+    assert score.shift == pytest.approx([1.0, *two.shift])
+    assert score.covariance[1:, 1:] == pytest.approx(two.covariance)
+    assert not score.covariance[0].any()
 
 
 def test_draws_have_the_variance_that_is_whitened():

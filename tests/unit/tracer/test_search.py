@@ -11,8 +11,8 @@ from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Parent, grow
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import ALIKE_NATS, MOVED_SDS, as_declared, base_of, fitted_hypothesis
-from aesi.tracer.search.forward import most_plausible
+from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
+from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
 ADDED_OHM = 2e-3
 SIZE_V = 2e-4
@@ -57,8 +57,8 @@ def test_a_hypothesis_that_moved_nothing_far_is_grown_where_it_is(cell, few, mak
     assert as_declared(problem, blocks, base_of(problem, blocks, Archive(None, ""))) is None
 
 
-def said(total, evidence):
-    return SimpleNamespace(score=SimpleNamespace(total=total, evidence=evidence))
+def said(total, evidence, names=1):
+    return SimpleNamespace(score=SimpleNamespace(total=total, evidence=evidence), hypothesis=("x",) * names)
 
 
 def test_of_effects_that_say_as_much_the_one_of_the_most_usual_values_is_taken():
@@ -67,9 +67,15 @@ def test_of_effects_that_say_as_much_the_one_of_the_most_usual_values_is_taken()
         said(10.0 - 0.9 * ALIKE_NATS, 5.0),
         said(10.0 - 2 * ALIKE_NATS, 99.0),
     )
-    assert most_plausible([best, alike, worse]) is alike
-    assert most_plausible([best, worse]) is best
-    assert most_plausible([]) is None
+    assert most_plausible([best, alike, worse], 20) is alike
+    assert most_plausible([best, worse], 20) is best
+    assert most_plausible([], 20) is None
+
+
+def test_a_name_is_paid_for_with_how_many_might_have_been_given():
+    nothing, named = said(10.0, 5.0, names=0), said(11.0, 5.0 + np.log(20.0) - 0.1)
+    assert most_plausible([nothing, named], 20) is nothing
+    assert most_plausible([nothing, named], 10) is named
 
 
 def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():

@@ -74,7 +74,6 @@ class OutOfSampleErrors:
             self.by_horizon,
             self.dt_s,
             self.current_a,
-            self.soc,
             alpha=alpha,
             inside=self.inside,
             excess=self.excess,

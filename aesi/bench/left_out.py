@@ -1,0 +1,151 @@
+"""Does what is found carry over? Each measured record in turn as the test, the others of its cell as data.
+
+The written model (`after`) is held against the declared and the recalibrated one on the record that chose nothing; all
+of them start from the state of charge that their own first voltage gives. Records with a thermocouple are simulated at
+its temperature. Of drives the first hour is taken.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aesi.bench import CaseRow
+from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.data import read_measurement
+from aesi.data.catalogue import locate
+from aesi.errors import AesiError, DataError
+from aesi.physics import Cell
+from aesi.pipeline.discovery.discover import discovery_content
+from aesi.records import Measurement
+from aesi.tracer import discover
+
+HOUR_S = 3600.0
+LIMIT_S = 900.0
+ALLOWED = 1.05
+"""Times the better of the declared and the recalibrated model: more is worse than leaving the cell alone."""
+
+
+@dataclass(frozen=True)
+class MeasuredSet:
+    """Records of one measured cell and the file that declares it.
+
+    data : name of the data set.  cell : a file in the folder of cell files, or None for the one published with the set.
+    slow : records that are taken whole.  drives : those of which the first hour is taken.
+    """
+
+    data: str
+    cell: str | None
+    slow: tuple[str, ...]
+    drives: tuple[str, ...]
+
+
+SETS = (
+    MeasuredSet("about_energy_nmc", None, ("C20", "C2", "1C", "drive_cycle"), ()),
+    MeasuredSet("lg_m50t_w8", "lg_m50_chen2020.bpx.json", ("n0_c20_discharge", "n0_hppc"), ("n0_udds",)),
+    MeasuredSet(
+        "lg_18650hg2", "lg_18650hg2.bpx.json", ("25degC_cap_1c_b",),
+        ("25degC_us06", "25degC_la92", "25degC_mixed2", "10degC_us06", "0degC_mixed1", "40degC_la92"),
+    ),
+    MeasuredSet(
+        "panasonic_ncr18650pf", "panasonic_ncr18650pf.bpx.json", ("25degC_1c_start",),
+        ("25degC_us06", "25degC_la92", "25degC_hwfet", "10degC_cycle_1", "0degC_cycle_1", "n10degC_cycle_1"),
+    ),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class LeftOutCase:
+    """One record of a set, left out."""
+
+    set: MeasuredSet
+    test: str
+
+    @property
+    def name(self) -> str:
+        """Of the case."""
+        return f"{self.set.data}/{self.test}"
+
+
+def plan(only: str | None = None) -> list[LeftOutCase]:
+    """Every record of every set in turn; only : substring of the name of a case."""
+    cases = [LeftOutCase(one, test) for one in SETS for test in (*one.slow, *one.drives)]
+    return [case for case in cases if only is None or only in case.name]
+
+
+def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> CaseRow:
+    """The row of one case; `verdict` is 'not run' where its data cannot be had.
+
+    cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer has failed.
+    """
+    began, processor = time.perf_counter(), time.process_time()
+    row: CaseRow = {"case": case.name, "cell": case.set.data, "record": case.test}
+
+    def spent() -> dict[str, float]:
+        return {"processor_s": time.process_time() - processor, "ours_s": time.perf_counter() - began}
+
+    try:
+        records = dict(_records(case.set))
+        path = Path(cells) / case.set.cell if case.set.cell else locate(case.set.data, "cell.bpx.json")
+        cell = Cell.from_bpx(path)
+    except DataError as error:
+        return row | {"verdict": "not run", "error": str(error), **spent()}
+    test = records.pop(case.test)
+    try:
+        with processor_limit(limit_s):
+            content = discovery_content(discover(cell, list(records.values()), [test]))
+    except AesiError as error:
+        return row | {"verdict": "error", "error": str(error), **spent()}
+    except OutOfTime:
+        return row | {"verdict": "out of time", "error": f"more than {limit_s:g} s", **spent()}
+    left = {f"{state}_mv": content[state]["test"]["rmse_mv"] for state in ("before", "recalibrated", "after")}
+    better = min(left["before_mv"], left["recalibrated_mv"])
+    told = {"verdict": content["verdict"], "effects": content["effects"]}
+    return row | told | left | {"times_better": left["after_mv"] / better, **spent()}
+
+
+def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:
+    for name in one.slow:
+        yield name, read_measurement(locate(one.data, name), max_rows=20_000)
+    for name in one.drives:
+        yield name, read_measurement(locate(one.data, name), max_rows=20_000, stop_s=HOUR_S)
+
+
+def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
+    """How often the written model is no worse than leaving the cell alone, the worst case, and what was named."""
+    ran = [row for row in rows if row["verdict"] != "not run"]
+    judged_rows = [row for row in ran if "times_better" in row]
+    worst = max(judged_rows, key=lambda row: float(row["times_better"]), default=None)
+    return {
+        "summary": True,
+        "cases": len(ran),
+        "not_run": len(rows) - len(ran),
+        "failed": len(ran) - len(judged_rows),
+        "no_worse": sum(row["times_better"] <= ALLOWED for row in judged_rows),
+        "worst_times": None if worst is None else worst["times_better"],
+        "worst_case": None if worst is None else worst["case"],
+        "confusion": dict(Counter("+".join(row["effects"]) or row["verdict"] for row in judged_rows)),
+    }
+
+
+def table(rows: Sequence[CaseRow]) -> list[str]:
+    """Lines of Markdown, a record a line, the worst in bold."""
+    worst = max((row.get("times_better", 0.0) for row in rows), default=0.0)
+    lines = [
+        "| cell | left out | verdict | declared | recalibrated | after | after / better |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in rows:
+        said = row["verdict"] + (f": {', '.join(row['effects'])}" if row.get("effects") else "")
+        if "times_better" not in row:
+            lines.append(f"| {row['cell']} | {row['record']} | {said}: {row['error']} | | | | |")
+            continue
+        figures = [f"{row[k]:.1f}" for k in ("before_mv", "recalibrated_mv", "after_mv")]
+        ratio = f"{row['times_better']:.2f}"
+        ratio = f"**{ratio}**" if row["times_better"] == worst else ratio
+        lines.append(f"| {row['cell']} | {row['record']} | {said} | {' | '.join(figures)} | {ratio} |")
+    return lines

@@ -1,0 +1,38 @@
+"""Each measured record left out in turn (`aesi.bench.left_out`), spread over processes or Dask workers, tracked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from aesi.bench.left_out import LIMIT_S, judged, plan, summary, table
+from flows.benchmarks.cases import Cases, tracked
+from flows.benchmarks.page import write_between
+
+SHOWN = ("cell", "record", "verdict", "effects", "error")
+BEGIN, END = "<!-- table of aesi bench left_out -->", "<!-- end of left_out -->"
+
+
+def run(
+    cells: str = "experiments/cells",
+    only: str | None = None,
+    limit_s: float | None = LIMIT_S,
+    workers: int = 1,
+    address: str | None = None,
+    write: str | None = None,
+) -> Iterator[dict[str, Any]]:
+    """One dict a record as it is judged, and a last one with `summary`: true.
+
+    cells : folder of the declared cell files.  only : substring of the case, which is set/record.  limit_s : processor
+    seconds a case.  workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two
+    marks becomes the table.
+    """
+    rows = []
+    judge = partial(judged, cells=cells, limit_s=limit_s)
+    for row in tracked(Cases("left_out", 0, plan(only), judge, summary, SHOWN), workers, address):
+        rows.append(row)
+        yield row
+    if write is not None:
+        order = {case.name: k for k, case in enumerate(plan(only))}
+        write_between(write, BEGIN, END, table(sorted(rows[:-1], key=lambda row: order[row["case"]])))

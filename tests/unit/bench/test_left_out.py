@@ -1,0 +1,46 @@
+"""`aesi bench left_out`: its plan, what it tells of records that are not there, and its table."""
+
+import pytest
+
+from aesi.bench.left_out import SETS, judged, plan, summary, table
+
+
+def test_every_record_is_left_out_once():
+    names = [case.name for case in plan()]
+    assert len(names) == len(set(names)) == sum(len(one.slow) + len(one.drives) for one in SETS)
+    assert [case.test for case in plan("nmc/C2")] == ["C20", "C2"]
+
+
+def test_records_that_cannot_be_had_are_not_run(tmp_path, monkeypatch):
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))
+    monkeypatch.setenv("AESI_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    row = judged(plan("lg_m50t")[0], "experiments/cells")
+    assert row["verdict"] == "not run"
+    assert row["error"]
+
+
+@pytest.fixture
+def rows():
+    def row(name, after, **more):
+        better = {"before_mv": 10.0, "recalibrated_mv": 8.0, "after_mv": after, "times_better": after / 8.0}
+        return (
+            {"case": name, "cell": "c", "record": name, "verdict": "found", "effects": ["x"]} | better | more
+        )
+
+    failed = {
+        "case": "d", "cell": "c", "record": "d", "verdict": "error", "error": "no charge", "effects": [],
+    }  # fmt: skip
+    return [row("a", 8.0), row("b", 12.0), row("e", 4.0), failed]
+
+
+def test_the_summary_counts_what_is_worse_than_leaving_the_cell_alone(rows):
+    last = summary(rows)
+    assert (last["cases"], last["failed"], last["no_worse"]) == (4, 1, 2)
+    assert (last["worst_case"], last["worst_times"]) == ("b", 1.5)
+
+
+def test_the_table_has_the_worst_in_bold_and_says_what_failed(rows):
+    lines = table(rows)
+    assert [line for line in lines if "**" in line] == ["| c | b | found: x | 10.0 | 8.0 | 12.0 | **1.50** |"]
+    assert "no charge" in lines[-1]
