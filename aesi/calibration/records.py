@@ -96,7 +96,9 @@ def hold_told(record: Prepared) -> str:
         "linear": "averages over {step:.3g} s, with the current in straight lines between them",
         "backward": "averages the longer the further a step lies back, with the current constant since the row before",
     }[record.hold].format(step=float(np.median(np.diff(record.rows.time_s))))
-    against = "" if declared in (None, record.hold) else f"; --hold {declared} holds for rows that are not thinned"
+    against = (
+        "" if declared in (None, record.hold) else f"; --hold {declared} holds for rows that are not thinned"
+    )
     return f"{record.name}: fitted to {len(record.rows):,} of {len(record.data):,} rows, {taken}{against}."
 
 

@@ -71,7 +71,8 @@ def _log(run_id: str, folder: Path) -> str:
     """Id of the model as it is logged now.
 
     Without an example of its input, which MLflow would run the model on: the porous electrode was compiled for that,
-    11 of 14 s of processor at the end of a run. MLflow warns that a signature would be safer with one: ours is declared.
+    11 of 14 s of processor at the end of a run. MLflow warns that a signature is safer with
+    one; ours is declared.
     """
     import mlflow
 
