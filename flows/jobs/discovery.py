@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from aesi.constants import MV_PER_V
 from flows.base import environment
 from flows.base.console import Console, duration
+from flows.base.interrupt import told_interrupted
 
 if TYPE_CHECKING:
     from aesi.pipeline.discovery.discover import Case
@@ -57,6 +58,7 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
     except BaseException as error:
         if isinstance(error, KeyboardInterrupt):
             console.say(f"Stopped. What was fitted is kept in {out}; the same command goes on from there.")
+            told_interrupted()
         if tracker is not None:
             tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise
