@@ -22,6 +22,7 @@ INTERRUPTED = 130
 
 
 _asked = threading.Event()
+_told = threading.Event()
 _ending = threading.Lock()
 
 
@@ -38,6 +39,18 @@ def ending_soon_on_interrupt() -> Iterator[None]:
         if _asked.is_set():
             end_now()
         signal.signal(signal.SIGINT, before)
+
+
+def tell_interrupted() -> None:
+    """Say that the command was interrupted, once, where the work at hand has not said so in its own words."""
+    if not _told.is_set():
+        _told.set()
+        print("Interrupted.", file=sys.stderr, flush=True)
+
+
+def told_interrupted() -> None:
+    """The work at hand has said that it was stopped, and how to go on."""
+    _told.set()
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
@@ -59,7 +72,8 @@ def end_now() -> None:
 
     if not _ending.acquire(blocking=False):
         time.sleep(60.0)  # another thread is at it
-    print("Interrupted.", file=sys.stderr, flush=True)
+    tell_interrupted()
+    _silence()
     children = psutil.Process().children(recursive=True)
     for child in children:
         _signal(child, signal.SIGTERM)
@@ -67,6 +81,13 @@ def end_now() -> None:
     for child in children:
         _signal(child, signal.SIGKILL)
     os._exit(INTERRUPTED)
+
+
+def _silence() -> None:
+    """Nothing is said from here on: what the work at hand makes of losing its children is no news."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
 
 
 def _signal(child: object, number: int) -> None:

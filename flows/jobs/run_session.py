@@ -13,6 +13,7 @@ from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console
+from flows.base.interrupt import told_interrupted
 from flows.jobs.run_request import RunRequest
 from flows.tracking.run_records import RunLock, RunRecord, records
 
@@ -42,6 +43,7 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
                 yield tracker
             except KeyboardInterrupt:
                 console.say(f"Stopped. Everything so far is kept; go on with: {request.resuming}")
+                told_interrupted()
                 _close(record, tracker, "killed", wait_s=5)
                 raise
             except BaseException:
