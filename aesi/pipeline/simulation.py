@@ -198,7 +198,9 @@ def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measureme
 
 def _start(model: HybridModel, record: Measurement, soc0: float | None) -> InitialState:
     """The state of charge at the first row: as given, from the voltage, or the saved model's."""
-    start = partial(initial_state, model.cell, record, hold=model.hold, effects=model.effects, model=model.model)
+    start = partial(
+        initial_state, model.cell, record, hold=model.hold, effects=model.effects, model=model.model
+    )
     if soc0 is not None or np.isfinite(record.voltage_v[0]) or model.soc0 is None:
         return start(soc0)
     words = f"{record.name} starts at the saved model's state of charge of {model.soc0:.4g}; --soc0 takes another."
