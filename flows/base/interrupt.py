@@ -52,6 +52,22 @@ def ending_soon_on_interrupt() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+@contextmanager
+def leaving_interrupts_to_us() -> Iterator[None]:
+    """Processes started within do not hear Ctrl-C, which reaches the whole group: who started them ends them.
+
+    It is held back from their first instruction on, also while they import; here it comes as soon as the block ends.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def tell_interrupted() -> None:
     """Say, once and as the last line of this process, that it was interrupted.
 

@@ -5,9 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import psutil
 import pytest
+
+WITH_US = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
 
 BUSY = """
 import subprocess, sys, time
@@ -51,3 +54,32 @@ def test_it_ends_within_seconds_with_its_children(closing, tmp_path):
     assert (tmp_path / "closing").exists()
     assert err == "Interrupted.\n"
     assert not child.is_running() or child.status() == psutil.STATUS_ZOMBIE
+
+
+STARTING = """
+import time
+from flows.base.interrupt import ending_soon_on_interrupt
+from flows.evaluation.spread import in_processes
+if __name__ == "__main__":
+    with ending_soon_on_interrupt():
+        print(list(in_processes(time.sleep, [60.0, 60.0], 2)))
+"""
+
+
+def test_a_worker_that_was_still_importing_showed_its_traceback(tmp_path):
+    script = tmp_path / "starting.py"
+    script.write_text(STARTING)
+    busy = subprocess.Popen(
+        [sys.executable, str(script)], env=WITH_US, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    workers = []
+    while len(workers) < 2:
+        workers = [
+            one for one in psutil.Process(busy.pid).children() if "spawn_main" in " ".join(one.cmdline())
+        ]
+        time.sleep(0.01)
+    os.killpg(busy.pid, signal.SIGINT)
+    _, err = busy.communicate(timeout=30)
+    assert busy.returncode == 130
+    assert err == "Interrupted.\n"
+    assert not [one for one in workers if one.is_running() and one.status() != psutil.STATUS_ZOMBIE]
