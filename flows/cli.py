@@ -13,7 +13,7 @@ import typer
 
 from aesi.errors import AesiError
 from flows.base import environment
-from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt
+from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
 from flows.commands import batch, bench, cell, data, effects, experiment
 
 app = typer.Typer(
@@ -66,7 +66,7 @@ def main() -> NoReturn:
         _fail(f"{error.filename or 'a file'}: {error.strerror or error}.", 1)
     except SystemExit as error:
         if error.code == INTERRUPTED:
-            print("Interrupted.", file=sys.stderr)
+            tell_interrupted()
         raise
     except RecursionError:
         _fail("a file is nested too deeply to be read.", 2)

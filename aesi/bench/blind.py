@@ -8,7 +8,6 @@ refuses, is a miss.
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.detectable import SEEN_NATS, seen_nats
-from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.bench.limit import NO_ANSWER, NoAnswer, Stopwatch, answer_of
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
 from aesi.constants import MV_PER_V
 from aesi.data.blind import FULL, BlindCase, CaseSpec, cells_in, generate, plan, small_plan
-from aesi.errors import AesiError, SimulationError
+from aesi.errors import SimulationError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
@@ -50,12 +49,11 @@ def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     cells : folder of the declared cell files.  limit_s : processor seconds of the tracer; a case that takes longer
     is a miss.
     """
-    began = time.perf_counter()
+    spent = Stopwatch()
     try:
         case = generate(spec, cells_in(Path(cells)))
     except SimulationError as error:
-        took = {"ours_s": time.perf_counter() - began}
-        return {**_planned(spec), "verdict": NOT_MADE, "error": str(error), **took}
+        return {**_planned(spec), "verdict": NOT_MADE, "error": str(error), **spent.row}
     return _judged(case, limit_s)
 
 
@@ -80,20 +78,16 @@ def _planned(spec: CaseSpec) -> dict[str, Any]:
 
 
 def _judged(case: BlindCase, limit_s: float | None) -> dict[str, Any]:
-    began, processor = time.perf_counter(), time.process_time()
+    spent = Stopwatch()
     row = _planned(case.spec) | {"label": case.label, "unexplained_mv": case.truth["rms_mv"]}
-    content: dict[str, Any] = {}
-    try:
-        with processor_limit(limit_s):
-            found = discover(Cell.from_bpx(case.declared), case.measurements, soc0=case.soc0)
-            content = discovery_content(found)
-    except AesiError as error:
-        row |= {"verdict": "error", "error": str(error)}
-    except OutOfTime:
-        row |= {"verdict": "out of time", "error": f"more than {limit_s:g} s of processor time"}
-    row |= _scored(case, content) if content else MISSED
-    row |= {"processor_s": time.process_time() - processor, "ours_s": time.perf_counter() - began}
-    return row | {"seen_nats": seen_nats(case)}
+    content = answer_of(lambda: _content(case), limit_s)
+    row |= content.row | MISSED if isinstance(content, NoAnswer) else _scored(case, content)
+    return row | spent.row | {"seen_nats": seen_nats(case)}
+
+
+def _content(case: BlindCase) -> dict[str, Any]:
+    declared = Cell.from_bpx(case.declared)
+    return discovery_content(discover(declared, case.measurements, soc0=case.soc0))
 
 
 MISSED: dict[str, Any] = {
@@ -157,7 +151,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     fitted = [{**r, "called_found": r["verdict"] == "found"} for r in effect if r["fitted"]]
     named = [r for r in effect if r["grouped"]]
     seen = [r for r in effect if r["seen_nats"] is not None and r["seen_nats"] > SEEN_NATS]
-    answered = [r for r in rows if r["verdict"] not in ("error", "out of time")]
+    answered = [r for r in rows if r["verdict"] not in NO_ANSWER]
     unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
     covered = [{"covered": one} for r in named for one in r["parameters_covered"]]
     confusion: dict[str, Counter[str]] = {}

@@ -7,7 +7,6 @@ its temperature. Of drives the first hour is taken.
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from aesi.bench import CaseRow
-from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.bench.limit import NoAnswer, Stopwatch, answer_of
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
-from aesi.errors import AesiError, DataError
+from aesi.errors import DataError
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
 from aesi.records import Measurement
@@ -82,30 +81,22 @@ def judged(case: LeftOutCase, cells: str, limit_s: float | None = LIMIT_S) -> Ca
 
     cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer has failed.
     """
-    began, processor = time.perf_counter(), time.process_time()
+    spent = Stopwatch()
     row: CaseRow = {"case": case.name, "cell": case.set.data, "record": case.test}
-
-    def spent() -> dict[str, float]:
-        return {"processor_s": time.process_time() - processor, "ours_s": time.perf_counter() - began}
-
     try:
         records = dict(_records(case.set))
         path = Path(cells) / case.set.cell if case.set.cell else locate(case.set.data, "cell.bpx.json")
         cell = Cell.from_bpx(path)
     except DataError as error:
-        return row | {"verdict": "not run", "error": str(error), **spent()}
+        return row | {"verdict": "not run", "error": str(error), **spent.row}
     test = records.pop(case.test)
-    try:
-        with processor_limit(limit_s):
-            content = discovery_content(discover(cell, list(records.values()), [test]))
-    except AesiError as error:
-        return row | {"verdict": "error", "error": str(error), **spent()}
-    except OutOfTime:
-        return row | {"verdict": "out of time", "error": f"more than {limit_s:g} s", **spent()}
+    content = answer_of(lambda: discovery_content(discover(cell, list(records.values()), [test])), limit_s)
+    if isinstance(content, NoAnswer):
+        return row | content.row | spent.row
     left = {f"{state}_mv": content[state]["test"]["rmse_mv"] for state in ("before", "recalibrated", "after")}
     better = min(left["before_mv"], left["recalibrated_mv"])
     told = {"verdict": content["verdict"], "effects": content["effects"]}
-    return row | told | left | {"times_better": left["after_mv"] / better, **spent()}
+    return row | told | left | {"times_better": left["after_mv"] / better, **spent.row}
 
 
 def _records(one: MeasuredSet) -> Iterator[tuple[str, Measurement]]:

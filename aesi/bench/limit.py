@@ -1,12 +1,24 @@
-"""A limit on the processor seconds of one piece of work."""
+"""A limit on the processor seconds of one piece of work, and what a benchmark says of a case that gave no answer."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from types import FrameType
+from typing import TypeVar
+
+from aesi.bench import CaseRow
+from aesi.errors import AesiError
+
+T = TypeVar("T")
+
+ERROR, OUT_OF_TIME = "error", "out of time"
+NO_ANSWER = (ERROR, OUT_OF_TIME)
+"""Verdicts of cases that gave no answer."""
 
 
 class OutOfTime(BaseException):
@@ -35,3 +47,43 @@ def processor_limit(seconds: float | None) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
+
+
+@dataclass(frozen=True)
+class NoAnswer:
+    """Why a case gave no answer: `verdict` is one of NO_ANSWER, `error` one sentence."""
+
+    verdict: str
+    error: str
+
+    @property
+    def row(self) -> CaseRow:
+        """What the row of the case says of it."""
+        return {"verdict": self.verdict, "error": self.error}
+
+
+def answer_of(look: Callable[[], T], limit_s: float | None) -> T | NoAnswer:
+    """What `look` returns; NoAnswer where it raises AesiError or uses more than limit_s processor seconds."""
+    try:
+        with processor_limit(limit_s):
+            return look()
+    except AesiError as error:
+        return NoAnswer(ERROR, str(error))
+    except OutOfTime:
+        return NoAnswer(OUT_OF_TIME, f"more than {limit_s:g} s of processor time")
+
+
+@dataclass(frozen=True)
+class Stopwatch:
+    """Processor seconds of this process and seconds by the clock, since it was made."""
+
+    processor_began: float = field(default_factory=time.process_time)
+    clock_began: float = field(default_factory=time.perf_counter)
+
+    @property
+    def row(self) -> CaseRow:
+        """As the row of a case names them."""
+        return {
+            "processor_s": time.process_time() - self.processor_began,
+            "ours_s": time.perf_counter() - self.clock_began,
+        }

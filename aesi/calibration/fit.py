@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import AGEING_SD, Model
 from aesi.calibration.parameters import free_parameters, with_films
-from aesi.calibration.records import Prepared, check_charge, prepared, with_temperatures
+from aesi.calibration.records import Prepared, check_charge, hold_told, prepared, with_temperatures
 from aesi.calibration.result import (
     Calibration,
     RecordError,
@@ -116,8 +116,8 @@ def problem(
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
     start = with_films(start)
     model = Model(start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), physics)
-    starts = tuple(r.start.sentence for r in ready)
-    return model, (*notes, *(n for _, more in kept for n in more), *told, *typical, *starts)
+    taken = tuple(sentence for r in ready for sentence in (r.start.sentence, hold_told(r)))
+    return model, (*notes, *(n for _, more in kept for n in more), *told, *typical, *taken)
 
 
 def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:

@@ -16,7 +16,7 @@ from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.simulation import ModelName
-from aesi.records import Hold, Measurement
+from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
 
 SOC_SD = 0.005
 """Of a state of charge that a potential in doubt gave; one that was given is believed."""
@@ -76,7 +76,7 @@ def _prepared(
     return Prepared(
         data=data,
         rows=thin.data,
-        hold=data.hold if data.hold is not None and thin.data is data else thin.hold,
+        hold=(data.hold or assumed_hold(data.time_s)) if thin.data is data else thin.hold,
         longest_s=thin.longest_s,
         kelvin=None if temperature is None else np.ascontiguousarray(temperature + ZERO_CELSIUS_K),
         start=start,
@@ -85,6 +85,21 @@ def _prepared(
         trusted=thin.trusted,
         flows=flowing(thin.data.current_a).astype(float),
     )
+
+
+def hold_told(record: Prepared) -> str:
+    """How the current was taken between the rows that are simulated, for a reader; declared or not."""
+    declared = record.data.hold
+    if record.rows is record.data:
+        return hold_sentence(record.name, record.hold, declared is not None)
+    taken = {
+        "linear": "averages over {step:.3g} s, with the current in straight lines between them",
+        "backward": "averages the longer the further a step lies back, with the current constant since the row before",
+    }[record.hold].format(step=float(np.median(np.diff(record.rows.time_s))))
+    against = (
+        "" if declared in (None, record.hold) else f"; --hold {declared} holds for rows that are not thinned"
+    )
+    return f"{record.name}: fitted to {len(record.rows):,} of {len(record.data):,} rows, {taken}{against}."
 
 
 def with_temperatures(

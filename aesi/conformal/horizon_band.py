@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtri, stdtrit
 
 from aesi.conformal.local_scale import LocalScale
 from aesi.errors import FitError, InputError
@@ -153,7 +152,7 @@ def calibrated_band(
 
 def _widening(independent: float, alpha: float) -> float:
     """k of (2)."""
-    return float(student.ppf(1 - alpha / 2, independent - 1) / norm.ppf(1 - alpha / 2))
+    return float(stdtrit(independent - 1, 1 - alpha / 2) / ndtri(1 - alpha / 2))
 
 
 def _scale(pieces: Sequence[_Piece], alpha: float) -> LocalScale:

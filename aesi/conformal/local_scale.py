@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from scipy.signal import lfilter
 
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
@@ -62,6 +61,8 @@ class LocalScale:
 
 def covariates(current_a: Array, dt_s: float, excess: Array | None = None, gap: Array | None = None) -> Array:
     """Columns of (1) for one continuous record: current_a (n,) A, dt_s in s, excess, gap (n,); (n, p)."""
+    from scipy.signal import lfilter
+
     keep = np.exp(-dt_s / MEMORY_S)
     mean, _ = lfilter(
         [1 - keep], [1, -keep], current_a, zi=[keep * current_a[0]] if len(current_a) else [0.0]

@@ -13,8 +13,8 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from aesi.data.fetch import Remote, fetch
-from aesi.data.laboratory.cache import cache_folder
 from aesi.errors import DataError
+from aesi.numerics.cache_folder import cache_folder
 
 FOLDER_VARIABLE = "AESI_DATA"
 """Names a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""

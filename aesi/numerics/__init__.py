@@ -1,1 +1,4 @@
-"""Arrays in, arrays out: numpy, scipy and numba only; nothing here knows a file, a cell or a flow."""
+"""Arrays in, arrays out: numpy, scipy and numba only; nothing here knows a cell or a flow.
+
+`compiled` and `cache_folder` say where machine code and made data are kept; nothing else knows a file.
+"""

@@ -16,8 +16,8 @@ compiled row, so their results agree to the last bit.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
 N_LAGS = 10
@@ -36,7 +36,7 @@ def n_features(window: int) -> int:
     return N_LAGS + 3 * len(spans(window)) + 1
 
 
-@njit(cache=True)
+@kept_njit()
 def history_row(past: Array, lengths: IntArray, out: Array) -> None:
     """Fill `out` with the features of `past` ((m,) V, most recent last, m >= N_LAGS, all finite)."""
     m = past.size
@@ -63,7 +63,7 @@ def history_row(past: Array, lengths: IntArray, out: Array) -> None:
     out[column] = abs(past[m - 1])
 
 
-@njit(cache=True)
+@kept_njit()
 def _fill_rows(series: Array, window: int, lengths: IntArray, rows: Array, ready: BoolArray) -> None:
     run = 0  # finite values since the last missing one
     for k in range(series.size):
@@ -87,7 +87,7 @@ def history_features(series: Array, window: int) -> tuple[Array, BoolArray]:
     return rows, ready
 
 
-@njit(cache=True)
+@kept_njit()
 def runs_before(series: Array) -> IntArray:
     """(n,) number of finite values directly before each sample, since the last missing one."""
     out = np.zeros(series.size, dtype=np.int64)

@@ -3,8 +3,8 @@
 import math
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array
 
 
@@ -15,7 +15,7 @@ def relax(discharge_ah: Array, charge_ah: Array, rate_1_ah: float, start: float)
     return out
 
 
-@njit(cache=True, nogil=True)
+@kept_njit(nogil=True)
 def _relax(discharge, charge, rate, start, out):  # type: ignore[no-untyped-def]
     out[0] = h = start
     for k in range(discharge.shape[0]):

@@ -31,14 +31,11 @@ def assumed_hold(time_s: Array) -> Hold:
 
 def hold_sentence(name: str, hold: Hold, declared: bool) -> str:
     """What was taken, for a reader."""
-    words = {
-        "linear": "in straight lines between rows",
-        "backward": "constant since the row before, as loggers write",
-    }
-    other = {"linear": "backward", "backward": "linear"}[hold]
-    return f"{name}: the current is taken {words[hold]}" + (
-        " as declared." if declared else f"; --hold {other} takes it otherwise."
-    )
+    words = {"linear": "in straight lines between rows", "backward": "constant since the row before"}
+    if declared:
+        return f"{name}: the current is taken {words[hold]}, as declared."
+    writer, other = {"linear": ("", "backward"), "backward": (", as loggers write", "linear")}[hold]
+    return f"{name}: the current is taken {words[hold]}{writer}; --hold {other} takes it otherwise."
 
 
 def digest(*arrays: Array | None) -> str:

@@ -8,8 +8,8 @@ step is a sum over at most twelve functions.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.sparse.terms.basis import FUNCTIONS, clipped_values, slope, value
 
@@ -17,7 +17,7 @@ LIMIT = 10.0
 """A prediction beyond this many times the trained half-range counts as diverged."""
 
 
-@njit(cache=True)
+@kept_njit()
 def run_one(drive: Array, functions: IntArray, start: float, clip: bool, limit: float) -> tuple[Array, int]:
     """One model along one record, in scaled error.
 
@@ -40,7 +40,7 @@ def run_one(drive: Array, functions: IntArray, start: float, clip: bool, limit: 
     return out, -1
 
 
-@njit(cache=True)
+@kept_njit()
 def run_many(
     drive: Array, functions: IntArray, measured: Array, restart: BoolArray, state: Array, clip: bool
 ) -> Array:
@@ -78,7 +78,7 @@ def run_many(
     return out
 
 
-@njit(cache=True)
+@kept_njit()
 def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: bool, limit: float) -> Array:
     """Predictions `steps` samples ahead of each measured error.
 
@@ -101,7 +101,7 @@ def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: 
     return out
 
 
-@njit(cache=True)
+@kept_njit()
 def gains(drive: Array, functions: IntArray, measured: Array, clip: bool) -> Array:
     """(n,) the slope of e'[k] -> e'[k + 1] at each measured error; above one the map amplifies."""
     n = drive.shape[1]

@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.constants import MV_PER_V
-from aesi.pipeline.discovery.discover import ARCHIVE, Case, run_case, write_discovery
-from aesi.pipeline.product.declared import declared_model
-from aesi.records import digest
 from flows.base import environment
 from flows.base.console import Console, duration
+from flows.base.interrupt import kept_on_interrupt
 
 if TYPE_CHECKING:
+    from aesi.pipeline.discovery.discover import Case
     from aesi.tracer import Discovery
     from aesi.tracer.discovery import TriedHypothesis
     from flows.jobs.stages import Stages
@@ -28,6 +27,8 @@ EXPERIMENT = "discover"
 
 def check(case: Case) -> None:
     """Raise AesiError, one sentence, for a cell or an effect file that cannot be used."""
+    from aesi.pipeline.product.declared import declared_model
+
     declared_model(case.cell)
     case.tried()
 
@@ -44,17 +45,21 @@ def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tu
 
 def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str) -> dict[str, Any]:
     """The flow itself; `run` runs a stage."""
+    from aesi.pipeline.discovery.discover import ARCHIVE, run_case, write_discovery
+
     started = time.monotonic()
     if (out / ARCHIVE).exists():
         console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
     tracker = _tracker(case, experiment, console)
     follow = Follow(tracker, console)
+    kept = f"What was fitted is kept in {out}; the same command goes on from there."
     try:
-        found = run("hypotheses", lambda: run_case(case, out, follow))
-        content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
+        with kept_on_interrupt(kept):
+            found = run("hypotheses", lambda: run_case(case, out, follow))
+            content: dict[str, Any] = run(
+                "report", lambda: write_discovery(out, case, found, _run_id(tracker))
+            )
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt):
-            console.say(f"Stopped. What was fitted is kept in {out}; the same command goes on from there.")
         if tracker is not None:
             tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise
@@ -115,6 +120,7 @@ class Follow:
 
 
 def _tracker(case: Case, experiment: str, console: Console) -> Tracker | None:
+    from aesi.records import digest
     from flows.tracking.store import Store, StoreAway
     from flows.tracking.tracker import Subject, Tracker
 

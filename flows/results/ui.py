@@ -14,7 +14,11 @@ from flows.tracking.view import VIEW, view_of
 TRAINING = "#/experiments?workflowType=machine_learning"
 """MLflow opens on what it has for language models, where runs are hard to find."""
 # The jobs that MLflow would run beside the server are for language models, and take eight processes.
-QUIETLY = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_LOGGING_LEVEL": "ERROR"}
+QUIETLY = {
+    "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",
+    "MLFLOW_LOGGING_LEVEL": "ERROR",
+    "PYTHONWARNINGS": "ignore:starlette.middleware.wsgi is deprecated",  # MLflow's own use of it
+}
 
 
 def serve(port: int, host: str, uri: str | None) -> None:
@@ -26,7 +30,16 @@ def serve(port: int, host: str, uri: str | None) -> None:
     if not _free(host, port):
         raise InputError(f"port {port} on {host} is taken; give another with --port.")
     store = Store(uri)  # makes or migrates the tables, so that an empty workspace shows an empty UI
-    command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri]
+    command = [
+        sys.executable,
+        "-m",
+        "mlflow",
+        "server",
+        "--backend-store-uri",
+        uri,
+        "--registry-store-uri",
+        uri,
+    ]
     command += ["--host", host, "--port", str(port), "--workers", "1"]
     address = f"http://{host}:{port}/"
     print(f"MLflow shows the runs at {address}{TRAINING} (Ctrl-C ends it)")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import Counter
 from dataclasses import dataclass
 from typing import Any
@@ -83,6 +84,8 @@ class SearchResult:
         told = [trial for trial in self.trials if trial.losses is not None]
         if len(told) < LEAST_TOLD:
             return {}
+        # Optuna warns of every target that low values of it are taken as good: of this one they are.
+        warnings.filterwarnings("ignore", "PedAnovaImportanceEvaluator computes the importances")
         return dict(
             get_param_importances(self.study, target=lambda trial: -trial.user_attrs[RECORD]["fitness"])
         )

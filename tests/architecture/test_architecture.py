@@ -92,3 +92,15 @@ def test_help_loads_nothing_heavy():
         [sys.executable, "-c", f"{heavy}; {code}"], capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+def test_reading_an_experiment_loads_none_of_what_its_stages_need():
+    heavy = {"scipy.stats", "scipy.signal", "sklearn", "pandas", "plotly", "prefect", "mlflow", "optuna"}
+    code = f"""
+import sys
+from flows.jobs.start import RunRequest
+RunRequest({str(ROOT / "experiments" / "smoke.yaml")!r}).config()
+print(sorted({heavy} & set(sys.modules)))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

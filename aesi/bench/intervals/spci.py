@@ -17,10 +17,10 @@ from time import process_time
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from aesi.conformal import METHODS, Calibrated
 from aesi.conformal.scores import interval_score
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array
 
 ALPHA = 0.1
@@ -55,7 +55,7 @@ def oracle_series(
     return OracleSeries(residuals, middle - NORMAL_95 * scale, middle + NORMAL_95 * scale)
 
 
-@njit(cache=True)
+@kept_njit()
 def _autoregression(phi: float, shocks: Array) -> Array:
     out = np.empty(shocks.size)
     last = 0.0

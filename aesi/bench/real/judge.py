@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.bench.limit import NoAnswer, Stopwatch, answer_of
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
@@ -19,7 +18,7 @@ from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
-from aesi.errors import AesiError, DataError
+from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell
 from aesi.pipeline.discovery.discover import discovery_content
@@ -38,7 +37,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
 
     cells : folder of the cell files.  limit_s : processor seconds; a case that takes longer is a miss.
     """
-    began, processor = time.perf_counter(), time.process_time()
+    spent = Stopwatch()
     row: dict[str, Any] = {
         "case": case.name,
         "group": case.group,
@@ -57,31 +56,17 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         declared = Cell.from_bpx(_cell(case.cell, Path(cells)))
         known = _known(case, data, declared)
     except DataError as error:
-        return row | {"verdict": "not run", "error": str(error), **_spent(began, processor)}
+        return row | {"verdict": "not run", "error": str(error), **spent.row}
     soc0 = case.soc0
     if case.fault:
         data = with_fault(data, case.fault.kind, case.fault.size)
         declared = declared_with_fault(declared, case.fault.kind, case.fault.size)
         soc0 = soc0_with_fault(soc0, case.fault.kind, case.fault.size)
-    try:
-        with processor_limit(limit_s):
-            found = discover(declared, [data], soc0=soc0)
-    except AesiError as error:
-        answer = {"verdict": "error", "error": str(error), "effects": [], "named": False}
-    except OutOfTime:
-        answer = {
-            "verdict": "out of time",
-            "error": f"more than {limit_s:g} s",
-            "effects": [],
-            "named": False,
-        }
-    else:
-        answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
-    return row | answer | _spent(began, processor)
-
-
-def _spent(began: float, processor: float) -> dict[str, float]:
-    return {"processor_s": time.process_time() - processor, "ours_s": time.perf_counter() - began}
+    found = answer_of(lambda: discover(declared, [data], soc0=soc0), limit_s)
+    if isinstance(found, NoAnswer):
+        return row | found.row | {"effects": [], "named": False} | spent.row
+    answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
+    return row | answer | spent.row
 
 
 def _cell(name: str, folder: Path) -> Path:

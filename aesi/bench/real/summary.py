@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench import CaseRow
+from aesi.bench.limit import NO_ANSWER
 from aesi.bench.scoring import rate
 
 NEAR_K = 2.0
@@ -20,7 +21,6 @@ HALVED = 0.5
 """Of the recalibrated error."""
 WORSE = 1.05
 """Of the declared error; as where the tracer warns."""
-NO_ANSWER = ("error", "out of time")
 SOC0 = "wrong_soc0"
 
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numba import njit
 
 from aesi.conformal.bands.band import Band, RawBand
 from aesi.conformal.bands.narrowest import narrowest
 from aesi.conformal.regressors.model import Kinds
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, SavedState
 
 
@@ -37,7 +37,7 @@ class FixedBand(Band):
         return cls(float(state["low"]), float(state["high"]))
 
 
-@njit(cache=True)
+@kept_njit()
 def _window_quantiles(past: Array, levels: Array, out: Array) -> None:
     # Position (n + 1) level among the order statistics: the rank of conformal prediction, interpolated.
     ordered = np.sort(past)
@@ -48,7 +48,7 @@ def _window_quantiles(past: Array, levels: Array, out: Array) -> None:
         out[j] = ordered[i] + (position - i) * (ordered[i + 1] - ordered[i])
 
 
-@njit(cache=True)
+@kept_njit()
 def _rolling(series: Array, window: int, needed: int, levels: Array, out: Array, ready: BoolArray) -> None:
     run = 0
     for k in range(series.size):

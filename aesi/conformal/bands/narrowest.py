@@ -10,8 +10,8 @@ Xu & Xie, ICML 2023 (SPCI), eq. (9).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array
 
 
@@ -21,7 +21,7 @@ def level_pairs(alpha: float, n_betas: int) -> Array:
     return np.concatenate([betas, 1 - alpha + betas])
 
 
-@njit(cache=True)
+@kept_njit()
 def narrowest(quantiles: Array, low: Array, high: Array) -> None:
     """Fill low, high (n,) with the narrowest pair of each row of `quantiles` (n, 2 B)."""
     n_betas = quantiles.shape[1] // 2

@@ -18,8 +18,8 @@ NeurIPS 2023 (conformal PID control: the P part).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 
 SHARED = 0.4
@@ -32,7 +32,7 @@ LOG_RATIO_LIMIT = 7.0
 or infinity, from where it would take as long to come back."""
 
 
-@njit(cache=True)
+@kept_njit()
 def move(log_ratio: Array, group: int, missed: bool, rate: float, alpha: float) -> None:
     """Equation (1), one step, in place; log_ratio : (n_groups,)."""
     step = rate * ((1.0 if missed else 0.0) - AIM * alpha)
@@ -41,7 +41,7 @@ def move(log_ratio: Array, group: int, missed: bool, rate: float, alpha: float) 
         log_ratio[g] = min(max(moved, -LOG_RATIO_LIMIT), LOG_RATIO_LIMIT)
 
 
-@njit(cache=True)
+@kept_njit()
 def scaled_band(low: float, high: float, log_ratio: float, floor: float) -> tuple[float, float]:
     """The raw band scaled by r about its middle, at least `floor` wide."""
     middle = 0.5 * (low + high)
@@ -50,7 +50,7 @@ def scaled_band(low: float, high: float, log_ratio: float, floor: float) -> tupl
     return middle - half, middle + half
 
 
-@njit(cache=True)
+@kept_njit()
 def replay(
     low: Array,
     high: Array,

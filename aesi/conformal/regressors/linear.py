@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from typing import ClassVar, Self
 
 import numpy as np
-from numba import njit
 
 from aesi.conformal.regressors.model import FitTask, Kinds, QuantileModel
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.quantile_regression import fit_quantiles
 from aesi.numerics.typing import Array, SavedState
 
 
-@njit(cache=True)
+@kept_njit()
 def _affine(rows: Array, intercept: Array, slope: Array, out: Array) -> None:
     # Written out so that one row and many rows round alike; BLAS gives no such promise.
     for k in range(rows.shape[0]):

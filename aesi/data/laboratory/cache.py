@@ -1,8 +1,7 @@
 """Arrays kept on disk under the hash of everything that made them.
 
-The folder is AESI_CACHE where that is set, else the user's cache folder of the platform. An entry is written
-to a temporary file and renamed, so a killed process leaves no half of one; one that does not match its own
-checksum is computed again, and a warning says so.
+An entry is written to a temporary file and renamed, so a killed process leaves no half of one; one that does not
+match its own checksum is computed again, and a warning says so.
 """
 
 from __future__ import annotations
@@ -22,22 +21,13 @@ from zipfile import BadZipFile
 import numpy as np
 
 from aesi.errors import DataError
+from aesi.numerics.cache_folder import cache_folder
 from aesi.numerics.typing import Array
 
 CHECKSUM = "checksum"
 SHIPPED = Path(__file__).with_name("shipped")
 """Entries that come with the package, once `docs/hooks/ship.py` has put an experiment's virtual records there; they are
 met by content like any other. Without them they are made."""
-
-
-def cache_folder() -> Path:
-    """Where data made or fetched are kept; not created here."""
-    chosen = os.environ.get("AESI_CACHE")
-    if chosen:
-        return Path(chosen).expanduser()
-    import pooch
-
-    return Path(pooch.os_cache("aesi"))
 
 
 def key_of(parts: Mapping[str, Any]) -> str:

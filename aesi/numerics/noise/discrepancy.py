@@ -13,15 +13,15 @@ State Space Methods, 2nd ed. (2012), chapters 4 and 7, for the filter.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, IntArray
 
 CORRELATION_LENGTHS_S = (2.0, 60.0, 1800.0)
 """From just slower than a sample to the slowest that a drive of an hour shows; a convention."""
 
 
-@njit(cache=True, nogil=True)
+@kept_njit(nogil=True)
 def _filter(columns, time_s, opens, amplitude, white, tau_s):  # type: ignore[no-untyped-def]
     n, m = columns.shape
     k = len(tau_s)

@@ -15,8 +15,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import AnyArray, Array, IntArray
 
 N_BINS = 64
@@ -99,7 +99,7 @@ def fit_boosted(
     return BoostedTrees(base, feature, threshold, leaf)
 
 
-@njit(cache=True)
+@kept_njit()
 def add_trees(rows: Array, feature: IntArray, threshold: Array, leaf: Array, out: Array) -> None:
     """Add the trees' values of rows (n, p) to out (n,)."""
     rounds, n_nodes = feature.shape
@@ -111,7 +111,7 @@ def add_trees(rows: Array, feature: IntArray, threshold: Array, leaf: Array, out
             out[k] += leaf[m, node - n_nodes]
 
 
-@njit(cache=True)
+@kept_njit()
 def _descend(bins: AnyArray, row: int, levels: int, feature: IntArray, cut: IntArray) -> int:
     node = 0
     for _ in range(levels):
@@ -119,14 +119,14 @@ def _descend(bins: AnyArray, row: int, levels: int, feature: IntArray, cut: IntA
     return node
 
 
-@njit(cache=True)
+@kept_njit()
 def _add_binned(bins: AnyArray, depth: int, feature: IntArray, cut: IntArray, leaf: Array, f: Array) -> None:
     first = 2**depth - 1
     for k in range(bins.shape[0]):
         f[k] += leaf[_descend(bins, k, depth, feature, cut) - first]
 
 
-@njit(cache=True)
+@kept_njit()
 def _grow(
     bins: AnyArray,
     y: Array,
@@ -163,7 +163,7 @@ def _grow(
             node[s] = 2 * at + (1 if bins[sample[s], feature[at]] <= cut[at] else 2)
 
 
-@njit(cache=True)
+@kept_njit()
 def _best_split(gradients: Array, masses: Array, least: float) -> tuple[int, int]:
     """(feature, bin) of the split that explains most of the gradients' variance; bin N_BINS for none."""
     g_all, m_all = gradients[0].sum(), masses[0].sum()
@@ -186,7 +186,7 @@ def _best_split(gradients: Array, masses: Array, least: float) -> tuple[int, int
     return best_j, best_b
 
 
-@njit(cache=True)
+@kept_njit()
 def _leaf_quantiles(
     bins: AnyArray,
     rest: Array,

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import AnyArray, Array, IntArray
 
 
@@ -34,7 +34,7 @@ class Splits:
     right: IntArray
 
 
-@njit(cache=True)
+@kept_njit()
 def leaf_of(
     x: AnyArray, root: int, feature: IntArray, threshold: Array, left: IntArray, right: IntArray
 ) -> int:
@@ -45,7 +45,7 @@ def leaf_of(
     return left[node]
 
 
-@njit(cache=True)
+@kept_njit()
 def _invert(cdf: Array, grid: Array, level: float) -> float:
     """Linear interpolation of the inverse of a distribution function on a grid."""
     last = cdf.size - 1
@@ -59,7 +59,7 @@ def _invert(cdf: Array, grid: Array, level: float) -> float:
     return grid[i - 1] + share * (grid[i] - grid[i - 1])
 
 
-@njit(cache=True)
+@kept_njit()
 def forest_quantiles(
     rows: AnyArray,
     levels: Array,

@@ -2,8 +2,6 @@
 
 Units are particles: of one size, at one place. Places are Gauss points, those of the negative electrode first, each
 counted from its collector. Currents of units and places are per area of the cell, positive for delithiation.
-
-numba's cache on disk names these classes: who renames one deletes `__pycache__` of this folder.
 """
 
 from __future__ import annotations

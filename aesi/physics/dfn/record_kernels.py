@@ -2,21 +2,18 @@
 
 import math
 
-import numpy as np
 from numba import njit
 
 from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
 from aesi.physics.dfn.output_kernels import left_range, record, record_profile
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
-from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, compiled, lookup
-from aesi.physics.espm.layout import CACHE_SLOTS
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, slot_of
 from aesi.physics.espm.transport_kernels import (
-    DIFFUSIONS,
-    TEMPERATURE_STEP_K,
     arrhenius,
     heated,
     mean_heat,
+    renew_factors,
     solid_forcing,
 )
 
@@ -76,11 +73,16 @@ def run_porous(  # type: ignore[no-untyped-def]
                 t_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * share
             elif e.heat[0] > 0.0:
                 t_k = heated(start_k, watts, dt, e.heat)
-            t_weights = renew_factors(t_k, t_weights, e, t, weights)
+            t_weights = renew_factors(t_k, t_weights, e.energies, e.reference_k, t.faster, weights.keys)
             if t_k != t_rates:
                 t_rates = t_k
                 set_rates(e, t, t_k)
-            slot = kept_slot(dt, p, s, t, weights)
+            slot, missing = slot_of(dt, weights.keys)
+            if missing:
+                renew(
+                    p, s, t.faster, dt,
+                    weights.particle[slot], weights.taken[slot], weights.salt[slot], weights.spread[slot],
+                )  # fmt: skip
             if e.has_layers:
                 hold_layers(e, state, t, newton, dt)
             last_try = length <= SHORTEST or fault_at >= 0
@@ -140,31 +142,6 @@ def jump(last, current, p, s, e, state, t, newton, half, t_k):  # type: ignore[n
             state.layer[r] += taken
     else:
         settle(p, s, e, state, t, newton, t.change, t.total, t_k)
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def renew_factors(t_k, t_weights, e, t, weights):  # type: ignore[no-untyped-def]
-    """Factors of temperature on diffusion, where it has moved since `t_weights`; returns that of which they are now."""
-    if abs(t_k - t_weights) <= TEMPERATURE_STEP_K:
-        return t_weights
-    weights.keys.fill(-1)
-    for i in range(3):
-        t.faster[i] = arrhenius(e.energies[DIFFUSIONS[i]], t_k, e.reference_k)
-    return t_k
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def kept_slot(dt, p, s, t, weights):  # type: ignore[no-untyped-def]
-    """Where the weights of a step of this length stand; they are made where they do not."""
-    key = np.int64(dt * NANOSECONDS + 0.5)
-    slot = key % CACHE_SLOTS
-    if weights.keys[slot] != key:
-        weights.keys[slot] = key
-        renew(
-            p, s, t.faster, dt,
-            weights.particle[slot], weights.taken[slot], weights.salt[slot], weights.spread[slot],
-        )  # fmt: skip
-    return slot
 
 
 @njit(inline="always", fastmath=FASTMATH)

@@ -12,7 +12,7 @@ from numba import njit
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops, solve_electrode
-from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, open_circuit
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, open_circuit, slot_of
 from aesi.physics.espm.layout import StepEnd
 from aesi.physics.espm.transport_kernels import (
     arrhenius,
@@ -21,8 +21,8 @@ from aesi.physics.espm.transport_kernels import (
     mean_heat,
     observe_salt,
     predict,
-    renew_rates,
-    slot_of,
+    renew_factors,
+    renew_weights,
 )
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
@@ -59,8 +59,15 @@ def run_general(  # type: ignore[no-untyped-def]
             i0, i1 = ends_of_part(current, k, part, parts, drive.backward)
             j1 = i1 / area
             if k > 0:
-                t_weights = renew_rates(t_k, t_weights, cell, modes)
-                slot = slot_of(dt, particles, electrolyte, modes)
+                t_weights = renew_factors(
+                    t_k, t_weights, cell.energies, cell.reference_k, modes.faster, modes.keys
+                )
+                slot, missing = slot_of(dt, modes.keys)
+                if missing:
+                    renew_weights(
+                        dt, modes.faster, particles.place, particles.rates, electrolyte.rates,
+                        modes.w[slot], modes.w_e[slot],
+                    )  # fmt: skip
                 diffuse(i0 / area, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved)
                 last_step = dt
             predict(memory, modes)

@@ -7,21 +7,19 @@ from the last two (exponential Adams-Bashforth of order two).
 
 import math
 
-import numpy as np
 from numba import njit
 
 from aesi.physics.espm.kernels import (
     FASTMATH,
-    NANOSECONDS,
     compiled,
     kinetic_ratio,
     lookup,
     mean_asinh,
     open_circuit,
+    slot_of,
     step_weights,
     wet,
 )
-from aesi.physics.espm.layout import CACHE_SLOTS
 
 
 @compiled
@@ -41,10 +39,8 @@ def run_linear(time, current, backward, theta0, solid, salt, cell, memory, out):
         if k > 0:
             dt = time[k] - time[k - 1]
             i0 = i1 if backward else current[k - 1]
-            key = np.int64(dt * NANOSECONDS + 0.5)
-            slot = key % CACHE_SLOTS
-            if memory.keys[slot] != key:
-                memory.keys[slot] = key
+            slot, missing = slot_of(dt, memory.keys)
+            if missing:
                 renew_plain_weights(dt, slot, solid, salt, memory)
             above_n = step_solid(memory.z_n, memory.w_n, slot, -i0, -i1)
             above_p = step_solid(memory.z_p, memory.w_p, slot, i0, i1)

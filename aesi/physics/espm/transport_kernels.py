@@ -2,12 +2,10 @@
 
 import math
 
-import numpy as np
 from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
-from aesi.physics.espm.kernels import FASTMATH, NANOSECONDS, compiled, lookup, step_weights, wet
-from aesi.physics.espm.layout import CACHE_SLOTS
+from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights, wet
 
 TEMPERATURE_STEP_K = 0.01
 """Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
@@ -169,33 +167,17 @@ def heated(t_k, watts, dt, heat):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def renew_rates(t_k, t_weights, cell, modes):  # type: ignore[no-untyped-def]
-    """Factors of temperature on diffusion, where it has moved since `t_weights`; returns that of which they are now."""
+def renew_factors(t_k, t_weights, energies, reference_k, faster, keys):  # type: ignore[no-untyped-def]
+    """Factors of temperature on diffusion, where it has moved since `t_weights`; returns that of which they are now.
+
+    energies : (8,) J/mol.  faster : (3,) is set.  keys : (slots,) of the weights that are kept, which are then void.
+    """
     if abs(t_k - t_weights) <= TEMPERATURE_STEP_K:
         return t_weights
-    modes.keys.fill(-1)
+    keys.fill(-1)
     for i in range(3):
-        modes.faster[i] = arrhenius(cell.energies[DIFFUSIONS[i]], t_k, cell.reference_k)
+        faster[i] = arrhenius(energies[DIFFUSIONS[i]], t_k, reference_k)
     return t_k
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def slot_of(dt, particles, electrolyte, modes):  # type: ignore[no-untyped-def]
-    """Where the weights of a step of this length stand; they are made where they do not."""
-    key = np.int64(dt * NANOSECONDS + 0.5)
-    slot = key % CACHE_SLOTS
-    if modes.keys[slot] != key:
-        modes.keys[slot] = key
-        renew_weights(
-            dt,
-            modes.faster,
-            particles.place,
-            particles.rates,
-            electrolyte.rates,
-            modes.w[slot],
-            modes.w_e[slot],
-        )
-    return slot
 
 
 @compiled

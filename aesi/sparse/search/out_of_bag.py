@@ -14,8 +14,8 @@ member would have left, relative to the physics, had it drawn none of the rows.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.sparse.search.judge import drive_of, free_predictions, one_step_predictions
 from aesi.sparse.search.problem import Problem
@@ -69,7 +69,7 @@ def _squares(problem: Problem, active: IntArray, fits: Array, resamples: IntArra
     return squares
 
 
-@njit(cache=True)
+@kept_njit()
 def _add_squares(
     target: Array, prediction: Array, weights: Array, unseen: BoolArray, pieces: IntArray, squares: Array
 ) -> None:

@@ -9,8 +9,8 @@ They are numbered so that compiled loops can name them: 0 is the constant one, 1
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, IntArray
 
 MAX_ORDER = 5
@@ -20,7 +20,7 @@ SPECIAL = range(MAX_ORDER + 1, len(FUNCTIONS))
 """The numbers of the functions that are not polynomials."""
 
 
-@njit(cache=True, inline="always")
+@kept_njit(inline="always")
 def value(function: int, x: float) -> float:
     """One function at one point."""
     if function == 0:
@@ -48,7 +48,7 @@ def value(function: int, x: float) -> float:
     return np.tanh(x)
 
 
-@njit(cache=True, inline="always")
+@kept_njit(inline="always")
 def slope(function: int, x: float) -> float:
     """Derivative of one function at one point."""
     if function == 0:
@@ -76,7 +76,7 @@ def slope(function: int, x: float) -> float:
     return 1.0 / np.cosh(x) ** 2
 
 
-@njit(cache=True)
+@kept_njit()
 def values(function: int, x: Array) -> Array:
     """One function along a series, (n,)."""
     out = np.empty(len(x))
@@ -85,7 +85,7 @@ def values(function: int, x: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@kept_njit()
 def slopes(function: int, x: Array) -> Array:
     """Derivative of one function along a series, (n,)."""
     out = np.empty(len(x))
@@ -94,7 +94,7 @@ def slopes(function: int, x: Array) -> Array:
     return out
 
 
-@njit(cache=True)
+@kept_njit()
 def clipped_values(functions: IntArray, x: Array, out: Array) -> None:
     """Functions of many points within [-1, 1], (12, n) rows filled where named: loops that vectorise.
 

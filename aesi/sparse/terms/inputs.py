@@ -16,7 +16,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
@@ -27,6 +26,8 @@ _FILTERED = re.compile(r"^I_(\d+(?:\.\d+)?)s$")
 
 def low_pass(x: Array, dt_s: float, tau_s: float) -> Array:
     """First-order low-pass of (n,) samples held over each interval, steady at the first of them."""
+    from scipy.signal import lfilter
+
     keep = np.exp(-dt_s / tau_s)
     return lfilter([1.0 - keep], [1.0, -keep], x, zi=[keep * x[0]])[0] if len(x) else x
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -75,6 +76,26 @@ def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
     )
 
 
+class Solved(NamedTuple):
+    """A^-1 b of (2); each may stand for a stack of systems.
+
+    root : (m, m) lower triangular factor of A.  shift : (m,) A^-1 b.  gain : b'A^-1 b - log|A|, nats.
+    """
+
+    root: Array
+    shift: Array
+    gain: Array
+
+    @classmethod
+    def of(cls, gram: Array, moment: Array, x: Array) -> Solved:
+        """gram : (..., m, m) J'J.  moment : (..., m) J'r.  x : (m,) the point."""
+        a, b = gram + np.eye(len(x)), moment - x
+        root = np.asarray(np.linalg.cholesky(a), dtype=float)
+        shift = np.asarray(np.linalg.solve(a, b[..., None])[..., 0], dtype=float)
+        log_det = 2.0 * np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
+        return cls(root, shift, (b * shift).sum(axis=-1) - log_det)
+
+
 @dataclass(frozen=True, eq=False)
 class Posterior:
     """Of (1), over all blocks and without each fold.
@@ -88,53 +109,51 @@ class Posterior:
 
     @cached_property
     def _left_out(self) -> Array:
-        out = np.zeros((len(self.folds) + 1, len(self.sums.square)))
+        """(f, b) one where the fold leaves the block out."""
+        out = np.zeros((len(self.folds), len(self.sums.square)))
         for k, fold in enumerate(self.folds):
             out[k, list(fold)] = 1.0
         return out
 
     @cached_property
-    def _solved(self) -> tuple[Array, Array, Array]:
-        """(f + 1,) log|A| and b'A^-1 b, (f + 1, m) A^-1 b, the last without any fold left out."""
+    def solved(self) -> Solved:
+        """From all data."""
+        return Solved.of(self.sums.gram.sum(axis=0), self.sums.moment.sum(axis=0), self.x)
+
+    @cached_property
+    def _solved_without(self) -> Solved:
+        """(f,) without each fold."""
         kept = 1.0 - self._left_out
-        m = len(self.x)
-        gram = np.tensordot(kept, self.sums.gram, axes=(1, 0)) + np.eye(m)
-        b = kept @ self.sums.moment - self.x
-        root = np.linalg.cholesky(gram)
-        half = np.linalg.solve(root, b[..., None])[..., 0]
-        shift = np.linalg.solve(np.swapaxes(root, 1, 2), half[..., None])[..., 0]
-        log_det = 2.0 * np.sum(np.log(np.diagonal(root, axis1=1, axis2=2)), axis=1)
-        return log_det, np.sum(half**2, axis=1), shift
+        gram = np.tensordot(kept, self.sums.gram, axes=(1, 0))
+        return Solved.of(gram, kept @ self.sums.moment, self.x)
 
     @cached_property
     def log_density(self) -> Array:
         """(f,) log p(y_F | y_-F) of each fold, nats."""
-        log_det, explained, _ = self._solved
-        out = self._left_out[:-1]
-        own = out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
-        return -0.5 * (own + log_det[-1] - log_det[:-1] - explained[-1] + explained[:-1])
+        own = self._left_out @ (self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows)
+        return np.asarray(-0.5 * (own - self.solved.gain + self._solved_without.gain))
 
     @cached_property
     def evidence(self) -> float:
         """log p(y) of all blocks, nats."""
-        log_det, explained, _ = self._solved
         own = float(np.sum(self.sums.square + self.sums.log_det + LOG_2PI * self.sums.rows))
-        return -0.5 * (own + float(self.x @ self.x) + float(log_det[-1] - explained[-1]))
+        return -0.5 * (own + float(self.x @ self.x) - float(self.solved.gain))
 
-    @cached_property
+    @property
     def shifts(self) -> Array:
         """(f, m) change of the parameters where a fold is left out."""
-        return self._solved[2][:-1]
+        return self._solved_without.shift
 
-    @cached_property
+    @property
     def shift(self) -> Array:
         """(m,) change of the parameters to where all data put them."""
-        return self._solved[2][-1]
+        return self.solved.shift
 
     @cached_property
     def covariance(self) -> Array:
         """(m, m) of the parameters given all data."""
-        return np.asarray(np.linalg.inv(self.sums.gram.sum(axis=0) + np.eye(len(self.x))))
+        inverse = np.linalg.inv(self.solved.root)
+        return np.asarray(inverse.T @ inverse)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,17 +192,15 @@ class PredictiveScore:
     covariance: Array
 
 
-def held_at_bounds(sums: BlockSums, x: Array, bounds: Array) -> tuple[Array, BoolArray]:
+def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArray]:
     """Change (m,) that takes those parameters to their bounds that all data together push there, zero for the others,
-    and which (m,) are held."""
-    low, high = bounds[:, 0] - x, bounds[:, 1] - x
-    root = np.linalg.cholesky(sums.gram.sum(axis=0) + np.eye(len(x)))
-    half = np.linalg.solve(root, sums.moment.sum(axis=0) - x)
-    best = np.linalg.solve(root.T, half)
+    and which (m,) are held.  bounds : (m, 2) of the coordinates."""
+    low, high = bounds[:, 0] - posterior.x, bounds[:, 1] - posterior.x
+    root, best, _ = posterior.solved
     if np.all((low < best) & (best < high)):
-        return np.zeros(len(x)), np.zeros(len(x), dtype=bool)
+        return np.zeros(len(best)), np.zeros(len(best), dtype=bool)
     ends = np.maximum(high, low + TINY)
-    inside = lsq_linear(root.T, half, (low, ends), method="bvls").x
+    inside = lsq_linear(root.T, root.T @ best, (low, ends), method="bvls").x
     held = (inside <= low + TINY) | (inside >= ends - TINY)
     return np.where(held, inside, 0.0), held
 
@@ -197,9 +214,11 @@ def score_at(
     """
     names = list(blocks.folds)
     folds = tuple(fold for name in names for fold in blocks.folds[name])
-    to_bounds, held = held_at_bounds(sums, x, bounds)
+    posterior = Posterior(sums, x, folds)
+    to_bounds, held = held_at_bounds(posterior, bounds)
     free = np.flatnonzero(~held)
-    posterior = Posterior(sums.moved(to_bounds).take(free), x[free], folds)
+    if held.any():
+        posterior = Posterior(sums.moved(to_bounds).take(free), x[free], folds)
     ends = np.cumsum([len(blocks.folds[name]) for name in names])[:-1]
     parts = dict(zip(names, np.split(posterior.log_density, ends), strict=True))
     conditions = [float(parts[name].sum()) for name in PARTITIONS_OF_CONDITIONS if name in parts]

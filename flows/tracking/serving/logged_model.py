@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -70,9 +71,12 @@ def _log(run_id: str, folder: Path) -> str:
     """Id of the model as it is logged now.
 
     Without an example of its input, which MLflow would run the model on: the porous electrode was compiled for that,
-    11 of 14 s of processor at the end of a run.
+    11 of 14 s of processor at the end of a run. MLflow warns that a signature is safer with
+    one; ours is declared.
     """
     import mlflow
+
+    warnings.filterwarnings("ignore", ".*An input example was not provided")
 
     hybrid = aesi.HybridModel.load(folder)
     with mlflow.start_run(run_id=run_id, log_system_metrics=False):

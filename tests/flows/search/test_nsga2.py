@@ -43,6 +43,12 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(problem, tmp_path):
     assert [t.losses for t in resumed.trials] == [t.losses for t in whole.trials]
 
 
+def test_importances_of_genes_come_without_warnings_of_optuna(problem, recwarn):
+    shares = search(problem, 24, seed=3, population=8).importances()
+    assert sum(shares.values()) == pytest.approx(1.0)
+    assert not [str(one.message) for one in recwarn]
+
+
 def test_the_order_of_evaluation_does_not_matter(problem):
     def backwards(batch):
         return [(k, evaluate(problem, batch[k])) for k in reversed(range(len(batch)))]

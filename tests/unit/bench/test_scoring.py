@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from aesi.bench import blind
-from aesi.bench.limit import OutOfTime, processor_limit
+from aesi.bench.limit import NoAnswer, OutOfTime, answer_of, processor_limit
 from aesi.bench.scoring import calibration, judge, proportion, rate
 from aesi.errors import SimulationError
 
@@ -106,6 +106,19 @@ def test_work_without_end_is_stopped():
         time.sleep(0.5)  # waiting costs no processor time
     with processor_limit(None):
         pass
+
+
+def test_a_case_without_an_answer_says_why():
+    def refused():
+        raise SimulationError("no charge left")
+
+    def endless():
+        while True:
+            sum(range(1000))
+
+    assert answer_of(refused, None) == NoAnswer("error", "no charge left")
+    assert answer_of(endless, 0.1) == NoAnswer("out of time", "more than 0.1 s of processor time")
+    assert answer_of(lambda: 3, 10.0) == 3
 
 
 def test_a_case_that_the_laboratory_cannot_make_is_counted_and_stops_nothing(monkeypatch):

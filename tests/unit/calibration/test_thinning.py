@@ -1,11 +1,18 @@
 """Fewer rows for fits: charge is kept, pulses stay pulses."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from aesi.calibration.model import leniency, saturated
+from aesi.calibration.records import hold_told, prepared
 from aesi.calibration.thinning import thinned
+from aesi.physics.cell import Cell
 from aesi.records import Measurement
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
 
 def pulses(step_s: float = 0.1) -> Measurement:
@@ -51,3 +58,29 @@ def test_the_loss_is_square_when_small_and_linear_when_large():
     error = np.array([-0.2, -0.01, 0.003, 0.05])
     slope = (saturated(error + 1e-7) - saturated(error - 1e-7)) / 2e-7
     assert leniency(error) == pytest.approx(slope, rel=1e-5)
+
+
+def drive(step_s: float, hold: str | None = None) -> Measurement:
+    time = np.arange(0.0, 4000.0, step_s)
+    current = 2.0 * np.sin(time / 1.3) * np.sign(np.sin(time / 90.0))
+    return Measurement(time, current, 3.7 - 0.03 * current, name="drive", hold=hold)
+
+
+@pytest.mark.parametrize(
+    ("data", "taken"),
+    [
+        (drive(2.0), "in straight lines between rows; --hold backward takes it otherwise."),
+        (drive(2.0, "backward"), "constant since the row before, as declared."),
+        (drive(8.0), "constant since the row before, as loggers write; --hold linear takes it otherwise."),
+        (drive(0.1), "averages over 1 s, with the current in straight lines between them."),
+        (
+            drive(0.1, "backward"),
+            "straight lines between them; --hold backward holds for rows that are not thinned.",
+        ),
+        (replace(pulses(), hold="linear"), "row before; --hold linear holds for rows that are not thinned."),
+    ],
+)
+def test_how_the_current_was_taken_between_the_rows_of_a_fit_is_told(data, taken):
+    cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+    (ready,) = prepared(cell, [data], 0.8)
+    assert hold_told(ready).endswith(taken)

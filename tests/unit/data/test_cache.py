@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from aesi.data.laboratory.cache import cache_folder, cached, key_of
+from aesi.data.laboratory.cache import cached, key_of
 from aesi.errors import DataError
+from aesi.numerics.cache_folder import cache_folder
 
 
 @pytest.fixture(autouse=True)

@@ -66,7 +66,7 @@ def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_wer
     residual = jacobian @ [3.0, 0.2, -0.1] + 0.1 * RNG.normal(size=N)
     table, log_det = whiten(np.column_stack([residual, jacobian]), TIME, STARTS[:-1], AMPLITUDE, WHITE)
     sums, x, bounds = block_sums(BLOCKS, table, log_det), np.zeros(M), np.tile([-1.0, 1.0], (M, 1))
-    to_bounds, held = held_at_bounds(sums, x, bounds)
+    to_bounds, held = held_at_bounds(Posterior(sums, x, BLOCKS.folds["block"]), bounds)
     assert held.tolist() == [True, False, False]
     assert to_bounds == pytest.approx([1.0, 0.0, 0.0])
 
