@@ -117,7 +117,7 @@ def test_a_given_state_of_charge_is_believed_for_one_record_and_checked_for_seve
 
 def test_a_given_state_on_a_flat_potential_is_not_contradicted_by_what_two_deviations_of_the_voltage_span():
     lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
-    data = resting(float(lfp.rest_voltage_v(0.9)[0]) + 2.0 * READING_V)  # where the potential has become steep
+    data = resting(float(lfp.rest_voltage_v(0.9)[0]) + 2.0 * READING_V)  # where it is steep
     read = initial_state(lfp, data)
     assert read.soc - 0.88 > 0.05 + 2.0 * read.sd
     found = initial_state(lfp, data, 0.88, shared=True)
