@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -197,9 +198,13 @@ def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measureme
 
 def _start(model: HybridModel, record: Measurement, soc0: float | None) -> InitialState:
     """The state of charge at the first row: as given, from the voltage, or the saved model's."""
-    if soc0 is None and not np.isfinite(record.voltage_v[0]):
-        soc0 = model.soc0
-    return initial_state(model.cell, record, soc0, model.hold, model.effects, model=model.model)
+    start = partial(
+        initial_state, model.cell, record, hold=model.hold, effects=model.effects, model=model.model
+    )
+    if soc0 is not None or np.isfinite(record.voltage_v[0]) or model.soc0 is None:
+        return start(soc0)
+    words = f"{record.name} starts at the saved model's state of charge of {model.soc0:.4g}; --soc0 takes another."
+    return replace(start(model.soc0), sentence=words)
 
 
 def _silent(notes: Iterable[str]) -> None:

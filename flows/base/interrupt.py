@@ -24,6 +24,17 @@ INTERRUPTED = 130
 _asked = threading.Event()
 _told = threading.Event()
 _ending = threading.Lock()
+_kept: list[str] = []
+
+
+@contextmanager
+def kept_on_interrupt(sentence: str) -> Iterator[None]:
+    """Within, Ctrl-C says this: what is kept, and how to go on."""
+    _kept.append(sentence)
+    try:
+        yield
+    finally:
+        _kept.remove(sentence)
 
 
 @contextmanager
@@ -41,22 +52,43 @@ def ending_soon_on_interrupt() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
+@contextmanager
+def leaving_interrupts_to_us() -> Iterator[None]:
+    """Processes started within do not hear Ctrl-C, which reaches the whole group: who started them ends them.
+
+    It is held back from their first instruction on, also while they import; here it comes as soon as the block ends.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def tell_interrupted() -> None:
-    """Say that the command was interrupted, once, where the work at hand has not said so in its own words."""
-    if not _told.is_set():
-        _told.set()
-        print("Interrupted.", file=sys.stderr, flush=True)
+    """Say, once and as the last line of this process, that it was interrupted.
 
-
-def told_interrupted() -> None:
-    """The work at hand has said that it was stopped, and how to go on."""
+    What the work at hand makes of losing its children and its server is no news, so nothing is shown after it.
+    """
+    if _told.is_set():
+        return
     _told.set()
+    start = "\n" if sys.stderr.isatty() else ""  # there the line holds ^C, and perhaps progress
+    said = f"Stopped. {_kept[-1]}" if _kept else "Interrupted."
+    os.write(2, f"{start}{said}\n".encode())  # print could be in the midst of another line, from a signal
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)
 
 
 def _interrupt(number: int, frame: FrameType | None) -> None:
     if _asked.is_set():
         end_now()
     _asked.set()
+    tell_interrupted()
     threading.Thread(target=_end_later, daemon=True).start()
     raise KeyboardInterrupt
 
@@ -73,7 +105,6 @@ def end_now() -> None:
     if not _ending.acquire(blocking=False):
         time.sleep(60.0)  # another thread is at it
     tell_interrupted()
-    _silence()
     children = psutil.Process().children(recursive=True)
     for child in children:
         _signal(child, signal.SIGTERM)
@@ -81,13 +112,6 @@ def end_now() -> None:
     for child in children:
         _signal(child, signal.SIGKILL)
     os._exit(INTERRUPTED)
-
-
-def _silence() -> None:
-    """Nothing is said from here on: what the work at hand makes of losing its children is no news."""
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for stream in (1, 2):
-        os.dup2(nowhere, stream)
 
 
 def _signal(child: object, number: int) -> None:

@@ -19,6 +19,7 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 from aesi.records import Failed
+from flows.base.interrupt import leaving_interrupts_to_us
 from flows.evaluation.pool import Evaluate, guarded
 
 WATCH_S = 1.0
@@ -117,7 +118,7 @@ class LocalPool:
         process = self._context.Process(
             target=_serve, args=(theirs, self._build, self._memory_mb, os.getpid()), daemon=True
         )
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), leaving_interrupts_to_us():
             # The forks run numpy code alone and leave by os._exit, so locks of other threads do not matter.
             warnings.simplefilter("ignore", DeprecationWarning)
             process.start()
@@ -127,7 +128,7 @@ class LocalPool:
 
 def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, parent: int) -> None:
     """Life of a process: build, then one genome in and one outcome out, until the other end is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; the parent decides
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not held back
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
     _limit_memory(memory_mb)

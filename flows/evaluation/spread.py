@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
 from flows.base import environment
+from flows.base.interrupt import leaving_interrupts_to_us
 from flows.evaluation.dask_pool import connect
 
 T = TypeVar("T")
@@ -20,8 +21,11 @@ def in_processes(function: Callable[[T], R], items: Sequence[T], workers: int) -
     from concurrent.futures import ProcessPoolExecutor, as_completed
     from multiprocessing import get_context
 
-    with ProcessPoolExecutor(workers, mp_context=get_context("spawn"), initializer=_quietly) as pool:
-        futures = [pool.submit(function, item) for item in items]
+    with ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=environment.prepare_process
+    ) as pool:
+        with leaving_interrupts_to_us():
+            futures = [pool.submit(function, item) for item in items]
         try:
             for future in as_completed(futures):
                 yield future.result()
@@ -45,11 +49,3 @@ def on_dask(function: Callable[[T], R], items: Sequence[T], workers: int, addres
         client.close(timeout=5)
         if cluster is not None:
             cluster.close(timeout=10)
-
-
-def _quietly() -> None:
-    """A worker leaves Ctrl-C to its parent, which ends it."""
-    import signal
-
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    environment.prepare_process()

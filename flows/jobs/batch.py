@@ -16,6 +16,7 @@ from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
 from flows.base.console import Console, duration
+from flows.base.interrupt import kept_on_interrupt
 from flows.evaluation.spread import in_processes, on_dask
 
 if TYPE_CHECKING:
@@ -42,9 +43,11 @@ def batch(
     started = time.monotonic()
     jobs = read_plan(source, cell)
     out.mkdir(parents=True, exist_ok=True)
-    console.say(f"{len(jobs)} cells from {source}, {workers} at a time; results in {out}")
+    cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
+    console.say(f"{cells} from {source}; results in {out}")
     rows: dict[str, dict[str, Any]] = {}
-    with _tracked(jobs, settings or Settings(), source, console) as tracker:
+    kept = f"What is done is kept in {out}; the same command goes on from there."
+    with kept_on_interrupt(kept), _tracked(jobs, settings or Settings(), source, console) as tracker:
         for row in _rows(jobs, out, settings or Settings(), workers, runner, address):
             rows[row["name"]] = row
             told = row["finding"] if row["status"] == "done" else f"failed: {row['reason']}"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from aesi.constants import MV_PER_V
 from flows.base import environment
 from flows.base.console import Console, duration
-from flows.base.interrupt import told_interrupted
+from flows.base.interrupt import kept_on_interrupt
 
 if TYPE_CHECKING:
     from aesi.pipeline.discovery.discover import Case
@@ -52,13 +52,14 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
         console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
     tracker = _tracker(case, experiment, console)
     follow = Follow(tracker, console)
+    kept = f"What was fitted is kept in {out}; the same command goes on from there."
     try:
-        found = run("hypotheses", lambda: run_case(case, out, follow))
-        content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
+        with kept_on_interrupt(kept):
+            found = run("hypotheses", lambda: run_case(case, out, follow))
+            content: dict[str, Any] = run(
+                "report", lambda: write_discovery(out, case, found, _run_id(tracker))
+            )
     except BaseException as error:
-        if isinstance(error, KeyboardInterrupt):
-            console.say(f"Stopped. What was fitted is kept in {out}; the same command goes on from there.")
-            told_interrupted()
         if tracker is not None:
             tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
         raise

@@ -13,7 +13,7 @@ from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment
 from flows.base.console import Console
-from flows.base.interrupt import told_interrupted
+from flows.base.interrupt import kept_on_interrupt
 from flows.jobs.run_request import RunRequest
 from flows.tracking.run_records import RunLock, RunRecord, records
 
@@ -38,12 +38,11 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
     config = request.config()
     with _advice_where_full(request):
         tracker, record = _begin(request, config, store, console)
-        with RunLock(tracker.run_id):
+        kept = f"Everything so far is kept; go on with: {request.resuming}"
+        with kept_on_interrupt(kept), RunLock(tracker.run_id):
             try:
                 yield tracker
             except KeyboardInterrupt:
-                console.say(f"Stopped. Everything so far is kept; go on with: {request.resuming}")
-                told_interrupted()
                 _close(record, tracker, "killed", wait_s=5)
                 raise
             except BaseException:

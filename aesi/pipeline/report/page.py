@@ -6,6 +6,7 @@ import json
 import re
 import textwrap
 from collections.abc import Mapping
+from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -136,6 +137,15 @@ def _significant(value: Any, digits: int = 3) -> str:
     return f"{value:.{digits}g}" if _known(value) else ABSENT
 
 
+def _resolving(interval: Mapping[str, Any]) -> int:
+    """Significant digits of a parameter that show its interval's width to two, at least three and at most six."""
+    low, high, value = (interval.get(key) for key in ("low", "high", "value"))
+    if low is None or high is None or not high > low:
+        return 3
+    largest = max(abs(low), abs(high), abs(value or 0.0))
+    return min(6, max(3, 2 + floor(log10(largest)) - floor(log10(high - low))))
+
+
 def _known(value: Any) -> bool:
     """Whether a cell holds a number; rows may lack a key, which Jinja hands on as an Undefined."""
     return isinstance(value, int | float) and value == value
@@ -146,4 +156,10 @@ def _tied(text: str) -> str:
     return re.sub(r"(\d) (?=(?:mV|%|s|V|A)(?!\w))", "\\1\u00a0", text)
 
 
-FILTERS = {"fixed": _fixed, "significant": _significant, "tied": _tied, "dedented": textwrap.dedent}
+FILTERS = {
+    "fixed": _fixed,
+    "significant": _significant,
+    "resolving": _resolving,
+    "tied": _tied,
+    "dedented": textwrap.dedent,
+}

@@ -17,6 +17,8 @@ MOST_PARAMETERS = 3
 """Of an effect, in one sentence."""
 ADDED = "added to what"
 """How a parameter's description says that it comes on top of the declared value."""
+SHARE = "share of the declared"
+"""How a parameter's description says that it is a part of something declared, which is told in per cent."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
 """Unit -> that of its thousandths or millionths, and how many make one."""
 SMALL = 0.5
@@ -105,6 +107,9 @@ def _tells(value: Mapping[str, Any], parameter: Parameter | None) -> bool:
 
 
 def _part(key: str, value: Mapping[str, Any], parameter: Parameter | None) -> str:
+    if parameter is not None and parameter.description.startswith(SHARE):
+        percent = {end: 100 * value[end] for end in ("value", "low", "high")}
+        return f"{quantity({**percent, 'unit': '%'})} {parameter.description.removeprefix('share ')}"
     words = key.rsplit("_", 1)[0].replace("_", " ") if key.endswith(("_v", "_a", "_k", "_s", "_ohm")) else key
     words = words.replace("_factor", "").replace("_", " ")
     times = " times" if parameter is not None and parameter.neutral == 1.0 else ""

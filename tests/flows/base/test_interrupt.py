@@ -5,9 +5,12 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import psutil
 import pytest
+
+WITH_US = os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])}
 
 BUSY = """
 import subprocess, sys, time
@@ -20,7 +23,7 @@ with ending_soon_on_interrupt():
         print(child.pid, flush=True)
         time.sleep(60)
     finally:
-        print("closing", flush=True)
+        open(sys.argv[1], "w").close()
         {closing}
 """
 
@@ -33,9 +36,9 @@ CLOSINGS = {
 
 
 @pytest.mark.parametrize("closing", CLOSINGS.values(), ids=CLOSINGS)
-def test_it_ends_within_seconds_with_its_children(closing):
+def test_it_ends_within_seconds_with_its_children(closing, tmp_path):
     busy = subprocess.Popen(
-        [sys.executable, "-c", BUSY.format(closing=closing)],
+        [sys.executable, "-c", BUSY.format(closing=closing), str(tmp_path / "closing")],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -47,6 +50,36 @@ def test_it_ends_within_seconds_with_its_children(closing):
     out, err = busy.communicate(timeout=30)
     assert busy.returncode == 130
     assert time.monotonic() - started < 10  # 2 s on a machine that does nothing else
-    assert "closing" in out
+    assert out == ""
+    assert (tmp_path / "closing").exists()
     assert err == "Interrupted.\n"
     assert not child.is_running() or child.status() == psutil.STATUS_ZOMBIE
+
+
+STARTING = """
+import time
+from flows.base.interrupt import ending_soon_on_interrupt
+from flows.evaluation.spread import in_processes
+if __name__ == "__main__":
+    with ending_soon_on_interrupt():
+        print(list(in_processes(time.sleep, [60.0, 60.0], 2)))
+"""
+
+
+def test_a_worker_that_was_still_importing_showed_its_traceback(tmp_path):
+    script = tmp_path / "starting.py"
+    script.write_text(STARTING)
+    busy = subprocess.Popen(
+        [sys.executable, str(script)], env=WITH_US, stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
+    workers = []
+    while len(workers) < 2:
+        workers = [
+            one for one in psutil.Process(busy.pid).children() if "spawn_main" in " ".join(one.cmdline())
+        ]
+        time.sleep(0.01)
+    os.killpg(busy.pid, signal.SIGINT)
+    _, err = busy.communicate(timeout=30)
+    assert busy.returncode == 130
+    assert err == "Interrupted.\n"
+    assert not [one for one in workers if one.is_running() and one.status() != psutil.STATUS_ZOMBIE]

@@ -12,6 +12,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
+from aesi.pipeline.simulation import predict_file
 from aesi.sparse import SparseModel
 
 
@@ -131,3 +132,10 @@ def test_a_record_of_other_sampling_is_loaded_at_the_experiments_step(record):
     loaded = load(coarse)
     assert loaded.split.train[0].dt_s == 2.0
     assert any("Resampled" in note for note in loaded.notes)
+
+
+def test_a_profile_alone_was_said_to_start_as_given(model, data, tmp_path):
+    data.to_frame()[["time_s", "current_a"]].to_csv(tmp_path / "profile.csv", index=False)
+    folder, said = model.save(tmp_path / "model"), []
+    predict_file(folder, tmp_path / "profile.csv", tmp_path / "out.csv", say_notes=said.extend)
+    assert f"profile starts at the saved model's state of charge of {SOC0:g}; --soc0 takes another." in said

@@ -10,6 +10,7 @@ import pytest
 
 from aesi.pipeline.report import sections, write_discovery_report, write_figures, write_run_report
 from aesi.pipeline.report.arrays.embed import STORED, ArrayStore, embed
+from aesi.pipeline.report.page import FILTERS
 from aesi.pipeline.report.plots import records
 
 
@@ -152,3 +153,17 @@ def test_a_further_section_is_a_file_a_line_and_a_test(views, monkeypatch, tmp_p
     assert '<section id="caveats">' in page
     assert "was measured once." in page
     assert '<section id="model">' in page
+
+
+@pytest.mark.parametrize(
+    ("interval", "digits"),
+    [
+        ({"value": 8.019e-3, "low": 8.004e-3, "high": 8.035e-3}, 4),  # [0.008, 0.00803] was shown
+        ({"value": 2.0, "low": 1.0, "high": 3.0}, 3),
+        ({"value": 0.0, "low": -1e-3, "high": 1e-3}, 3),
+        ({"value": 5.0}, 3),
+        ({"value": 5.0, "low": 5.0, "high": 5.0}, 3),
+    ],
+)
+def test_an_interval_narrower_than_a_thousandth_was_shown_as_a_point(interval, digits):
+    assert FILTERS["resolving"](interval) == digits

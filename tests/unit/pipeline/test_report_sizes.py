@@ -50,6 +50,13 @@ def test_only_what_differs_from_nothing_is_told():
     assert text == "solid diffusivity (negative 0.600 [0.580, 0.620] times)"
 
 
+def test_a_loss_is_told_in_per_cent_of_what_was_declared():
+    loss = {"loss": value(0.09998, 0.09964, 0.10031, "dimensionless")}
+    assert with_size("lithium_inventory_loss", discovery("lithium_inventory_loss", "parameter", loss)) == (
+        "lithium inventory loss (9.998 % [9.964, 10.031] of the declared capacity)"
+    )
+
+
 def test_the_line_of_a_verdict():
     ohms = {"resistance_ohm": value(8e-3, 7.9e-3, 8.1e-3, "ohm")}
     found = discovery("series_resistance", "physics", ohms)
