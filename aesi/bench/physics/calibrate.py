@@ -28,7 +28,8 @@ SLOWER = 0.6
 """Of the truth: contacts, and the factor of the negative electrode's diffusivity."""
 NOISE_V = 1e-3
 HOLD_S, REST_S = 30, 60
-"""Of one current of a drive, and of the rest that it begins with."""
+"""White noise of the voltage; length of one current of a drive, and of the rest that it begins with. Conventions, as
+the sizes above."""
 
 
 def run(
