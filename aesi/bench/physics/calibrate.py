@@ -27,9 +27,9 @@ CONTACT_OHM = 8e-3
 SLOWER = 0.6
 """Of the truth: contacts, and the factor of the negative electrode's diffusivity."""
 NOISE_V = 1e-3
+"""White noise of the voltage. A convention, as the sizes above."""
 HOLD_S, REST_S = 30, 60
-"""White noise of the voltage; length of one current of a drive, and of the rest that it begins with. Conventions, as
-the sizes above."""
+"""Of one current of a drive, and of the rest that it begins with."""
 
 
 def run(
