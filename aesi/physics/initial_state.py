@@ -78,7 +78,7 @@ def initial_state(
         except DataError:
             return _given(record, soc0, None)
         allowed = OTHER_STATE if read.basis in ("rest", "full charge") else OTHER_STATE_LOADED
-        if abs(read.soc - soc0) <= allowed + 2.0 * read.sd:
+        if read.off(soc0) <= allowed:
             return replace(_given(record, soc0, None), doubt=abs(read.soc - soc0))
         if shared:
             return _read_instead(read, soc0)
@@ -137,7 +137,9 @@ class _Start:
         words = f"{self.record.name} rests at {voltage:.3f} V: state of charge {soc:.4f} +/- {sd:.4f}"
         if moving:
             words += f", doubtful because the voltage still moves ({1e3 * moved:+.0f} mV) before the current starts"
-        return InitialState(self._declared(soc), sd, "rest", words + ".", rest_voltage_v=voltage)
+        low, high = self.open_circuit.ends(true, spread)
+        ends = self._declared(low), self._declared(high)
+        return InitialState(self._declared(soc), sd, "rest", words + ".", rest_voltage_v=voltage, ends=ends)
 
     def _under_load(self) -> InitialState:
         first = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))

@@ -72,6 +72,10 @@ class OpenCircuit:
         sd = max(0.5 * float(ends[1] - ends[0]), GIVEN_SD)
         return self.soc_at(voltage_v), sd
 
+    def ends(self, voltage_v: float, spread_v: float) -> tuple[float, float]:
+        """States of charge of the voltage -+ two `spread_v`."""
+        return self.soc_at(voltage_v - 2.0 * spread_v), self.soc_at(voltage_v + 2.0 * spread_v)
+
     def admits(self, voltage_v: float, spread_v: float) -> bool:
         """Is there a state of this cell that rests within two of the given deviations of the voltage?"""
         low, high = np.interp([0.0, 1.0], self.soc, self.ocv)

@@ -14,7 +14,8 @@ class InitialState:
 
     basis : what it rests on.  sentence : the same for a reader, with the figures.  contradicted : True where a given
     state of charge is far from that of the voltage.  rest_voltage_v : at which the cell rests there, as read.
-    doubt : how far the reading of the voltage is from what was given.
+    doubt : how far the reading of the voltage is from what was given.  ends : states of charge that the voltage would
+    say two of its deviations lower and higher; on a flat potential far beyond soc -+ 2 sd.
     """
 
     soc: float
@@ -24,3 +25,9 @@ class InitialState:
     contradicted: bool = False
     rest_voltage_v: float | None = None
     doubt: float = 0.0
+    ends: tuple[float, float] | None = None
+
+    def off(self, soc: float) -> float:
+        """How far a state of charge is from all that the voltage may mean; 0 within."""
+        low, high = self.ends or (self.soc - 2.0 * self.sd, self.soc + 2.0 * self.sd)
+        return max(low - soc, soc - high, 0.0)

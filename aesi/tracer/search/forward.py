@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
+
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import LEAST_V
-from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
@@ -33,8 +35,10 @@ BEAM = 2
 """Hypotheses that a further effect is tried on. The best and one to fall back on, a convention: each costs
 another round of growing."""
 HOPELESS_SHARE = 0.7
-"""Of the mean square beyond noise on unseen data: where the best effect leaves more, a further one is not tried. A
-convention that saves time, and gives up pairs that say much together and little apart."""
+"""Of the mean square beyond noise on unseen data without any effect: where two effects leave more, a third is not tried
+and none is exchanged. A convention that saves time: on a measured cell, which no two effects explain, each further
+round takes minutes. One effect may leave all of it: on a blind case (a contact, hysteresis and heat, seed 13) the first
+of three said 256 nats and did not lower the error, and the three were found."""
 
 
 def searched(
@@ -63,14 +67,14 @@ def searched(
         steps.append(step)
         if step.admitted is None:
             break
-        left = [beyond_noise(problem, blocks, fit) for fit in (chosen, step.admitted)]
         chosen = step.admitted
-        if not enough(blocks, chosen) and left[1] > HOPELESS_SHARE * left[0]:
+        if len(chosen.hypothesis) > 1 and _hopeless(problem, blocks, base, chosen):
             break
         others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
     chosen = _pruned(problem, blocks, chosen, steps, archive, report)
-    chosen = _exchanged(problem, blocks, chosen, steps, slopes, archive, report)
+    if not _hopeless(problem, blocks, base, chosen):
+        chosen = _exchanged(problem, blocks, chosen, steps, slopes, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
 
 
@@ -84,16 +88,16 @@ def _pruned(
 ) -> FittedHypothesis:
     """The hypothesis without effects that it does not need once the others are in."""
     least_nats = max((step.admission_nats for step in steps), default=0.0)
-    while len(chosen.hypothesis) > 1:
+    while chosen.hypothesis:
         best: FittedHypothesis | None = None
-        for name in chosen.hypothesis[:-1]:  # the last one was admitted on top of the others
+        for name in chosen.hypothesis:
             rest = tuple(other for other in chosen.hypothesis if other != name)
             start, size = chosen.placed, chosen.score.delta_v
             fit = fitted_hypothesis(problem, blocks, rest, start, size, archive)
             if fit is None:
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
-            if not _admitted(blocks, fit, chosen, least_nats) and (
+            if not needed(blocks, fit, chosen, least_nats) and (
                 best is None or fit.score.total > best.score.total
             ):
                 best = fit
@@ -171,7 +175,7 @@ def _step(
             report(problem, fit, fit.score.total - best.score.total)
             fitted.append(fit)
     fitted.sort(key=lambda f: -f.score.total)
-    may = [f for f in fitted if _admitted(blocks, best, f, least_nats)]
+    may = [f for f in fitted if admissible(blocks, best, f, least_nats)]
     admitted = most_plausible(may, len(problem.competing()))
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
@@ -206,7 +210,23 @@ def _finalists(ranked: Sequence[Grown], best: FittedHypothesis) -> list[Grown]:
     return [one for one, gain in zip(ranked, gains, strict=False) if gain > least]
 
 
-def _admitted(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
-    off = unseen_rmse_v(blocks, without) ** 2 - unseen_rmse_v(blocks, fit) ** 2
+def _hopeless(
+    problem: InverseProblem, blocks: Blocks, base: FittedHypothesis, chosen: FittedHypothesis
+) -> bool:
+    """Does the hypothesis leave so much that another effect more will not do?"""
+    return beyond_noise(problem, blocks, chosen) > HOPELESS_SHARE * beyond_noise(problem, blocks, base)
+
+
+def admissible(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
+    """Does the effect say enough of unseen data, move them by more than two solvers of one model differ, and end on no
+    bound? By how much it lowers their error is not asked: the first of several may not lower it at all."""
+    moved_v = held_out_residual(blocks, without) - held_out_residual(blocks, fit)
     says = fit.score.total - without.score.total
-    return says > least_nats and off > LEAST_V**2 and not fit.at_bounds
+    return says > least_nats and float(np.mean(moved_v**2)) > LEAST_V**2 and not fit.at_bounds
+
+
+def needed(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
+    """Would the effect be admitted on top of all the others, and does it lower the error of unseen data by more than
+    two solvers of one model differ?"""
+    off = unseen_rmse_v(blocks, without) ** 2 - unseen_rmse_v(blocks, fit) ** 2
+    return off > LEAST_V**2 and admissible(blocks, without, fit, least_nats)

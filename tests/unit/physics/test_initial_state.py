@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from aesi.errors import DataError
 from aesi.physics import Cell, initial_state, simulate
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.start.open_circuit import READING_V
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -112,6 +113,16 @@ def test_a_given_state_of_charge_is_believed_for_one_record_and_checked_for_seve
     assert one_of_many.soc == pytest.approx(0.4, abs=5e-3)
     assert "contradicts" in one_of_many.sentence
     assert initial_state(LG_M50, data, 0.41, shared=True).basis == "given"
+
+
+def test_a_given_state_on_a_flat_potential_is_not_contradicted_by_what_two_deviations_of_the_voltage_span():
+    lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
+    data = resting(float(lfp.rest_voltage_v(0.9)[0]) + 2.0 * READING_V)  # where it is steep
+    read = initial_state(lfp, data)
+    assert read.soc - 0.88 > 0.05 + 2.0 * read.sd
+    found = initial_state(lfp, data, 0.88, shared=True)
+    assert (found.basis, found.soc, found.contradicted) == ("given", 0.88, False)
+    assert initial_state(lfp, data, 0.5, shared=True).basis == "rest"
 
 
 def test_an_instrument_fault_is_taken_off_the_reading():

@@ -8,10 +8,12 @@ import pytest
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
+from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Parent, grow
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
+from aesi.tracer.search.forward import admissible, needed
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
 ADDED_OHM = 2e-3
@@ -86,3 +88,29 @@ def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
     assert contact[0].sd == CATALOGUE["series_resistance"].parameters["resistance_ohm"].spread.loose / 30.0
     lost = of_effect("lithium_inventory_loss", CATALOGUE["lithium_inventory_loss"].parameters, 30.0)
     assert lost[0].sd > CATALOGUE["lithium_inventory_loss"].parameters["loss"].spread.loose  # cells age
+
+
+BLOCKS = SimpleNamespace(of_row=np.zeros(100, dtype=int))
+
+
+def left(residual_v, total):
+    """A fit without parameters that leaves this of unseen data."""
+    score = SimpleNamespace(total=total, shifts={"block": np.zeros((1, 0))})
+    point = SimpleNamespace(residual_v=residual_v, jacobian_v=np.zeros((100, 0)))
+    return SimpleNamespace(score=score, point=point, at_bounds=())
+
+
+def test_an_effect_that_moves_unseen_data_is_a_step_though_it_is_no_end_before_it_lowers_the_error():
+    wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
+    before, moved, lower = left(wave_v, 0.0), left(-wave_v, 50.0), left(0.5 * wave_v, 50.0)
+    assert admissible(BLOCKS, before, moved, 5.0)
+    assert not needed(BLOCKS, before, moved, 5.0)
+    assert admissible(BLOCKS, before, lower, 5.0)
+    assert needed(BLOCKS, before, lower, 5.0)
+
+
+def test_an_effect_that_says_little_or_moves_less_than_two_solvers_differ_by_is_no_step():
+    wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
+    before = left(wave_v, 0.0)
+    assert not admissible(BLOCKS, before, left(0.5 * wave_v, 4.0), 5.0)
+    assert not admissible(BLOCKS, before, left(0.9 * wave_v, 50.0), 5.0)
