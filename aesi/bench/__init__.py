@@ -9,6 +9,7 @@ BENCHMARKS = {
     "espm": "aesi.bench.physics.espm",
     "dfn": "aesi.bench.physics.dfn",
     "start": "aesi.bench.physics.start",
+    "calibrate": "aesi.bench.physics.calibrate",
     "ensemble": "aesi.bench.hybrid.ensemble",
     "design": "aesi.bench.hybrid.design",
     "spci": "aesi.bench.intervals.spci",

@@ -8,7 +8,7 @@ judging the physics.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,10 +27,11 @@ from aesi.pipeline.product.error_series import error_series
 from aesi.records import ErrorSeries, Measurement, Split
 from aesi.sparse import with_inputs
 
-SplitLayout = Literal["repeats", "schedules", "beyond"]
+SplitLayout = Literal["repeats", "schedules", "beyond", "one"]
 """repeats : WLTC five times over the whole state of charge, training on 1, 3 and 5, test on 2 and 4.
 schedules : the paper's training, validation and test schedules.
-beyond : as repeats, but the training drives never charge, and the test drives do, at BEYOND times the current."""
+beyond : as repeats, but the training drives never charge, and the test drives do, at BEYOND times the current.
+one : a single training record, WLTC five times over the whole state of charge; test on UDDS five times."""
 
 INPUTS = ("I", "I_next", "I_60s", "c_sp", "c_sn", "c_e0", "c_eL")
 DT_S = 1.0
@@ -109,20 +110,33 @@ def _beyond(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
 def _in_turn(
     capacity_ah: float, train: Callable[[Array], Array], test: Callable[[Array], Array]
 ) -> dict[str, tuple[Profile, ...]]:
-    """WLTC by turns for training and test, so many times as hard that all use up the charge from start to end."""
-    bench = Bench(capacity_ah, DT_S)
-    once = bench.drive("wltc_3b")
+    """WLTC by turns for training and test."""
+    once = Bench(capacity_ah, DT_S).drive("wltc_3b")
     drives = [(test if k + 1 in TEST_REPEATS else train)(once) for k in range(N_REPEATS)]
-    share = float(np.sum(drives)) * DT_S / SECONDS_PER_HOUR / capacity_ah
+    return {"record": (_emptying("drive", drives, capacity_ah),)}
+
+
+def _one(capacity_ah: float) -> dict[str, tuple[Profile, ...]]:
+    bench = Bench(capacity_ah, DT_S)
+    train, test = (
+        _emptying(name, N_REPEATS * [bench.drive(name)], capacity_ah) for name in ("wltc_3b", "udds")
+    )
+    return {"train": (train,), "valid": (), "test": (test,)}
+
+
+def _emptying(name: str, drives: Sequence[Array], capacity_ah: float) -> Profile:
+    """The drives after a minute of rest, so many times as hard that they use up the charge from start to end."""
+    bench = Bench(capacity_ah, DT_S)
+    share = float(np.sum(np.concatenate(drives))) * DT_S / SECONDS_PER_HOUR / capacity_ah
     scale = (SOC_START - SOC_END) / share
-    pieces = [bench.rest(60.0), *(scale * drive for drive in drives)]
-    return {"record": (bench.profile("drive", pieces, SOC_START),)}
+    return bench.profile(name, [bench.rest(60.0), *(scale * drive for drive in drives)], SOC_START)
 
 
 PROFILES: dict[SplitLayout, Callable[[float], dict[str, tuple[Profile, ...]]]] = {
     "repeats": _repeats,
     "schedules": lambda capacity_ah: paper_profiles(capacity_ah, DT_S),
     "beyond": _beyond,
+    "one": _one,
 }
 
 

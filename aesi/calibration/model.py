@@ -15,11 +15,11 @@ from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, solver
 
 SOLID_ORDER = 8
-"""Eight modes resolve a particle to 0.4 mV under a drive to 3C."""
+"""Modes of solid diffusion: eight resolve a particle to 0.4 mV under a drive to 3C."""
 ELECTRODE_POINTS = 4
-"""Of the porous electrode: to 0.14 mV on discharges of the shipped cells to 1C."""
+"""Points across a porous electrode: four err by 0.14 mV at most on discharges of the shipped cells to 1C."""
 MOST_STEPS = 4
-"""Of a model between two rows: they are thinned to where little happens between them."""
+"""Steps of the model between two rows: rows are thinned so that little happens between them."""
 ERROR_V = 5e-3
 """What a calibrated single-particle model is expected to miss: the calibrated files leave 5 to 16 mV of the pulses, the
 drive and the 1C discharge at 25 degC that they were fitted to (docs/cells.md)."""
@@ -35,7 +35,8 @@ AGEING_SD = 0.03
 of the size of what is found: the Panasonic's pulse tests of five months lost 0, 2, 3 and 4 % (`Capacity share by
 record` in its file)."""
 NEWER = 0.1
-"""Deviations that a record's capacity may exceed that of the file by: none, but for the descent to start inside."""
+"""By how many AGEING_SD a record's capacity may exceed that of the file. A cell does not grow younger: the bound is
+above nought only so that a descent that starts there is inside."""
 ZERO_SHARE = 5e-4
 """Of the largest current among the records: what a cycler's zero is uncertain by, 0.1 % of its range being usual."""
 STEP = 0.02

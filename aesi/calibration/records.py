@@ -19,9 +19,10 @@ from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
 
 SOC_SD = 0.005
-"""Of a state of charge that a potential in doubt gave; one that was given is believed."""
+"""Least standard deviation of an initial state of charge that was read from a voltage, since the potentials that it was
+read from are being fitted; one that the user gave keeps its own."""
 SLOW_C_RATE = 0.15
-"""Below this a cycler's zero is a share of the current."""
+"""Slow records: below this rate the zero offset of a cycler's current is a notable share of it, and is fitted."""
 MOST_ROWS = 4000
 """Rows of a drive that a fit sees: windows grow until there are no more."""
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 BOUND_SHARE = 0.02
-"""Of a parameter's range, next to a bound: what counts as the bound."""
+"""A parameter closer to a bound than this share of its range is reported to have ended there."""
 
 
 @dataclass(frozen=True)

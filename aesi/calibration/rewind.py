@@ -1,4 +1,4 @@
-"""The cell that is written: full and empty where its records have them, and the capacity of the usual record."""
+"""The cell that is written: full and empty where the records show them, and the capacity of a typical record."""
 
 from __future__ import annotations
 

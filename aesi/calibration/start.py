@@ -20,7 +20,7 @@ of several temperatures move them from there, see `aesi.calibration.parameters`.
 Diffusion in graphite and the conductivity as in Ecker et al., J. Electrochem. Soc. 162 (2015) A1836 (30.3, 17.1), rates
 as of graphite in O'Kane et al., Phys. Chem. Chem. Phys. 24 (2022) 7909."""
 OPEN_SHARE = 1e-3
-"""Of the largest current of a record: below this a cycler has its relay open, whatever it reads."""
+"""Of the largest current of a record: below this no current flows (the relay is open), whatever the cycler reads."""
 FULL_WINDOW_V = 0.15
 """A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
 LONG_CHARGE = 0.3

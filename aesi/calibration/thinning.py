@@ -11,12 +11,12 @@ from aesi.numerics.typing import BoolArray
 from aesi.records import Hold, Measurement
 
 WINDOW_S = 1.0
-"""Of a drive: solid diffusion and the electrolyte are slower than this."""
+"""Rows of a drive are averaged over this: solid diffusion and the electrolyte are slower."""
 STEADY_ROWS = 400
 """Rows that a steady record is spread over, besides those after its steps."""
 SPACING = Spacing(first_s=0.2, growth=0.4)
 SOON_S = 1.0
-"""A row after a step that another follows this soon need not be believed."""
+"""A row with a step of the current in it does not count in the fit where the next row follows this soon."""
 
 
 @dataclass(frozen=True, eq=False)

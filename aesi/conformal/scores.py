@@ -17,8 +17,8 @@ from aesi.conformal.intervals import Intervals
 from aesi.numerics.typing import Array, IntArray
 
 CURRENT_BINS = 8
-"""Bins of current and of charge, and rows from which one counts: conventions of the tables, and so are the
-minutes."""
+"""Bins over the range of the current. Conventions of the tables, as are the width of a bin in state of charge, the rows
+from which a bin counts, and windows of a minute."""
 SOC_BIN_WIDTH = 0.1
 MIN_BIN_SAMPLES = 200
 """At 200 rows a coverage of 90 % scatters by 2 %, were they independent."""

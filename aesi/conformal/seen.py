@@ -38,7 +38,7 @@ class Seen:
 
     @classmethod
     def of(cls, soc: Sequence[Array], temperature_degc: Sequence[Array | None]) -> Self:
-        """Of one array a record; temperatures None where they were not measured."""
+        """From states of charge and temperatures (degC), one array a record; None where no temperature was measured."""
         measured = [each for each in temperature_degc if each is not None and len(each)]
         span = (
             (min(float(t.min()) for t in measured), max(float(t.max()) for t in measured))

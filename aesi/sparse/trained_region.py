@@ -4,8 +4,8 @@
 
 d_j is how far the scaled input j lies outside its trained range, -1 to 1, and g the distance in the state of charge to
 the nearest trained row, since a gap between two drives lies within the range of each input. rho is the correlation of
-errors that far apart (`aesi.numerics.visited`): (1) is what a Gaussian process, known at the nearest fitted row alone,
-would have left of what it is there.
+errors that far apart (`aesi.numerics.visited`): (1) is the share of its value at the nearest fitted row that the mean
+of a Gaussian process keeps, if that row alone is known.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from time import process_time
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +35,7 @@ HORIZONS_S = (1.0, 10.0, 60.0)
 OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
 """Those of the experiment on the measured drive."""
 RIDGE, THRESHOLD = 10.0, 1e-3
+LAYOUTS: tuple[SplitLayout, ...] = ("repeats", "schedules", "beyond")
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,11 +99,11 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
     cells: int = 40,
-    layouts: Sequence[SplitLayout] = get_args(SplitLayout),
+    layouts: Sequence[SplitLayout] = LAYOUTS,
     seed: int = 0,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:
-    """cell : BPX file of the declared cell.  cells : virtual cells a layout."""
+    """cell : BPX file of the declared cell.  cells : virtual cells a layout.  layouts : see `SplitLayout`."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):

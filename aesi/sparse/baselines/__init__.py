@@ -19,8 +19,8 @@ from aesi.sparse.search.problem import Problem
 class Tuning:
     """What a baseline may spend and is judged by, the same as the search.
 
-    candidates, population : how many, and in a generation.  space : ranges (None: the widest).  judge : weights and
-    constraints.  told : hears of each candidate, as a row of plain values.
+    candidates : how many are evaluated, population : in each generation.  space : ranges (None: the widest).
+    judge : weights of the fitness, and constraints.  told : is called with each candidate, a row of plain values.
     """
 
     seed: int = 0

@@ -2,8 +2,8 @@
 
     e[k + 1] = c
 
-A voltage sensor's offset, or a slow overpotential that the physics lacks, is mostly a constant; what a correction takes
-of it says nothing of the physics that it learnt.
+A voltage sensor's offset, or a slow overpotential that the physics lacks, is mostly a constant: a correction that
+takes off no more than this has learnt nothing of the physics.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
     e[k + 1] = a e[k] + b' U[k] + c
 
 Proctor, Brunton & Kutz, SIAM J. Appl. Dyn. Syst. 15 (2016) 142, doi:10.1137/15M1013857. With one state there is nothing
-to truncate. It is fitted one step ahead, as published; free run shows what that costs.
+to truncate. It is fitted one step ahead, as published, and judged in free run like all others.
 """
 
 from __future__ import annotations

@@ -62,12 +62,11 @@ def one_step_predictions(problem: Problem, drive: Array, functions: IntArray, ro
 
 @dataclass(frozen=True, eq=False)
 class FoldRuns:
-    """(n, 3) scaled predictions, by regime: of the fold's fit, its refit of the stable terms, and AESI I.
+    """(n, 3) scaled predictions in each regime: by the fold's fit, by its refit of the stable terms, and by AESI I.
 
-    from_none : a free run by the inputs alone, without a measured error at its start (`free_run` where the error feeds
-    back).
-    amplitudes : of the three (fade.py).  sums : (3, n_folds, 3) over each fold, of e**2, e p and p**2 with p the
-    prediction from none before its amplitude, in free run; scaled.
+    from_none : free run by the inputs alone, no measured error at its start; `free_run` for models with feedback.
+    amplitudes : (3,) of equation (2) in fade.py.  sums : (3, n_folds, 3), for each of the three and each fold the sums
+    of e**2, e p and p**2, with p the prediction `from_none` before the amplitude; scaled.
     """
 
     one_step: Array

@@ -1,4 +1,4 @@
-"""What the members of an ensemble leave on rows they did not draw, made comparable.
+"""Out-of-bag errors of the members of an ensemble, made comparable.
 
 Every resample leaves out other rows, so a member whose rows happen to be easy would win. The rows are cut into
 pieces of a block; s[p, b] is the squared error of member b on the u[p, b] rows of piece p that it did not draw, each

@@ -63,7 +63,7 @@ class Options:
     fold : rows of a left-out piece (default: records, each cut into `cuts`, or an eighth of the rows of a single one).
     regime : what the losses measure.  outside : what happens beyond the trained range.
     feedback : whether terms may hold the error at all.
-    fade : whether a correction without such terms gives way to the physics where nothing bears it out (fade.py).
+    fade : whether a correction without such terms is shrunk towards the physics (fade.py).
     balance : let every record count alike, in fits and losses, whatever the size of its error. Otherwise one
     record near the end of discharge, where the error is largest, decides the model for all others.
     """
@@ -220,7 +220,7 @@ class Problem:
 
     @property
     def folds_are_drives(self) -> bool:
-        """Whether what is left out are records, or the parts of each that were asked for by `Options.cuts`."""
+        """True where folds are whole records, or the parts that `Options.cuts` asks of each, not pieces of rows."""
         return self.options.fold is None and len(self.spans) > 1
 
     @property
@@ -267,7 +267,10 @@ class Problem:
 
 
 def _of_own_target(factors: Array, m: int, targets: int) -> Array:
-    """(n_folds, any, m + 1) of factors whose columns are terms, the target, and the targets of the folds, if any."""
+    """(n_folds, any, m + 1) factors of the m terms and each fold's own target.
+
+    factors : (n_folds, any, m + 1 + targets), the common target before those of the folds, if any.
+    """
     if not targets:
         return factors[:, :, : m + 1]
     return np.stack([factor[:, [*range(m), m + 1 + k]] for k, factor in enumerate(factors)])

@@ -32,7 +32,7 @@ class UnseenErrors:
 def unseen_errors(
     left_out: Sequence[HeldOutDrive], scaling: Scaling, error: Array, target: Array, folds: Sequence[Span]
 ) -> UnseenErrors:
-    """Of the physics behind `left_out`, one a fold; where there is none, of the physics of `error` and `target`."""
+    """Errors of the physics fitted without each fold; where `left_out` is empty, `error` and `target` as they are."""
     if not left_out:
         return UnseenErrors(np.empty((0, len(target))), error, target)
     before, after = (

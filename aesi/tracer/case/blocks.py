@@ -12,21 +12,22 @@ from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.problem import InverseProblem
 
 BLOCKS = 24
-"""Pieces that are left out in turn, all records together: enough to tell, and each long against the correlation of a
-model error. A convention."""
+"""Blocks of all records together, each left out in turn: enough for a sum over them to say something, and each long
+against the correlation of a model error. A convention."""
 FEWEST = 4
-"""Blocks of all records together, and the fewest of one."""
+"""Fewest blocks that one record is cut into."""
 SEEN_SHARE = 2.0 / 3.0
-"""Of a single record: what is fitted where its end is left out."""
+"""Share of the blocks, from the first on, that is fitted in the fold that leaves out the end."""
 FEWEST_MEASURED = 6
-"""Of one record of a measured cell, whose model error lasts longer."""
+"""Blocks that one record of a measured cell may always have; more need as many independent samples of the model error,
+which lasts longer there."""
 RANGES = 3
-"""Ranges of rate, and of charge."""
+"""Ranges of the current's RMS, and of the state of charge, by which blocks are left out together."""
 
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """starts : (b + 1,) first rows of the blocks, and the number of rows.  record : (b,) that each block is of.
+    """starts : (b + 1,) first rows of the blocks, and the number of rows.  record : (b,) number of each block's record.
 
     folds : partition -> list of sets of blocks that are left out in turn.
     """

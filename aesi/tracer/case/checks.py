@@ -12,12 +12,12 @@ from aesi.physics.cell import Cell
 from aesi.tracer.case.records import PreparedRecord
 
 FEWEST_SAMPLES = 200
-"""For a record of less than ten times SHORTEST_S."""
+"""Fewest samples of a record shorter than ten times SHORTEST_S."""
 SHORTEST_S = 300.0
-"""Less shows neither diffusion nor a slope of the open-circuit voltage."""
+"""Shortest record: in less, neither diffusion nor the slope of the open-circuit voltage shows."""
 LEAST_C_RATE = 0.02
-"""A current that stays below moves the voltage by no more than the open-circuit potentials are off. A convention, as a
-rest's (`aesi.physics.initial_state`): such a record holds no load."""
+"""A record whose current stays below this rate holds no load: its overpotential is within what open-circuit potentials
+are off by. A convention, like the rate below which a current counts as a rest (`aesi.physics.initial_state`)."""
 FOREIGN_CELL_V = 0.25
 """A model of the right chemistry, however badly parametrised, is closer than this to the voltage in the median. The
 file of an LG M50, sized to cells of other makes, errs by 50 to 110 mV RMS on their drives from 10 to 40 degC
@@ -53,7 +53,8 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
 
 
 def _discharged_ah(record: PreparedRecord) -> Array:
-    """(n,) as the record's current is held: a pulse before a row minutes later is no triangle."""
+    """(n,) Ah discharged since the first row. Between rows the current is linear or constant, by the record's `hold`:
+    where rows are minutes apart, straight lines would make a triangle of a pulse."""
     current = record.data.current_a
     mean = current[1:] if record.hold == "backward" else 0.5 * (current[1:] + current[:-1])
     return np.concatenate([[0.0], np.cumsum(mean * np.diff(record.data.time_s))]) / SECONDS_PER_HOUR

@@ -21,7 +21,7 @@ STATE_OF_CHARGE = "soc0"
 FURTHEST_SDS = 4.0
 """An own parameter may not leave this many of its standard deviations."""
 TINY = 1e-6
-"""Of a standard deviation of the prior: closer to a bound is on it."""
+"""Of a standard deviation of the prior: what is closer to a bound counts as on it."""
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,8 @@ class FreeParameter:
         return self.coordinate(self.low), self.coordinate(self.high)
 
     def on_bound(self, x: float) -> bool:
-        """True where the parameter of an effect ended on a bound of what is plausible: not at its neutral point, and
-        not where a bound is the end of what a shape can mean at all."""
+        """True where an effect's parameter ended on the bound of what is plausible. Its neutral point is no such bound,
+        nor is the end of what can be meant at all (a share of 0 or 1)."""
         if self.own or not (self.amplitude or self.log):
             return False
         low, high = self.bounds
@@ -99,9 +99,9 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
 
 
 def _expected(p: Parameter, capacity_ah: float) -> float | None:
-    """Standard deviation of how far a parameter under test is from where it does nothing, None where that is not known.
+    """Prior standard deviation of an effect's parameter about its neutral value, None where none is known.
 
-    Of contacts, and of what every cell file declares, it is how far files of other cells of its make are off.
+    For contacts, and for what every cell file declares, it is the scatter between files of cells of one make.
     """
     if p.spread is not None and p.spread.loose is not None and p.neutral is not None:
         if p.spread.ohmic:

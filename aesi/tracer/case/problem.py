@@ -29,9 +29,9 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.case.stepping import FEWER_POINTS, stepping
 
 Trust = Literal["exact", "tight", "loose", "measured"]
-"""How far the declared parameters are believed: as fitted to this very cell by this very model, as a careful
-parametrisation of it, as one of a cell of its make; or as fitted to this very cell by a model that errs as models of
-measured cells do, read by instruments as they are."""
+"""How far the declared parameters are believed. exact: fitted to this very cell by this very model.  tight: a careful
+parametrisation of this cell.  loose: one of another cell of its make.  measured: fitted to this very cell by a model
+that errs as models of measured cells do, its records read by instruments that may be off."""
 INDEPENDENT_S, INDEPENDENT_CHARGE = 200.0, 0.05
 """How long, and over how much charge, the error of a model of a measured cell lasts: its integral correlation time is
 45 to 670 s on eight development records of `aesi bench real`, geometric mean 140 s about the mean and 260 s about
@@ -83,7 +83,8 @@ class InverseProblem:
         return tuple(out)
 
     def _soc0_sd(self, record: PreparedRecord) -> float:
-        """What was given and what the model of a measured cell reads may both be off by as much as they differ."""
+        """Standard deviation of the initial state of charge; for a measured cell at least the difference between the
+        one that was given and the one that its voltage reads as."""
         return max(record.soc0_sd, record.soc0_doubt) if self.trust == "measured" else record.soc0_sd
 
     def _spread(self, effect: Effect, p: Parameter) -> float | None:
@@ -99,8 +100,8 @@ class InverseProblem:
         return sd / self.cell.nominal_capacity_ah if p.spread.ohmic else sd
 
     def active(self, values: ValuesByOwner) -> tuple[ActiveEffect, ...]:
-        """The effects to simulate with.  One under test is in even at its neutral point: some say the same of a cell in
-        other words there (windows by voltages), and a fit must not see a step."""
+        """The effects to simulate with.  One under test is among them at its neutral point too: some rewrite the cell
+        even there (its windows by voltages), and a residual must be continuous in the parameters of a fit."""
         return (
             *self.fixed,
             *(

@@ -1,4 +1,4 @@
-"""What the model itself approximates, settled before anything is sought in the cell."""
+"""Approximations of the model itself, numerics and reduction, settled before anything is sought in the cell."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ NOTABLE_SHARE = 0.1
 """Of the noise: an approximation that moves the voltage by more than this is taken back in every hypothesis. A
 convention: what moves by less lifts an error by half a percent."""
 LEAST_V = 1.5e-4
-"""What counts at all on data that were not seen, as squares: less is within what two models of one cell differ by. On
-a blind case that lacks nothing (3 of seed 12) a double layer was named to take back 0.13 mV between the two models."""
+"""Least difference of two voltages, as RMS, that counts as evidence: two models of one cell differ by as much. On a
+blind case that lacks nothing (3 of seed 12) a double layer was named to take back 0.13 mV between the two models."""
 
 
 def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
@@ -59,8 +59,8 @@ class Reduction:
 
 
 def reduction_of(problem: InverseProblem) -> Reduction | None:
-    """What the reduction of the declared cell moves in its records; None where one of the models cannot be simulated,
-    or where the declared model takes the reduction back already."""
+    """By how much both models of the declared cell differ on its records; None where one of them cannot be simulated,
+    or where the declared model already holds an effect that takes the reduction back."""
     if any(active.effect.refines == "reduction" for active in problem.fixed):
         return None
     moved = []

@@ -1,5 +1,5 @@
-"""What a fit spares: longer steps of the nonlinear part where a record asks for no more, so that slow tests cost as
-little as short ones, and fewer points across a porous electrode than a simulation that is looked at."""
+"""Coarser numerics for fits than for a simulation that is looked at: longer steps of the nonlinear part where rows are
+far apart, so that slow tests cost as little as short ones, and fewer points across a porous electrode."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class FittedHypothesis:
     """A hypothesis where the data put it.
 
     free : what moves.  point : the linear form there.  score : on unseen data.  simulations : spent.
-    as_declared : about the declared values of its own parameters, not where the data put them.
+    as_declared : whether the linear form is about the declared values of the own parameters, instead of the optimum.
     """
 
     hypothesis: tuple[str, ...]

@@ -52,8 +52,8 @@ class Parent:
 
     @cached_property
     def movable(self) -> IntArray:
-        """Parameters but those on a bound of what they can mean at all, which a linear form cannot see.  The bounds of
-        the others are where their prior has long taken over."""
+        """Numbers of the parameters that may move to first order: all but those on a hard bound, such as nought of a
+        resistance, beyond which the linear form would go. A bound at FURTHEST_SDS is none: the prior holds there."""
         x = self.fit.point.x
         bounds = np.array([f.bounds for f in self.fit.free])
         near = np.abs(x[:, None] - bounds) < 1e-9
@@ -65,8 +65,8 @@ class Parent:
 class Grown:
     """A parent and one effect: its parameters fitted, the rest to first order.
 
-    free, point : of what may move, on no bound.  on_bounds : value of what is.  u : coordinates of the effect alone.
-    slopes_v : (n, k) V, what its parameters do there.
+    free, point : the movable parameters and the linear form in them.  on_bounds : values of the others.
+    u : (k,) coordinates of the effect's own parameters.  slopes_v : (n, k) V, their sensitivities there.
     """
 
     hypothesis: tuple[str, ...]

@@ -59,7 +59,7 @@ class ModelState:
             return run(data, record.soc0, effects, hold)
 
     def _full(self, otherwise: float) -> float:
-        """State of charge of a full charge, as the fitted records that start from one put it."""
+        """State of charge that counts as full: the mean fitted start of the records that begin fully charged."""
         assert self.values is not None
         known = self.values[STATE_OF_CHARGE]
         full = [known[str(i)] for i, r in enumerate(self.problem.records) if r.basis == "full charge"]

@@ -51,8 +51,8 @@ def largest_gains(
 
 
 def _drawn(problem: InverseProblem, draws: int, rng: np.random.Generator) -> Array:
-    """(n, draws) draws of the model error and the noise, whitened: what has the covariance that is whitened is white;
-    rows that are one sample together share its draw."""
+    """(n, draws) of model error and noise, whitened: standard normal numbers. Under a coarsened likelihood the rows
+    that make up one independent sample share its draw."""
     if not problem.coarse:
         return rng.normal(size=(len(problem.time_s), draws))
     sample = np.floor(np.cumsum(problem.independent) - problem.independent).astype(int)
@@ -60,8 +60,8 @@ def _drawn(problem: InverseProblem, draws: int, rng: np.random.Generator) -> Arr
 
 
 def _said(blocks: Blocks, sensitivities: Array, white: Array) -> Array:
-    """(s,) nats, what a linear hypothesis says of each of s surrogates that it has not seen, less what all hypotheses
-    share.
+    """(s,) held-out log predictive density of each of s surrogates under a linear hypothesis, nats, up to a constant
+    that all hypotheses share.
 
     sensitivities : (n, m), white : (n, s), both whitened.
     """

@@ -74,7 +74,7 @@ def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
 
 
 def _even(run: Run, residual: Array) -> ErrorSeries:
-    """A record at its own usual spacing, evenly, with the inputs of the sample that is predicted in each row."""
+    """The record resampled evenly at its median spacing; a row has the inputs of the next sample, which it predicts."""
     inputs = np.column_stack([run.current_a if name == "I" else run.series[name] for name in INPUT_NAMES])
     series = ErrorSeries(
         name="record",
