@@ -14,6 +14,7 @@ BENCHMARKS = {
     "design": "aesi.bench.hybrid.design",
     "spci": "aesi.bench.intervals.spci",
     "bands": "aesi.bench.intervals.bands",
+    "drift": "aesi.bench.intervals.drift",
     "cells": "aesi.bench.physics.cells",
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""
