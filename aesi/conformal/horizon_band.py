@@ -21,8 +21,9 @@ N_PIECES = 8
 can be scored by a scale fitted to the others. Over the development splits of the NMC drive in `aesi bench splits`, with
 one term more in the scale, the bands of AESI I cover 97.9 % with 4, 90.6 % with 8, 82.2 % with 16."""
 MIN_PIECES = 3
-"""Fewer pieces cannot say how much one differs from the next: where the rows inside the trained range make fewer, all
-rows are used and the band says so; where even these do, there is none."""
+"""Least pieces of a band, since fewer cannot say how much one differs from the next. Where the rows inside the trained
+range give fewer, all rows are used and the band is marked `extrapolated`; where these do too, there is none. With 6 no
+figure of `aesi bench bands --set layouts='["one"]' --set cells=2` changes, since none of its bands comes near it."""
 MIN_ROWS = 30
 """Rows from which a piece counts. With 10 or 100 no figure of those splits changes."""
 FORGOTTEN = 100
