@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 from aesi.bench import CaseRow
@@ -61,6 +62,24 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
         raise
     tracker.end("FINISHED")
     yield last
+
+
+def judged_once(case: Any, judge: Callable[[Any], CaseRow], keep: str | None) -> CaseRow:
+    """The row of a case, from the folder `keep` where it is there; case.name names its file.
+
+    keep : of one state of the code; None to judge every time.
+    """
+    if keep is None:
+        return judge(case)
+    path = Path(keep) / f"{case.name}.json"
+    if path.exists():
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    row = judge(case)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draft = path.with_suffix(".part")
+    draft.write_text(json.dumps(row), encoding="utf-8")
+    draft.replace(path)
+    return row
 
 
 def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from aesi.bench.left_out import LIMIT_S, judged, plan, summary, table
-from flows.benchmarks.cases import Cases, tracked
+from flows.benchmarks.cases import Cases, judged_once, tracked
 from flows.benchmarks.page import write_between
 
 SHOWN = ("cell", "record", "verdict", "effects", "error")
@@ -21,15 +21,17 @@ def run(
     workers: int = 1,
     address: str | None = None,
     write: str | None = None,
+    keep: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """One dict a record as it is judged, and a last one with `summary`: true.
 
     cells : folder of the declared cell files.  only : substring of the case, which is set/record.  limit_s : processor
     seconds a case.  workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two
-    marks becomes the table.
+    marks becomes the table.  keep : a folder for what each case gave; a case that is in it is not judged again, so that
+    an interrupted run goes on. It is of one state of the code: empty it after a change.
     """
     rows = []
-    judge = partial(judged, cells=cells, limit_s=limit_s)
+    judge = partial(judged_once, judge=partial(judged, cells=cells, limit_s=limit_s), keep=keep)
     for row in tracked(Cases("left_out", 0, plan(only), judge, summary, SHOWN), workers, address):
         rows.append(row)
         yield row

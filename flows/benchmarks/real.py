@@ -5,16 +5,14 @@ Each case is a nested run in the experiment `real`; its parent holds the rates a
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from aesi.bench import CaseRow
-from aesi.bench.real import RealCase, chosen, judged, summary, write_report
+from aesi.bench.real import chosen, judged, summary, write_report
 from aesi.bench.real.judge import LIMIT_S
-from flows.benchmarks.cases import Cases, tracked
+from flows.benchmarks.cases import Cases, judged_once, tracked
 
 SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
 
@@ -39,7 +37,7 @@ def run(
     so that an interrupted run goes on. It is of one state of the code: empty it after a change.
     """
     specs = chosen(cases, only, development, every)
-    judge = partial(judged_once, cells=cells, limit_s=limit_s, keep=keep)
+    judge = partial(judged_once, judge=partial(judged, cells=cells, limit_s=limit_s), keep=keep)
     rows = []
     for row in tracked(Cases("real", 0, specs, judge, summary, SHOWN), workers, address):
         if row.get("summary"):
@@ -49,18 +47,3 @@ def run(
         else:
             rows.append(row)
             yield {key: value for key, value in row.items() if key != "residual"}
-
-
-def judged_once(case: RealCase, cells: str, limit_s: float | None, keep: str | None) -> CaseRow:
-    """The row of a case, from the folder `keep` where it is there."""
-    if keep is None:
-        return judged(case, cells, limit_s)
-    path = Path(keep) / f"{case.name}.json"
-    if path.exists():
-        return dict(json.loads(path.read_text(encoding="utf-8")))
-    row = judged(case, cells, limit_s)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_suffix(".part")
-    draft.write_text(json.dumps(row), encoding="utf-8")
-    draft.replace(path)
-    return row

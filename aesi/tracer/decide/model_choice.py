@@ -67,7 +67,7 @@ def with_model(
         return told(first, "espm", ", what it leaves the other one leaves as well")
     second = search(full, kept(full))
     if believed((second.path, second.verdict), (first.path, first.verdict)):
-        return told(first, "espm", ", with which less or more usual things have to be missing")
+        return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
 
 
