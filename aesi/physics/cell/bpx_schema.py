@@ -42,6 +42,10 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise CellError(f"cannot read the cell file {path}: {error.strerror or error}.") from None
+    except UnicodeDecodeError as error:
+        raise CellError(
+            f"{path} is not text ({error.reason} at byte {error.start}), so no BPX file; is it a record?"
+        ) from None
     try:
         raw = json.loads(text)
     except json.JSONDecodeError as error:

@@ -28,7 +28,7 @@ class Archive:
         self._lock = threading.Lock()
         self._kept: dict[str, Array] = {}
         if path is not None and path.exists():
-            for line in path.read_text(encoding="utf-8").splitlines():
+            for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
                 try:
                     entry = json.loads(line)
                     if entry["context"] == context:

@@ -167,6 +167,12 @@ def test_files_that_are_not_there_or_not_json_are_named(tmp_path):
         Cell.from_bpx(broken)
 
 
+def test_a_file_that_is_no_text_is_refused_in_one_sentence(tmp_path):
+    (tmp_path / "record.mpr").write_bytes(bytes(range(256)))
+    with pytest.raises(CellError, match=r"record\.mpr is not text .* is it a record\?"):
+        Cell.from_bpx(tmp_path / "record.mpr")
+
+
 @pytest.mark.parametrize("soc", [0.02, 0.4, 0.97])
 def test_the_rest_voltage_leads_back_to_the_state_of_charge(lg_m50, soc):
     voltage = float(lg_m50.rest_voltage_v(soc)[0])
