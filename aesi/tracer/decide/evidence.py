@@ -10,7 +10,6 @@ import numpy as np
 from aesi.errors import DataError
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem, Trust
-from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.one_cause import in_one
@@ -121,16 +120,10 @@ def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks
 
 def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
     """Is the second of two searches believed rather than the first? One that explains the data before one that does
-    not; one with fewer names, unless more of them lower the error of unseen data by more than two solvers of one model
-    differ; then by what they chose."""
+    not, then by what they chose."""
     unknown = [verdict.word == "unknown" for _, verdict in (one, other)]
     if unknown[0] != unknown[1]:
         return unknown[0]
-    fewer, more = sorted((one, other), key=lambda search: len(search[0].chosen.hypothesis))
-    if len(fewer[0].chosen.hypothesis) < len(more[0].chosen.hypothesis):
-        left = [unseen_rmse_v(path.blocks, path.chosen) ** 2 for path, _ in (fewer, more)]
-        if left[0] - left[1] <= LEAST_V**2:
-            return fewer is other
     chosen = other[0].chosen
     return most_plausible([one[0].chosen, chosen], len(one[0].problem.competing())) is chosen
 

@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
+from aesi.tracer.case.reduction import LEAST_V, Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.evidence import Evidence, believed
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis
 from aesi.tracer.search.forward import HOPELESS_SHARE
-from aesi.tracer.search.path import Path, beyond_noise
+from aesi.tracer.search.path import Path, beyond_noise, unseen_rmse_v
 from aesi.tracer.search.plausible import ALIKE_NATS
 
 Search = Callable[[InverseProblem, Archive], Evidence]
@@ -66,9 +66,23 @@ def with_model(
     ):
         return told(first, "espm", ", what it leaves the other one leaves as well")
     second = search(full, kept(full))
-    if believed((second.path, second.verdict), (first.path, first.verdict)):
+    if with_single_particle(second, first):
         return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
+
+
+def with_single_particle(full: Evidence, single: Evidence) -> bool:
+    """Is the search with the single particle believed? Of two that explain the data as well the one with fewer names,
+    unless more of them lower the error of unseen data by more than two solvers of one model differ: what one model
+    approximates, a name too many makes up for in the other. Else as of any two."""
+    explained = "unknown" not in (full.verdict.word, single.verdict.word)
+    names = [len(one.path.chosen.hypothesis) for one in (full, single)]
+    if explained and names[0] != names[1]:
+        fewer, more = sorted((full, single), key=lambda one: len(one.path.chosen.hypothesis))
+        left = [unseen_rmse_v(one.path.blocks, one.path.chosen) ** 2 for one in (fewer, more)]
+        if left[0] - left[1] <= LEAST_V**2:
+            return fewer is single
+    return believed((full.path, full.verdict), (single.path, single.verdict))
 
 
 def _says_more(full: InverseProblem, path: Path, kept: Kept) -> bool:

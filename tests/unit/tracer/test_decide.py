@@ -1,7 +1,6 @@
 """Verdicts as pure functions of frozen evidence, the archive, and the map from margin to frequency."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +10,6 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
-from aesi.tracer.decide.evidence import believed
 from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
@@ -114,24 +112,3 @@ def test_the_map_gives_the_frequency_that_it_was_fitted_to():
     truth = FrequencyMap(0.5, 0.8, 0)
     for margin in (-2.0, 0.0, 2.0):
         assert found.frequency(margin) == pytest.approx(truth.frequency(margin), abs=0.04)
-
-
-def explained(names, total, rmse_v, word="found"):
-    """A search that is over: what it chose, what that says and leaves of unseen data."""
-    n = 100
-    score = SimpleNamespace(total=total, evidence=total, shifts={"block": np.zeros((1, 0))})
-    point = SimpleNamespace(residual_v=np.full(n, rmse_v), jacobian_v=np.zeros((n, 0)))
-    chosen = SimpleNamespace(hypothesis=names, score=score, point=point)
-    blocks = SimpleNamespace(of_row=np.zeros(n, dtype=int))
-    problem = SimpleNamespace(competing=lambda: range(20))
-    return SimpleNamespace(chosen=chosen, blocks=blocks, problem=problem), SimpleNamespace(word=word)
-
-
-def test_a_further_name_has_to_lower_the_error_of_unseen_data():
-    one = explained(("a",), 100.0, 1e-3)
-    two = explained(("b", "c"), 120.0, 1e-3)
-    assert not believed(one, two)
-    assert believed(two, one)
-    assert believed(one, explained(("b", "c"), 120.0, 0.9e-3))
-    assert believed(one, explained(("d",), 120.0, 1e-3))
-    assert believed(explained((), 90.0, 1e-3, "unknown"), two)

@@ -2,6 +2,7 @@
 are one's, or the one that was asked for."""
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content, found_model
 from aesi.records import Measurement
 from aesi.tracer import discover
+from aesi.tracer.decide.model_choice import with_single_particle
 
 from .conftest import CELLS, NOISE_V, steps
 
@@ -67,3 +69,25 @@ def test_models_that_differ_by_less_than_the_noise_leave_the_single_particle(m50
     one = found(m50, loud, max_effects=0)
     assert one.choice.model == "espm"
     assert not one.choice.reduction.notable
+
+
+def explained(names, total, rmse_v, word="found"):
+    """A search that is over: what it chose, what that says and leaves of unseen data."""
+    n = 100
+    score = SimpleNamespace(total=total, evidence=total, shifts={"block": np.zeros((1, 0))})
+    point = SimpleNamespace(residual_v=np.full(n, rmse_v), jacobian_v=np.zeros((n, 0)))
+    chosen = SimpleNamespace(hypothesis=names, score=score, point=point)
+    blocks = SimpleNamespace(of_row=np.zeros(n, dtype=int))
+    problem = SimpleNamespace(competing=lambda: range(20))
+    path = SimpleNamespace(chosen=chosen, blocks=blocks, problem=problem)
+    return SimpleNamespace(path=path, verdict=SimpleNamespace(word=word))
+
+
+def test_a_further_name_than_with_the_other_model_has_to_lower_the_error_of_unseen_data():
+    one = explained(("a",), 100.0, 1e-3)
+    two = explained(("b", "c"), 120.0, 1e-3)
+    assert not with_single_particle(one, two)
+    assert with_single_particle(two, one)
+    assert with_single_particle(one, explained(("b", "c"), 120.0, 0.9e-3))
+    assert with_single_particle(one, explained(("d",), 120.0, 1e-3))
+    assert with_single_particle(explained((), 90.0, 1e-3, "unknown"), two)
