@@ -1,9 +1,15 @@
 """Virtual records that come with the package are met by their content, before the user's cache."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from aesi.data.laboratory import cache
+from aesi.data.laboratory import cache, simulator
+from aesi.pipeline.experiment.config import read_experiment
+from aesi.pipeline.experiment.sources import cell_path, virtual_experiment
+
+EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
 
 
 def test_a_shipped_entry_is_found_first_and_an_unknown_one_is_made(tmp_path, monkeypatch):
@@ -15,3 +21,13 @@ def test_a_shipped_entry_is_found_first_and_an_unknown_one_is_made(tmp_path, mon
     made = cache.cached("laboratory", "new", lambda: {"voltage_v": np.ones(2)})
     np.testing.assert_array_equal(made["voltage_v"], np.ones(2))
     assert (tmp_path / "cache" / "laboratory" / "new.npz").is_file()
+
+
+def test_all_that_the_first_experiment_falls_back_to_is_shipped(monkeypatch, tmp_path):
+    """A change of the laboratory asks for `docs/hooks/ship.py` again; without it the first run takes minutes more."""
+    config = read_experiment(EXPERIMENTS / "measured_nmc_drive.yaml")
+    config = config.model_copy(update={"data": config.fallback.data, "cell": config.fallback.cell})
+    monkeypatch.setenv("AESI_CACHE", str(tmp_path))
+    monkeypatch.setattr(cache, "_store", lambda path, arrays: pytest.fail(f"{path.name} is not shipped"))
+    monkeypatch.setattr(simulator, "_simulate", lambda *_: pytest.fail("simulated: it is not shipped"))
+    virtual_experiment(config, cell_path(config))
