@@ -33,7 +33,7 @@ FINALIST_SHARE = 0.5
 at 2 to 27 % of the best one's full fit."""
 BEAM = 2
 """Hypotheses that a further effect is tried on. The best and one to fall back on, a convention: each costs
-another round of growing."""
+another round of growing. With 1 and 4 the seven cases of `ALIKE_NATS` get the same answers."""
 HOPELESS_SHARE = 0.7
 """Of the mean square beyond noise on unseen data without any effect: where two effects leave more, a third is not tried
 and none is exchanged. A convention that saves time: on a measured cell, which no two effects explain, each further
