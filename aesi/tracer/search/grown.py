@@ -14,7 +14,8 @@ from aesi.tracer.search.archive import Archive, fit_name
 
 PROMISING = 9
 """Effects that are grown on a hypothesis with effects: those that say most to first order. A convention that saves
-time: of these, `FINALISTS` are fitted, so that three more than are needed are looked at. With 5 the seven cases of `ALIKE_NATS` get the same answers."""
+time: of these, `FINALISTS` are fitted, so that three more than are needed are looked at. With 5 the seven cases of
+`ALIKE_NATS` get the same answers."""
 
 
 def promising(parent: Parent, slopes: Mapping[str, Array]) -> list[str]:

@@ -11,8 +11,8 @@ from aesi.tracer.likelihood.fit import FittedHypothesis
 
 ALIKE_NATS = 3.0
 """Hypotheses within this of each other say as much of unseen data: odds of twenty, a convention. With half and twice as
-much (`docs/hooks/constant.py aesi.tracer.search.plausible:ALIKE_NATS=6 bench blind --set seed=13`) seven cases (0, 5, 8,
-10, 15, 17, 19), three with an effect, get the same answers."""
+much (`docs/hooks/constant.py aesi.tracer.search.plausible:ALIKE_NATS=6 bench blind --set seed=13`) the cases 0, 5, 8,
+10, 15, 17 and 19, three of them with an effect, get the same answers."""
 
 
 def plausibility(fit: FittedHypothesis, competing: int) -> float:
