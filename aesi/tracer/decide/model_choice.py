@@ -14,12 +14,12 @@ from dataclasses import dataclass, replace
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import LEAST_V, Reduction, reduction_of, with_fine_numerics
+from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.evidence import Evidence, believed
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis
 from aesi.tracer.search.forward import HOPELESS_SHARE
-from aesi.tracer.search.path import Path, beyond_noise, unseen_rmse_v
+from aesi.tracer.search.path import Path, beyond_noise, lowers_error, unseen_rmse_v
 from aesi.tracer.search.plausible import ALIKE_NATS
 
 Search = Callable[[InverseProblem, Archive], Evidence]
@@ -79,8 +79,8 @@ def with_single_particle(full: Evidence, single: Evidence) -> bool:
     names = [len(one.path.chosen.hypothesis) for one in (full, single)]
     if explained and names[0] != names[1]:
         fewer, more = sorted((full, single), key=lambda one: len(one.path.chosen.hypothesis))
-        left = [unseen_rmse_v(one.path.blocks, one.path.chosen) ** 2 for one in (fewer, more)]
-        if left[0] - left[1] <= LEAST_V**2:
+        left_v = [unseen_rmse_v(one.path.blocks, one.path.chosen) for one in (fewer, more)]
+        if not lowers_error(*left_v):
             return fewer is single
     return believed((full.path, full.verdict), (single.path, single.verdict))
 

@@ -20,7 +20,7 @@ from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.grown import promising, side_by_side
-from aesi.tracer.search.path import Path, Report, Step, beyond_noise, unseen_rmse_v
+from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible
 
 FINALISTS = 6
@@ -72,7 +72,7 @@ def searched(
             break
         others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
-    chosen = _pruned(problem, blocks, chosen, steps, archive, report)
+    chosen = _pruned(problem, blocks, base, chosen, steps, archive, report)
     if not _hopeless(problem, blocks, base, chosen):
         chosen = _exchanged(problem, blocks, chosen, steps, slopes, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
@@ -81,6 +81,7 @@ def searched(
 def _pruned(
     problem: InverseProblem,
     blocks: Blocks,
+    base: FittedHypothesis,
     chosen: FittedHypothesis,
     steps: Sequence[Step],
     archive: Archive,
@@ -93,7 +94,7 @@ def _pruned(
         for name in chosen.hypothesis:
             rest = tuple(other for other in chosen.hypothesis if other != name)
             start, size = chosen.placed, chosen.score.delta_v
-            fit = fitted_hypothesis(problem, blocks, rest, start, size, archive)
+            fit = fitted_hypothesis(problem, blocks, rest, start, size, archive) if rest else base
             if fit is None:
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
@@ -228,5 +229,5 @@ def admissible(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis,
 def needed(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
     """Would the effect be admitted on top of all the others, and does it lower the error of unseen data by more than
     two solvers of one model differ?"""
-    off = unseen_rmse_v(blocks, without) ** 2 - unseen_rmse_v(blocks, fit) ** 2
-    return off > LEAST_V**2 and admissible(blocks, without, fit, least_nats)
+    left_v = unseen_rmse_v(blocks, without), unseen_rmse_v(blocks, fit)
+    return lowers_error(*left_v) and admissible(blocks, without, fit, least_nats)
