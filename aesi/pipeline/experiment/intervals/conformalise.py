@@ -17,7 +17,7 @@ from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
-from aesi.records import HeldOutDrive
+from aesi.records import LeftOutDrives
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -30,15 +30,16 @@ def conformalise(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[HeldOutDrive] = (),
+    left_out: LeftOutDrives | None = None,
 ) -> tuple[Fitted, ...]:
     """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
     All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
     also the training records.
-    left_out : training drives under physics fitted without a part of them; by default the drives as they are.
+    left_out : training drives under physics fitted without some rows of them; by default the drives as they are.
+    Parts of them calibrate.
     """
-    return tuple(_conformalised(one, problem, chosen, config, left_out) for one in models)
+    return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
 
 
 def _conformalised(
@@ -46,15 +47,15 @@ def _conformalised(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[HeldOutDrive],
+    left_out: LeftOutDrives,
 ) -> Fitted:
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
     if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
-        pairs += fold_models(problem, chosen, one.model, left_out)
+        pairs += fold_models(problem, chosen, one.model, left_out.parts)
         one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
     elif isinstance(one.model, Bare | Persistence):
-        pairs += [(one.model, each.series, each.rows) for each in left_out]
-        if not left_out:
+        pairs += [(one.model, each.series, each.rows) for each in left_out.parts]
+        if not left_out.parts:
             pairs += [(one.model, series, WHOLE) for series in problem.split.train]
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
