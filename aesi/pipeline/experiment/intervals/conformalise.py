@@ -11,7 +11,7 @@ from typing import overload
 
 import numpy as np
 
-from aesi.conformal import COMPARED, Calibrated, Method, RefittedForest, RefittedIntervals
+from aesi.conformal import COMPARED, Calibrated, FreeRunBands, Method, RefittedForest, RefittedIntervals
 from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
@@ -37,7 +37,7 @@ def conformalise(
     All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
     also the training records.
     left_out : training drives under physics fitted without some rows of them; by default the drives as they are.
-    Parts of them calibrate.
+    Parts of them calibrate, and whole ones keep the band of a whole drive from being narrower than they need.
     """
     return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
 
@@ -49,12 +49,16 @@ def _conformalised(
     config: ExperimentConfig,
     left_out: LeftOutDrives,
 ) -> Fitted:
+    drives: list[Unseen] = []
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
     if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
         pairs += fold_models(problem, chosen, one.model, left_out.parts)
+        if left_out.drives and problem.folds_are_drives:
+            drives += fold_models(problem, chosen, one.model, left_out.drives, problem.spans)
         one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
     elif isinstance(one.model, Bare | Persistence):
         pairs += [(one.model, each.series, each.rows) for each in left_out.parts]
+        drives += [(one.model, each.series, each.rows) for each in left_out.drives]
         if not left_out.parts:
             pairs += [(one.model, series, WHOLE) for series in problem.split.train]
     if not pairs:
@@ -71,8 +75,7 @@ def _conformalised(
         except FitError as error:
             notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
     try:
-        errors = OutOfSampleErrors.of(pairs, problem.split.train, config.conformal.horizons_s)
-        bands = errors.bands(config.conformal.alpha)
+        bands = _bands(pairs, drives, problem, config)
         if any(band.extrapolated for band in bands.horizons):
             notes.append(
                 f"The bands of {one.model.name} in free run are calibrated on too few pieces inside the trained "
@@ -81,6 +84,19 @@ def _conformalised(
     except FitError as error:
         notes.append(f"{one.model.name} has no bands in free run: {error}")
     return replace(one, intervals=intervals, bands=bands, compared=compared, notes=tuple(notes))
+
+
+def _bands(
+    pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
+) -> FreeRunBands:
+    train, alpha = problem.split.train, config.conformal.alpha
+    bands = OutOfSampleErrors.of(pairs, train, config.conformal.horizons_s).bands(alpha)
+    if not drives:
+        return bands
+    try:
+        return bands.no_narrower_than(OutOfSampleErrors.of(drives, train, ()).bands(alpha))
+    except FitError:  # drives too short to be told apart
+        return bands
 
 
 @overload
