@@ -24,8 +24,8 @@ from aesi.tracer.search.plausible import ALIKE_NATS
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
-Kept = Callable[[InverseProblem], Archive]
-"""The fits of a problem that are known already."""
+Kept = Callable[[InverseProblem, Archive | None], Archive]
+"""The fits of a problem that are known already, beside those with the other model of the cell."""
 
 
 @dataclass(frozen=True)
@@ -54,18 +54,20 @@ def with_model(
 
     if wanted is not None:
         one = fine(wanted)
-        return told(search(one, kept(one)), wanted, ", as asked")
+        return told(search(one, kept(one, None)), wanted, ", as asked")
     single = fine("espm")
-    first = search(single, kept(single))
+    fits = kept(single, None)
+    first = search(single, fits)
     if reduction is None or not reduction.notable:
         return told(first, "espm")
     full = fine("dfn")
+    full_fits = kept(full, fits)
     tight = first.paths["tight"]
     if first.verdict.word == "unknown" and not (
-        _says_more(full, tight, kept) or _takes_off(full, tight, kept)
+        _says_more(full, tight, full_fits) or _takes_off(full, tight, full_fits)
     ):
         return told(first, "espm", ", what it leaves the other one leaves as well")
-    second = search(full, kept(full))
+    second = search(full, full_fits)
     if with_single_particle(second, first):
         return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
@@ -85,18 +87,16 @@ def with_single_particle(full: Evidence, single: Evidence) -> bool:
     return believed((full.path, full.verdict), (single.path, single.verdict))
 
 
-def _says_more(full: InverseProblem, path: Path, kept: Kept) -> bool:
+def _says_more(full: InverseProblem, path: Path, archive: Archive) -> bool:
     """Does the porous electrode say more of unseen data with nothing but its own parameters moved?"""
-    base = base_of(full, path.blocks, kept(full))
+    base = base_of(full, path.blocks, archive)
     return base is not None and base.score.total > path.base.score.total + ALIKE_NATS
 
 
-def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
+def _takes_off(full: InverseProblem, path: Path, archive: Archive) -> bool:
     """Does the porous electrode leave notably less of unseen data with what the single particle ended with?"""
     chosen = path.chosen
-    fit = fitted_hypothesis(
-        full, path.blocks, chosen.hypothesis, chosen.placed, chosen.score.delta_v, kept(full)
-    )
+    fit = fitted_hypothesis(full, path.blocks, chosen.hypothesis, chosen, archive)
     if fit is None:
         return False
     return beyond_noise(full, path.blocks, fit) < HOPELESS_SHARE * beyond_noise(

@@ -78,26 +78,30 @@ class HypothesisFitter:
         bounds = np.array([f.bounds for f in self.free])
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         self.simulations = 0
-        self._last: tuple[bytes, Array | None] = (b"", None)
+        self._errors: dict[bytes, Array | None] = {}
+        self._last_slopes: tuple[bytes, Array | None] = (b"", None)
 
     def residual(self, x: Array) -> Array | None:
         """(n,) V, or None where the model fails."""
         key = x.tobytes()
-        if self._last[0] != key:
+        if key not in self._errors:
             self.simulations += 1
             predicted = self.problem.predict(values_of(self.free, x))
-            self._last = (key, None if predicted is None else self.problem.measured - predicted)
-        return self._last[1]
+            self._errors[key] = None if predicted is None else self.problem.measured - predicted
+        return self._errors[key]
 
-    def jacobian(self, x: Array, residual: Array, columns: Sequence[int] | None = None) -> Array | None:
+    def jacobian(self, x: Array, residual: Array) -> Array | None:
         """(n, k) V per standard deviation of the prior, by one-sided differences within the bounds."""
-        wanted = range(len(x)) if columns is None else columns
-        out = np.zeros((len(residual), len(wanted)))
-        for place, j in enumerate(wanted):
+        if self._last_slopes[0] == x.tobytes():
+            return self._last_slopes[1]
+        columns = []
+        for j in range(len(x)):
             column = self._slope(x, j, residual)
             if column is None:
                 return None
-            out[:, place] = column
+            columns.append(column)
+        out = np.column_stack(columns)
+        self._last_slopes = (x.tobytes(), out)
         return out
 
     def _slope(self, x: Array, j: int, residual: Array) -> Array | None:
@@ -117,27 +121,14 @@ class HypothesisFitter:
                 return column
         return None
 
-    def descend(self, x: Array, delta_v: float, steps: int) -> Array:
-        """Coordinates after a descent at one size of the model error."""
+    def descend(self, x: Array, delta_v: float, rounds: int, slopes_v: Array | None = None) -> Array:
+        """Coordinates after a descent at one size of the model error.
 
-        def cost(at: Array) -> float:
-            e = self.residual(at)
-            if e is None:
-                return np.inf
-            r = whitened(self.problem, self.blocks, e[:, None], delta_v)[0]
-            return 0.5 * float(np.sum(r**2) + at @ at)
-
-        def linearise(at: Array) -> tuple[Array, Array] | None:
-            e = self.residual(at)
-            jacobian = None if e is None else self.jacobian(at, e)
-            if e is None or jacobian is None:
-                return None
-            table = whitened(self.problem, self.blocks, np.column_stack([e, -jacobian]), delta_v)[0]
-            return np.concatenate([table[:, 0], at]), np.vstack([table[:, 1:], np.eye(len(at))])
-
-        return descend(
-            linearise, cost, np.clip(x, self.low, self.high), self.low, self.high, steps, GAIN_NATS
-        ).x
+        slopes_v : (n, k) V, the model's sensitivities as they are near x, to begin with.
+        """
+        whitened_one = _Whitened(self, delta_v)
+        begin = None if slopes_v is None else whitened_one.columns(slopes_v)
+        return descend(whitened_one, x, self.low, self.high, rounds, GAIN_NATS, begin).x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit at a point, scored."""
@@ -161,6 +152,29 @@ def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> Predic
         sums = block_sums(blocks, white, log_det)
         out.append(score_at(blocks, sums, point.x, point.bounds, delta_v, prior.log_density(delta_v)))
     return best_over_sizes(out)
+
+
+@dataclass(frozen=True, eq=False)
+class _Whitened:
+    """What a descent minimises at one size of the model error: whitened residual, then the coordinates."""
+
+    fitter: HypothesisFitter
+    delta_v: float
+
+    def residual(self, x: Array) -> Array | None:
+        e = self.fitter.residual(x)
+        return None if e is None else np.concatenate([self._white(e[:, None])[:, 0], x])
+
+    def slopes(self, x: Array, residual: Array) -> Array | None:
+        e = self.fitter.residual(x)
+        jacobian = None if e is None else self.fitter.jacobian(x, e)
+        return None if jacobian is None else self.columns(jacobian)
+
+    def columns(self, jacobian_v: Array) -> Array:
+        return np.vstack([-self._white(jacobian_v), np.eye(jacobian_v.shape[1])])
+
+    def _white(self, columns_v: Array) -> Array:
+        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.delta_v)[0]
 
 
 class LinearForm(Protocol):

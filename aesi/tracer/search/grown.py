@@ -50,8 +50,8 @@ def side_by_side(wanted: Sequence[tuple[Parent, str]], archive: Archive) -> Iter
     def one(parent: Parent, name: str) -> Grown | None:
         kind = "grown as declared" if parent.fit.as_declared else "grown"
         key = fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
-        known = archive.get(key, len(parent.problem.effects[name].parameters))
-        found = grow(parent, name, _growth_size(parent), known)
+        size = len(parent.problem.effects[name].parameters)
+        found = grow(parent, name, _growth_size(parent), archive.get(key, size), archive.near(key, size))
         if found is not None:
             archive.put(key, found.u)
         return found
