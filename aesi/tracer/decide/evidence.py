@@ -24,7 +24,6 @@ from aesi.tracer.decide.verdict import (
     tolerance_v,
 )
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
@@ -44,7 +43,7 @@ class Option:
 
     state: ModelState
     left_out: LeftOut
-    explanation: Explanation | None
+    explanation: FittedHypothesis | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -215,50 +214,46 @@ def _best_carried(
     verdict: Verdict,
     recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
 ) -> Evidence:
-    """What is written where nothing explains the data: what was named all the same, or else what leaves least.
+    """What is written where nothing explains the data: what leaves least on parts left out, of all that was fitted.
 
-    Least on parts left out. Either has to run over the declared range, and to be no worse on any part than the declared
-    and the recalibrated model.
+    It has to run over the declared range and to be worth it, see `LeftOut.may_replace`; else the declared model stays.
     """
     declared = Option(ModelState(path.problem), left_out_errors(path.problem, path.blocks, None), None)
-    basic = [declared]
-    other = declared.state
-    if recalibrated is not None:
-        problem, fit = recalibrated
-        other = ModelState.of(problem, fit)
-        if range_fault(other) is None:  # what cannot be adopted itself is no yardstick for what can
-            basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
     tried = [(other.problem, fit) for other in others for fit in (other.base, other.chosen)]
-    more = [
+    if recalibrated is not None:
+        tried.insert(0, recalibrated)
+    options = [
         Option(ModelState.of(problem, fit), left_out_errors(problem, path.blocks, fit), fit)
         for problem, fit in dict.fromkeys(tried)
-        if recalibrated is None or fit is not recalibrated[1]
     ]
-    fit_options = [o for o in more if o.left_out.no_worse_than([b.left_out for b in basic])]
-    ranked = sorted([*basic, *fit_options], key=lambda o: o.left_out.pooled_v)
-    named = [
-        o
-        for o in more
-        if o.explanation is path.chosen and verdict.effects and o.left_out.no_worse_than([declared.left_out])
-    ]
+    safe = [option for option in options if option.left_out.may_replace(declared.left_out)]
+    other = declared.state if recalibrated is None else options[0].state
     fault = None
-    for option in (*named, *ranked):
-        rates_c = ORDINARY_C if option in named else (*ORDINARY_C, *FAST_C)
-        fault = range_fault(option.state, rates_c) if option.explanation is not None else None
+    for option in sorted([declared, *safe], key=lambda o: o.left_out.pooled_v):
+        if option.explanation is None:
+            return Evidence(
+                path, paths, other, option.state, verdict, fault or _why(path, option, declared, safe)
+            )
+        named = option.explanation is path.chosen and verdict.effects
+        fault = range_fault(option.state, ORDINARY_C if named else (*ORDINARY_C, *FAST_C))
         if fault is None:
-            why = _why(path, option, more, fit_options)
-            limits = () if option.explanation is None else _limits(option.state)
-            return Evidence(path, paths, other, option.state, verdict, why, limits)
-    return Evidence(path, paths, other, declared.state, verdict, fault)
+            why = _why(path, option, declared, safe)
+            return Evidence(path, paths, other, option.state, verdict, why, _limits(option.state))
+    raise AssertionError("the declared model is among the options")
 
 
-def _why(path: Path, taken: Option, more: list[Option], fitting: list[Option]) -> str | None:
-    chosen = next((o for o in more if o.explanation is path.chosen), None)
-    if chosen is None or chosen is taken or not path.chosen.hypothesis:
+def _why(path: Path, taken: Option, declared: Option, safe: Sequence[Option]) -> str | None:
+    """Why what was named is not what is written; None where it is."""
+    if taken.explanation is path.chosen or not path.chosen.hypothesis:
         return None
     names = " + ".join(path.chosen.hypothesis)
-    if chosen not in fitting:
-        return (
-            f"{names} does worse than the declared or the recalibrated model on a part of the data left out"
-        )
-    return f"another model leaves less than {names} on parts of the data left out"
+    if any(option.explanation is path.chosen for option in safe):
+        why = f"another model leaves less than {names} on parts of the data left out"
+    else:
+        why = f"{names} does worse than the declared model on a part of the data left out"
+    if taken.explanation is None:
+        return f"{why}; the declared model stays"
+    added = " + ".join(taken.explanation.hypothesis)
+    model = f"the recalibrated model with {added}" if added else "the recalibrated model"
+    left = f"{1e3 * taken.left_out.pooled_v:.1f} mV there, {1e3 * declared.left_out.pooled_v:.1f} as declared"
+    return f"{why}; written is {model} ({left})"

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from aesi.numerics.bounded import descend
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
 from aesi.tracer.case.problem import InverseProblem
@@ -121,12 +121,20 @@ class HypothesisFitter:
                 return column
         return None
 
-    def descend(self, x: Array, delta_v: float, rounds: int, slopes_v: Array | None = None) -> Array:
+    def descend(
+        self,
+        x: Array,
+        delta_v: float,
+        rounds: int,
+        slopes_v: Array | None = None,
+        without: Sequence[int] = (),
+    ) -> Array:
         """Coordinates after a descent at one size of the model error.
 
-        slopes_v : (n, k) V, the model's sensitivities as they are near x, to begin with.
+        slopes_v : (n, k) V, the model's sensitivities as they are near x, to begin with.  without : blocks that are
+        not looked at.
         """
-        whitened_one = _Whitened(self, delta_v)
+        whitened_one = _Whitened(self, delta_v, ~np.isin(self.blocks.of_row, without))
         begin = None if slopes_v is None else whitened_one.columns(slopes_v)
         return descend(whitened_one, x, self.low, self.high, rounds, GAIN_NATS, begin).x
 
@@ -156,10 +164,12 @@ def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> Predic
 
 @dataclass(frozen=True, eq=False)
 class _Whitened:
-    """What a descent minimises at one size of the model error: whitened residual, then the coordinates."""
+    """What a descent minimises at one size of the model error: whitened residual of the rows that are looked at (n,),
+    then the coordinates."""
 
     fitter: HypothesisFitter
     delta_v: float
+    seen: BoolArray
 
     def residual(self, x: Array) -> Array | None:
         e = self.fitter.residual(x)
@@ -174,7 +184,7 @@ class _Whitened:
         return np.vstack([-self._white(jacobian_v), np.eye(jacobian_v.shape[1])])
 
     def _white(self, columns_v: Array) -> Array:
-        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.delta_v)[0]
+        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.delta_v)[0][self.seen]
 
 
 class LinearForm(Protocol):

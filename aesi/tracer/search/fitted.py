@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, coordinates_of
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, coordinates_of, values_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
 from aesi.tracer.likelihood.growth import Explanation
@@ -53,6 +53,16 @@ def fitted_hypothesis(
             x = fitter.descend(x0, size, FIT_ROUNDS, _slopes_v(near, fitter.free))
         archive.put(name, x)
     return fitter.finished(x)
+
+
+def values_without(
+    problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, fold: Sequence[int]
+) -> dict[str, dict[str, float]]:
+    """owner -> name -> value where the data without some blocks put a hypothesis: with the whole model, by steps from
+    where all data put it and updates of the slopes that it has there."""
+    fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
+    x = fitter.descend(fit.point.x, fit.score.delta_v, 0, fit.point.jacobian_v, fold)
+    return values_of(fit.free, x)
 
 
 def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:
