@@ -41,10 +41,14 @@ class LeftOut:
 
     def may_replace(self, other: LeftOut) -> bool:
         """Is the model better than another one on the whole, and on no part worse by more than models of measured cells
-        err anyway?"""
+        err by?"""
         allowed = [np.hypot(its, MEASURED_V) for its in other.rmse_v]
         no_worse = all(own <= most for own, most in zip(self.rmse_v, allowed, strict=True))
         return no_worse and AS_GOOD * self.pooled_v < other.pooled_v
+
+    def as_good_as(self, other: LeftOut) -> bool:
+        """Does the model leave no more than another one and what models of measured cells err by?"""
+        return self.pooled_v <= np.hypot(other.pooled_v, MEASURED_V)
 
 
 def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None) -> LeftOut:

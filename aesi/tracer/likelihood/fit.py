@@ -15,6 +15,7 @@ from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, valu
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
+    Posterior,
     PredictiveScore,
     best_over_sizes,
     block_sums,
@@ -200,3 +201,13 @@ def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
     """(n,) V: the residual of each block at the parameters that the other blocks give, linearly."""
     shifts = fit.score.shifts["block"][blocks.of_row]
     return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)
+
+
+def prediction_sd_v(problem: InverseProblem, blocks: Blocks, fit: LinearForm) -> Array:
+    """(n,) V, standard deviation of what is predicted of each block by the parameters that the others give, if the
+    hypothesis is right: with a model error as small as that of a right one."""
+    x, jacobian = fit.point.x, fit.point.jacobian_v
+    white, log_det = whitened(problem, blocks, fit.point.table(), PRIORS[problem.trust].median_v)
+    posterior = Posterior(block_sums(blocks, white, log_det), x, blocks.folds["block"])
+    spread = [jacobian[rows] @ c for rows, c in zip(blocks.rows, posterior.covariances_without, strict=True)]
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", np.concatenate(spread), jacobian)))

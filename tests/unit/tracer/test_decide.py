@@ -10,7 +10,8 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
-from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v
+from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v, unexplained_v
+from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
@@ -45,9 +46,30 @@ def test_what_is_left_beyond_the_tolerance_is_unknown_and_names_nothing(path):
     bare = replace(path, chosen=path.base)
     verdict = judged(bare, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", ())
-    assert verdict.structured_v == structured_v(path, path.base) > verdict.tolerance_v
+    left_v = unexplained_v(path.problem, path.blocks, path.base, verdict.tolerance_v)
+    assert verdict.structured_v == left_v > verdict.tolerance_v
+    assert left_v == pytest.approx(structured_v(path, path.base), rel=0.05)  # few parameters, well known
     generous = judged(bare, Thresholds(solver_v=0.1))
     assert generous.word == "none"
+
+
+def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
+    one, blocks = path.base, path.blocks
+    wild = np.zeros((len(one.point.residual_v), 1))
+    wild[blocks.rows[5]] = 1.0  # a parameter that one block alone could tell
+    point = replace(
+        one.point,
+        x=np.append(one.point.x, 0.0),
+        residual_v=one.point.residual_v + 1.0 * wild[:, 0],
+        jacobian_v=np.column_stack([one.point.jacobian_v, wild]),
+        bounds=np.vstack([one.point.bounds, [[-9.0, 9.0]]]),
+    )
+    flexible = replace(one, point=point, score=scored(path.problem, blocks, point))
+    sd_v = prediction_sd_v(path.problem, blocks, flexible)
+    assert sd_v[blocks.rows[5]] == pytest.approx(1.0, rel=1e-3)
+    assert max(sd_v[blocks.rows[4]]) < 1e-3
+    assert structured_v(path, flexible) > 0.1
+    assert unexplained_v(path.problem, blocks, flexible, 1e-3) < 2 * structured_v(path, one)
 
 
 def test_data_that_order_nothing_give_look_alikes(path):
@@ -95,6 +117,8 @@ def test_a_model_is_replaced_by_one_that_is_worse_nowhere_and_better_on_the_whol
     assert not LeftOut((15e-3, 2e-3), 11e-3).may_replace(declared)  # worse on one part
     assert not LeftOut((10e-3, 29e-3), 21.5e-3).may_replace(declared)  # as good
     assert not LeftOut((1e-3, np.inf), np.inf).may_replace(declared)
+    assert LeftOut((14e-3, 14e-3), 14e-3).as_good_as(LeftOut((11e-3, 11e-3), 11e-3))
+    assert not LeftOut((14e-3, 14e-3), 14e-3).as_good_as(LeftOut((8e-3, 8e-3), 8e-3))
 
 
 def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refused(path):
