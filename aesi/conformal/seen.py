@@ -21,12 +21,15 @@ from typing import Self
 
 import numpy as np
 
-from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array, SavedState
-from aesi.numerics.visited import correlation, distance_to_visited, visited
-
-ENERGY_J_MOL = 40e3
-"""The mean of 53 and 44 (Ecker et al. 2015), 35 and 18 (Chen et al. 2020), 55 and 35 kJ/mol (About:Energy 2022)."""
+from aesi.numerics.visited import (
+    TemperatureSpan,
+    correlation,
+    distance_to_visited,
+    temperature_span,
+    thermal_distance,
+    visited,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,30 +37,22 @@ class Seen:
     """charge : (k,) states of charge, sorted.  temperature_degc : the lowest and the highest, None if not measured."""
 
     charge: Array
-    temperature_degc: tuple[float, float] | None = None
+    temperature_degc: TemperatureSpan | None = None
 
     @classmethod
     def of(cls, soc: Sequence[Array], temperature_degc: Sequence[Array | None]) -> Self:
         """From states of charge and temperatures (degC), one array a record; None where no temperature was measured."""
-        measured = [each for each in temperature_degc if each is not None and len(each)]
-        span = (
-            (min(float(t.min()) for t in measured), max(float(t.max()) for t in measured))
-            if measured
-            else None
-        )
+        measured = [each for each in temperature_degc if each is not None]
+        span = temperature_span(np.concatenate(measured)) if measured else None
         return cls(visited(np.concatenate(list(soc))), span)
 
     def gap(self, soc: Array) -> Array:
         """(n,) of (1), 0 to 1."""
         return np.asarray(np.sqrt(1.0 - correlation(distance_to_visited(soc, self.charge)) ** 2))
 
-    def growth(self, temperature_degc: Array | None) -> Array | float:
+    def growth(self, temperature_degc: Array | None) -> Array:
         """(n,) k_T of (2), >= 1."""
-        if self.temperature_degc is None or temperature_degc is None:
-            return 1.0
-        near = np.clip(temperature_degc, *self.temperature_degc) + ZERO_CELSIUS_K
-        apart = np.abs(1.0 / (temperature_degc + ZERO_CELSIUS_K) - 1.0 / near)
-        return np.asarray(np.exp(ENERGY_J_MOL / GAS_CONSTANT_J_MOL_K * apart))
+        return np.asarray(np.exp(thermal_distance(temperature_degc, self.temperature_degc)))
 
     def to_state(self) -> SavedState:
         """Plain values and a numpy array."""

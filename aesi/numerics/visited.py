@@ -1,9 +1,10 @@
-"""Where on the axis of the charge rows lie, thinned to what matters, and how far from there another place is."""
+"""Where rows lie in charge and temperature, thinned to what matters, and how far from there another place is."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 
 RESOLUTION = 0.005
@@ -13,6 +14,12 @@ LENGTH = 0.12
 the development splits of the NMC drive in `aesi bench splits` (16 candidates) a correction that fades so takes 65.4 %
 off the declared model's squared error, 37.7 % at worst, with 0.06; 65.5 and 31.5 % with 0.12; 65.1 and 25.8 % with
 0.16; 64.2 and 16.7 % with 0.24."""
+
+ENERGY_J_MOL = 40e3
+"""The mean of 53 and 44 (Ecker et al. 2015), 35 and 18 (Chen et al. 2020), 55 and 35 kJ/mol (About:Energy 2022)."""
+
+TemperatureSpan = tuple[float, float]
+"""Lowest and highest temperature, degC."""
 
 
 def visited(places: Array) -> Array:
@@ -33,3 +40,19 @@ def distance_to_visited(places: Array, known: Array) -> Array:
 def correlation(distance: Array) -> Array:
     """(n,) exp(-(d / LENGTH)**2 / 2), of a model's errors at states of charge a distance apart."""
     return np.asarray(np.exp(-0.5 * (distance / LENGTH) ** 2))
+
+
+def temperature_span(temperature_degc: Array) -> TemperatureSpan | None:
+    """The lowest and the highest of (n,) degC, NaN where not measured; None where none was."""
+    measured = temperature_degc[np.isfinite(temperature_degc)]
+    return (float(measured.min()), float(measured.max())) if len(measured) else None
+
+
+def thermal_distance(temperature_degc: Array | None, span: TemperatureSpan | None) -> Array | float:
+    """(n,) E / R |1 / T - 1 / T_near|, >= 0: log of what overpotentials change by from the nearest temperature of
+    the span, with an activation energy E between those of kinetics and diffusion. 0 where none was measured."""
+    if span is None or temperature_degc is None:
+        return 0.0
+    near = np.clip(temperature_degc, *span) + ZERO_CELSIUS_K
+    apart = np.abs(1.0 / (temperature_degc + ZERO_CELSIUS_K) - 1.0 / near)
+    return np.asarray(np.nan_to_num(ENERGY_J_MOL / GAS_CONSTANT_J_MOL_K * apart))

@@ -7,7 +7,7 @@ from aesi.records.error_series import INPUT_NAMES, ErrorModel, ErrorSeries, Free
 from aesi.records.failed import Failed
 from aesi.records.measurement import Hold, Measurement, Spectrum, assumed_hold, digest, hold_sentence
 from aesi.records.run import Run
-from aesi.records.split import ROLES, HeldOutDrive, Role, Split
+from aesi.records.split import ROLES, HeldOutDrive, LeftOutDrives, Role, Split
 
 __all__ = [
     "INPUT_NAMES",
@@ -18,6 +18,7 @@ __all__ = [
     "FreeRun",
     "HeldOutDrive",
     "Hold",
+    "LeftOutDrives",
     "Measurement",
     "Role",
     "Run",

@@ -28,6 +28,14 @@ class HeldOutDrive:
         return self.train[self.place]
 
 
+@dataclass(frozen=True, eq=False)
+class LeftOutDrives:
+    """Training drives left out in turn: parts, as a search leaves them out, and drives, whole, where parts are less."""
+
+    parts: tuple[HeldOutDrive, ...] = ()
+    drives: tuple[HeldOutDrive, ...] = ()
+
+
 @dataclass(frozen=True)
 class Split:
     """Records by role. The test records choose nothing: they are met once, by the model already chosen."""

@@ -43,10 +43,13 @@ class Fade:
     amplitude: float
     region: TrainedRegion
 
-    def weight(self, scaled: Array, soc: Array, excess: Array | None) -> Array:
+    def weight(
+        self, scaled: Array, soc: Array, temperature_degc: Array | None, excess: Array | None
+    ) -> Array:
         """(n,) a w along scaled inputs (n, n_inputs) that were not held at the edge, with the leverage's excess."""
         leverage = 0.0 if excess is None else KAPPA * excess**2
-        return np.asarray(self.amplitude * self.region.nearness(scaled, soc) / (1.0 + leverage))
+        near = self.region.nearness(scaled, soc, temperature_degc)
+        return np.asarray(self.amplitude * near / (1.0 + leverage))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""

@@ -31,7 +31,7 @@ from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library, Term, evaluate_terms
 from aesi.sparse.terms.scaling import Scaling
 
-SCHEMA = "aesi.sparse_model/5"
+SCHEMA = "aesi.sparse_model/6"
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class SparseModel:
         """Prediction from `error0_v` (default: the measured error_v[0]) with its own feedback only."""
         start = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
-        error_v, diverged = self._freely(self._drive(variables, series.soc), start)
+        error_v, diverged = self._freely(self._drive(variables, series), start)
         variables[:, 0] = error_v
         return FreeRun(
             error_v,
@@ -106,7 +106,7 @@ class SparseModel:
         """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
         if steps < 1:
             raise DataError(f"{self.name}: a prediction {steps} steps ahead is none; give at least 1.")
-        return self._ahead(self._drive(self._variables(series), series.soc), series.error_v, steps)
+        return self._ahead(self._drive(self._variables(series), series), series.error_v, steps)
 
     def reach(self, series: ErrorSeries, steps: int | None = None, error0_v: float | None = None) -> Array:
         """(n,) V, >= 0: how much a prediction leaves open by holding inputs at the edge of their trained range.
@@ -121,7 +121,7 @@ class SparseModel:
         start = float(series.error_v[0]) if error0_v is None else error0_v
         held, gone_on = (
             self._freely(drive, start)[0] if steps is None else self._ahead(drive, series.error_v, steps)
-            for drive in (self._drive(variables, series.soc), self._drive(variables, series.soc, further))
+            for drive in (self._drive(variables, series), self._drive(variables, series, further))
         )
         return np.abs(gone_on - held)
 
@@ -133,7 +133,7 @@ class SparseModel:
         """(n,) slope of the map e[k] -> e[k + 1] along a record; stable where its size is below one."""
         if not self.has_feedback:
             return np.full(len(series), self.memory)
-        drive = self._drive(self._variables(series), series.soc)
+        drive = self._drive(self._variables(series), series)
         measured = self.scaling.error_to_scaled(series.error_v)
         return free_run.gains(drive, self._functions, measured, self._clip)
 
@@ -225,7 +225,7 @@ class SparseModel:
             scaled = free_run.remember_ahead(drive[0, :-1], self.memory, measured, steps)
         return np.append(error_v[:1], self.scaling.error_to_volts(scaled))
 
-    def _drive(self, variables: Array, soc: Array, further: Array | None = None) -> Array:
+    def _drive(self, variables: Array, series: ErrorSeries, further: Array | None = None) -> Array:
         """(n_functions, n): for each function of the error, the sum of its terms' input parts; further : how far
         they go on along their slopes."""
         products = evaluate_terms(
@@ -238,7 +238,9 @@ class SparseModel:
             ]
         )
         return (
-            drive if self.fade is None else self._zero + self._weight(variables, soc) * (drive - self._zero)
+            drive
+            if self.fade is None
+            else self._zero + self._weight(variables, series) * (drive - self._zero)
         )
 
     @property
@@ -246,8 +248,8 @@ class SparseModel:
         """The scaled error at which the physics is exact."""
         return float(self.scaling.error_to_scaled(np.array(0.0)))
 
-    def _weight(self, variables: Array, soc: Array) -> Array:
+    def _weight(self, variables: Array, series: ErrorSeries) -> Array:
         """(n,) what is left of the correction."""
         assert self.fade is not None
         unheld = self.scaling.apply(variables) + self.scaling.cut_off(variables)
-        return self.fade.weight(unheld[:, 1:], soc, self._excess(variables))
+        return self.fade.weight(unheld[:, 1:], series.soc, series.temperature_degc, self._excess(variables))

@@ -1,11 +1,13 @@
 """How much of a correction is left at a sample that is remote from the rows that it was fitted to.
 
-    w(x) = exp(-sum_j (d_j(x) / DISTANCE)**2 / 2) rho(g(x))                                                 (1)
+    w(x) = exp(-(sum_j d_j(x)**2 + d_T(x)**2) / (2 DISTANCE**2)) rho(g(x))                                  (1)
 
-d_j is how far the scaled input j lies outside its trained range, -1 to 1, and g the distance in the state of charge to
-the nearest trained row, since a gap between two drives lies within the range of each input. rho is the correlation of
-errors that far apart (`aesi.numerics.visited`): (1) is the share of its value at the nearest fitted row that the mean
-of a Gaussian process keeps, if that row alone is known.
+d_j is how far the scaled input j lies outside its trained range, -1 to 1, d_T how far the temperature does, 1 where
+overpotentials change e-fold, and g the distance in the state of charge to the nearest trained row, since a gap between
+two drives lies within the range of each input. rho is the correlation of errors that far apart
+(`aesi.numerics.visited`): (1) is the share of its value at the nearest fitted row that the mean of a Gaussian process
+keeps, if that row alone is known. No term is in the temperature, which drives at one ambient do not vary enough to
+learn; so half its trained range, 2 K there, says nothing of how fast errors change with it, and Arrhenius' law does.
 """
 
 from __future__ import annotations
@@ -16,7 +18,14 @@ from typing import Any, Self
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.numerics.visited import correlation, distance_to_visited, visited
+from aesi.numerics.visited import (
+    TemperatureSpan,
+    correlation,
+    distance_to_visited,
+    temperature_span,
+    thermal_distance,
+    visited,
+)
 
 DISTANCE = 0.3
 """Of a scaled input, half a range being 1. Over the development splits of the NMC drive in `aesi bench splits` (16
@@ -27,28 +36,40 @@ same): 62.3, 26.2; 17.0, -11.2 with 0.1 and 64.9, 30.1; 23.2, -7.9 with 0.2, 65.
 
 @dataclass(frozen=True, eq=False)
 class TrainedRegion:
-    """low, high : (n_inputs,) the trained range, scaled.  charge : (k,) states of charge that were visited, sorted."""
+    """low, high : (n_inputs,) the trained range, scaled.  charge : (k,) states of charge that were visited, sorted.
+    temperature_degc : the lowest and the highest, None where none was measured."""
 
     low: Array
     high: Array
     charge: Array
+    temperature_degc: TemperatureSpan | None = None
 
     @classmethod
-    def of(cls, scaled: Array, soc: Array) -> Self:
-        """Of rows with scaled inputs (n, n_inputs) and states of charge (n,)."""
-        return cls(scaled.min(axis=0), scaled.max(axis=0), visited(soc))
+    def of(cls, scaled: Array, soc: Array, temperature_degc: Array) -> Self:
+        """Of rows with scaled inputs (n, n_inputs), states of charge and temperatures (n,), NaN where not measured."""
+        return cls(scaled.min(axis=0), scaled.max(axis=0), visited(soc), temperature_span(temperature_degc))
 
-    def nearness(self, scaled: Array, soc: Array) -> Array:
-        """(n,) of (1), 0 to 1; scaled : (n, n_inputs), not held at the edge."""
+    def nearness(self, scaled: Array, soc: Array, temperature_degc: Array | None) -> Array:
+        """(n,) of (1), 0 to 1; scaled : (n, n_inputs), not held at the edge; a temperature that was not measured counts
+        as fitted."""
         beyond = np.maximum(self.low - scaled, 0.0) + np.maximum(scaled - self.high, 0.0)
-        along_inputs = np.exp(-0.5 * np.sum((beyond / DISTANCE) ** 2, axis=1))
+        squared = np.sum(beyond**2, axis=1) + thermal_distance(temperature_degc, self.temperature_degc) ** 2
+        along_inputs = np.exp(-0.5 * squared / DISTANCE**2)
         return np.asarray(along_inputs * correlation(distance_to_visited(soc, self.charge)))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        return {"low": self.low.tolist(), "high": self.high.tolist(), "charge": self.charge.tolist()}
+        span = None if self.temperature_degc is None else list(self.temperature_degc)
+        return {
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+            "charge": self.charge.tolist(),
+            "temperature_degc": span,
+        }
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Inverse of `to_dict`."""
-        return cls(*(np.array(data[key], dtype=float) for key in ("low", "high", "charge")))
+        low, high, charge = (np.array(data[key], dtype=float) for key in ("low", "high", "charge"))
+        span = data["temperature_degc"]
+        return cls(low, high, charge, None if span is None else (float(span[0]), float(span[1])))

@@ -24,7 +24,7 @@ from aesi.pipeline.experiment.fit import build_problem, final_models
 from aesi.pipeline.experiment.intervals.conformalise import conformalise
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Failed
+from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
 from flows.base import codec
 from flows.tracking.experiment_log import DECLARED, INPUTS, RECORDS, candidate_metrics, coefficients
@@ -67,7 +67,9 @@ def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
     config = parse_experiment(json.loads(store.read(parent, "experiment.json").read_text(encoding="utf-8")))
     split = codec.loads(store.read(parent, f"{INPUTS}/{RECORDS}").read_bytes())
     declared = HybridModel.load(store.read(parent, f"{INPUTS}/{DECLARED}"))
-    loaded = Loaded(declared.cell, declared.cell.name, declared.effects, split, (), {}, {}, (), config)
+    loaded = Loaded(
+        declared.cell, declared.cell.name, declared.effects, split, LeftOutDrives(), {}, {}, (), config
+    )
     problem = build_problem(loaded, config)
     candidate = evaluate(problem, _genome(run), weights(config))
     if isinstance(candidate, Failed):

@@ -63,7 +63,7 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
         fade=library.fade,
         seed=config.seed,
     )
-    return Problem.build(loaded.split, options, left_out=loaded.left_out)
+    return Problem.build(loaded.split, options, left_out=loaded.left_out.parts)
 
 
 def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) -> tuple[Fitted, ...]:

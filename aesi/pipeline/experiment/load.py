@@ -7,7 +7,6 @@ the states that its history gave it.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,13 +17,13 @@ from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import activated
 from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
-from aesi.pipeline.experiment.drives import by_role, cuts, parts, training_drives, training_part
-from aesi.pipeline.experiment.physics_models import DECLARED, PhysicsModels, no_rows, physics_models, without
+from aesi.pipeline.experiment.drives import by_role, training_drives
+from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
+from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sources import cell_path, sources_of
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import ErrorSeries, HeldOutDrive, Hold, Role, Split
-from aesi.sparse import with_inputs
+from aesi.records import Hold, LeftOutDrives, Split
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
@@ -36,15 +35,15 @@ class Loaded:
     config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
-    cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : for each part of the training drives that
-    is left out in turn (`cuts`), all of them under physics that was fitted to the other parts.
+    cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : the training drives under physics
+    that was fitted without a part of one (`cuts`), or without one, each in turn.
     """
 
     cell: Cell
     cell_name: str
     effects: tuple[ActiveEffect, ...]
     split: Split
-    left_out: tuple[HeldOutDrive, ...]
+    left_out: LeftOutDrives
     soc0: dict[str, float]
     digests: dict[str, str]
     notes: tuple[str, ...]
@@ -122,9 +121,13 @@ def _load(config: ExperimentConfig) -> Loaded:
         records[name].rows[rows] = True
     hold = config.data.hold
     physics = physics_models(cell, effects, records, hold, config.cell.start, model=model)
+    training = TrainingDrives(config, records, drives, sources.roles)
+    left_out = None
+    if config.cell.start == "recalibrated" and len(drives) > 1:
+        physics, left_out = training.left_out(physics)
     if model == "dfn":
         notes.append(DFN_NOTE)
-    series, empty = _series(physics, records, config)
+    series, empty = series_under(physics, records, config)
     for name in empty:
         if name not in sources.roles["test"]:
             _refuse(physics, records[name], hold)
@@ -132,44 +135,19 @@ def _load(config: ExperimentConfig) -> Loaded:
             f"{name} runs empty in the model; its stoichiometries were held at the edge from there on."
         )
     split = by_role(config.data, series, sources.roles)
-    refitted = config.cell.start == "recalibrated" and len(drives) > 1
-    left_out = tuple(
-        HeldOutDrive(
-            _without(config, physics, records, drive, rows, sources.roles) if refitted else split.train,
-            place,
-            rows,
-        )
-        for place, (drive, piece) in enumerate(zip(drives, split.train, strict=True))
-        for rows in parts(len(piece), cuts(config.data))
-    )
     chosen = physics.chosen
     return Loaded(
         cell=chosen.cell,
         cell_name=cell.name or path.stem,
         effects=effects,
         split=split,
-        left_out=left_out,
+        left_out=left_out or training.as_they_are(split.train),
         soc0={name: chosen.soc0(each) for name, each in soc0.items()},
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
         model=model,
     )
-
-
-def _series(
-    physics: PhysicsModels, records: Mapping[str, FitRecord], config: ExperimentConfig
-) -> tuple[dict[str, ErrorSeries], list[str]]:
-    """Whole records under the physics, and the names of those that run empty there."""
-    series: dict[str, ErrorSeries] = {}
-    empty = []
-    for name, record in records.items():
-        whole, ran_empty = physics.series(record.measurement, record.soc0, config.data.dt_s, config.data.hold)
-        # Before the record is cut: a filtered current has to know what came before a piece.
-        series[name] = with_inputs(whole, config.library.inputs or whole.input_names)
-        if ran_empty:
-            empty.append(name)
-    return series, empty
 
 
 def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:
@@ -185,27 +163,6 @@ def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:
         hold,
         model=chosen.model,
     )
-
-
-def _without(
-    config: ExperimentConfig,
-    fitted: PhysicsModels,
-    records: Mapping[str, FitRecord],
-    drive: tuple[str, slice],
-    part: slice,
-    roles: Mapping[Role, Sequence[str]],
-) -> tuple[ErrorSeries, ...]:
-    """The training drives under physics that was fitted to all but a part of one; `fitted` was fitted to that too."""
-    name, rows = drive
-    unseen = slice(rows.start + part.start, rows.start + part.stop)
-    others = without(records, name, unseen)
-    declared = fitted.by_name[DECLARED]
-    physics = physics_models(
-        declared.cell, declared.effects, others, config.data.hold, config.cell.start, fitted, declared.model
-    )
-    of_training = records if config.data.repeats else {drive: records[drive] for drive in roles["train"]}
-    series, _ = _series(physics, of_training, config)
-    return training_part(config.data, series, roles)
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:

@@ -23,6 +23,7 @@ from aesi.pipeline.experiment.recalibrate import (
     RESISTOR,
     FitRecord,
     PhysicsStart,
+    deviating,
     recalibrate,
 )
 from aesi.pipeline.product.error_series import error_series
@@ -46,6 +47,15 @@ class PhysicsModels:
     def chosen(self) -> PhysicsStart:
         """What the correction is learned on."""
         return self.by_name[self.start]
+
+    def carried(self, share: float) -> PhysicsModels:
+        """With that share of each deviation of the recalibrated one."""
+        whole = self.by_name[RECALIBRATED]
+        if share == 1.0:
+            return self
+        z = share * np.array(whole.deviations)
+        moved = deviating(whole.declared, whole.effects, ALL, z, whole.model)
+        return replace(self, by_name={**self.by_name, RECALIBRATED: moved})
 
     def series(self, record: Measurement, soc0: float, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
         """The error of the chosen physics along a record, what the others say beside it, and whether it ran empty."""

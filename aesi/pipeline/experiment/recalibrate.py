@@ -169,6 +169,26 @@ def recalibrate(
     return fit.physics(found.x if np.isfinite(found.cost) else np.zeros(len(free)))
 
 
+def deviating(
+    declared: Cell, effects: tuple[ActiveEffect, ...], free: Sequence[int] | Array, z: Array, model: ModelName
+) -> PhysicsStart:
+    """The declared physics with its free knobs moved by z (n_free,) deviations."""
+    x = np.zeros(len(KNOBS))
+    x[np.array(free)] = z
+    values: dict[str, dict[str, float]] = {}
+    for knob, deviations in zip(KNOBS, x, strict=True):
+        if deviations != 0.0:
+            moved = float(deviations) * knob.deviation
+            values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
+    shift = values.pop(SOC0, {}).get("shift", 0.0)
+    volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
+    added = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
+    cell = model_with(declared, added).cell
+    ohm = declared.contact_resistance_ohm + volts_at_1c / declared.nominal_capacity_ah
+    cell = replace(cell, contact_resistance_ohm=ohm)
+    return PhysicsStart(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
+
+
 @dataclass(frozen=True, eq=False)
 class _Fit:
     declared: Cell
@@ -186,20 +206,7 @@ class _Fit:
 
     def physics(self, z: Array) -> PhysicsStart:
         """z : (n_free,) deviations."""
-        x = np.zeros(len(KNOBS))
-        x[self.free] = z
-        values: dict[str, dict[str, float]] = {}
-        for knob, deviations in zip(KNOBS, x, strict=True):
-            if deviations != 0.0:
-                moved = float(deviations) * knob.deviation
-                values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
-        shift = values.pop(SOC0, {}).get("shift", 0.0)
-        volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
-        effects = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
-        cell = model_with(self.declared, effects).cell
-        ohm = self.declared.contact_resistance_ohm + volts_at_1c / self.declared.nominal_capacity_ah
-        cell = replace(cell, contact_resistance_ohm=ohm)
-        return PhysicsStart(self.declared, cell, self.effects, shift, tuple(z.tolist()), self.model)
+        return deviating(self.declared, self.effects, self.free, z, self.model)
 
     def residual(self, z: Array) -> Array | None:
         """(m + n_free,): what is left of the voltages and of what was known, in deviations."""

@@ -16,7 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.numerics.blocks import leave_out_weights, pieces
+from aesi.numerics.blocks import Span, leave_out_weights, pieces
 from aesi.numerics.typing import IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries, HeldOutDrive
@@ -40,12 +40,13 @@ def fold_models(
     candidate: Candidate,
     judged: SparseModel | None = None,
     left_out: Sequence[HeldOutDrive] = (),
+    cut: Sequence[Span] | None = None,
 ) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
     """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
 
-    One for every piece: the folds of the search, where these are drives.  Folds in which no term survives are
-    left out.  judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
-    left_out : for every fold, its record under physics that has not seen the fold either; by default the records as
+    One for every piece of `cut`: by default the folds of the search, where these are drives.  Pieces without which no
+    term survives are left out.  judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
+    left_out : for every piece, its record under physics that has not seen the piece either; by default the records as
     they are.
     """
     genome, judged = candidate.genome, judged or candidate.bagging
@@ -53,7 +54,8 @@ def fold_models(
     solver = STRidge(genome.lambda1, genome.lambda2)
     n = len(problem.target)
     drives = problem.folds_are_drives
-    cut = list(problem.folds) if drives else pieces(problem.spans, max(1, n // N_PIECES))
+    if cut is None:
+        cut = problem.folds if drives else pieces(problem.spans, max(1, n // N_PIECES))
     augmented = np.empty((n, len(active) + 1), order="F")
     augmented[:, :-1] = problem.theta(active).T
     augmented[:, -1] = problem.target
@@ -71,7 +73,7 @@ def fold_models(
             leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
         )
         if judged.fade is not None:
-            region = TrainedRegion.of(problem.inputs[seen], problem.soc[seen])
+            region = TrainedRegion.of(problem.inputs[seen], problem.soc[seen], problem.temperature_degc[seen])
             model = replace(model, fade=Fade(judged.fade.amplitude, region))
         record, rows = fold_samples(problem, a, b)
         yield model, left_out[i].series if drives and left_out else record, rows

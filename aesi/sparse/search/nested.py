@@ -9,35 +9,53 @@ Varma & Simon, BMC Bioinformatics 7 (2006) 91, doi:10.1186/1471-2105-7-91.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.sparse.fade import shrunken
 from aesi.sparse.search.evaluate import Candidate
 from aesi.sparse.search.problem import Problem
 
-ENSEMBLES = (0, 1)
-"""AESI I and II, as in `Candidate.fold_sums`."""
+
+@dataclass(frozen=True, eq=False)
+class NestedPick:
+    """What some folds choose: a candidate, and the amplitude of its correction."""
+
+    candidate: Candidate
+    amplitude: float
+
+
+def picked(
+    problem: Problem, candidates: Sequence[Candidate], ensemble: int, folds: BoolArray
+) -> NestedPick | None:
+    """By the given folds alone, (n_folds,); ensemble : 0 for AESI I, 1 for AESI II, as in `Candidate.fold_sums`.
+
+    None where no fold, or no candidate, is left to choose by.
+    """
+    known = [c for c in candidates if np.isfinite(c.fold_sums[ensemble]).all()]
+    if not folds.any() or not known:
+        return None
+    weights = np.array([problem.row_weights[a] for a, _ in problem.folds])
+    sums = [(weights[:, None] * c.fold_sums[ensemble])[folds] for c in known]
+    amplitudes = [shrunken(each) if problem.options.fade else 1.0 for each in sums]
+    left = [_left(each, a).sum() for each, a in zip(sums, amplitudes, strict=True)]
+    best = int(np.argmin(left))
+    return NestedPick(known[best], amplitudes[best])
 
 
 def nested_shares(problem: Problem, candidates: Sequence[Candidate], ensemble: int) -> Array:
     """(n_folds,) the share of each fold's squared error that is left by what the other folds chose.
 
-    ensemble : 0 for AESI I, 1 for AESI II.  1 everywhere where there are fewer than two folds.
+    ensemble : as for `picked`.  1 where there is nothing to choose by.
     """
-    folds = len(problem.folds)
-    known = [c.fold_sums[ensemble] for c in candidates if np.isfinite(c.fold_sums).all()]
-    if folds < 2 or not known:
-        return np.ones(folds)
-    weights = np.array([problem.row_weights[a] for a, _ in problem.folds])
-    sums = np.stack(known) * weights[:, None]
-    shares = np.empty(folds)
-    for d in range(folds):
-        others = np.delete(sums, d, axis=1)
-        amplitudes = np.array([shrunken(each) if problem.options.fade else 1.0 for each in others])
-        pick = int(np.argmin([_left(each, a).sum() for each, a in zip(others, amplitudes, strict=True)]))
-        shares[d] = _left(sums[pick, d], amplitudes[pick]) / sums[pick, d, 0]
+    shares = np.ones(len(problem.folds))
+    for d in range(len(problem.folds)):
+        pick = picked(problem, candidates, ensemble, np.arange(len(problem.folds)) != d)
+        if pick is not None:
+            sums = pick.candidate.fold_sums[ensemble][d]
+            shares[d] = _left(sums, pick.amplitude) / sums[0]
     return shares
 
 

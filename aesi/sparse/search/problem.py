@@ -41,6 +41,7 @@ from aesi.sparse.search.rows import (
     left_out_pieces,
     nearness_of_left_out,
     spans_of,
+    temperatures,
 )
 from aesi.sparse.search.unseen import unseen_errors
 from aesi.sparse.terms.basis import FUNCTIONS, values
@@ -94,7 +95,8 @@ class Problem:
 
     products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
     error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
-    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  region : what a fit to all rows is fitted to.
+    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  temperature_degc : (n,), NaN where it
+    was not measured.  region : what a fit to all rows is fitted to.
     unseen_error, unseen_target : the same by physics that has not seen the row's fold (unseen.py).
     counts : (resamples, n) how often each resample holds a row.
     nearness : (n,) what is left of a correction at each row that was fitted without its fold (trained_region.py).
@@ -119,6 +121,7 @@ class Problem:
     unseen_error: Array
     unseen_target: Array
     soc: Array
+    temperature_degc: Array
     region: TrainedRegion
     counts: CountArray
     row_weights: Array
@@ -170,7 +173,8 @@ class Problem:
         block = options.block or default_block(n)
         cut = left_out_pieces(spans, options.fold, options.cuts)
         soc = np.concatenate([record.soc[:-1] for record in train])
-        region = TrainedRegion.of(rows[:, 1:], soc)
+        temperature = temperatures(train)
+        region = TrainedRegion.of(rows[:, 1:], soc, temperature)
         weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
         error = np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train])
         drives_left_out = options.fold is None and len(left_out) == len(cut)
@@ -206,12 +210,13 @@ class Problem:
             unseen_error=unseen.error,
             unseen_target=unseen.target,
             soc=soc,
+            temperature_degc=temperature,
             region=region,
             counts=weights,
             row_weights=row_weights,
             restart=starts_mask(pieces(spans, options.horizon or block), n),
             folds=cut,
-            nearness=nearness_of_left_out(rows[:, 1:], soc, cut),
+            nearness=nearness_of_left_out(rows[:, 1:], soc, temperature, cut),
             factors=every[: len(weights), :, : m + 1],
             fold_factors=_of_own_target(every[len(weights) :], m, len(unseen.targets)),
             full_factor=r[:, : m + 1],

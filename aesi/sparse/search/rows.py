@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.numerics.blocks import Span, pieces
 from aesi.numerics.typing import Array
+from aesi.records import ErrorSeries
 from aesi.sparse.trained_region import TrainedRegion
 
 
@@ -36,13 +37,25 @@ def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
     return [(int(p), int(q)) for p, q in pairwise(edges)]
 
 
-def nearness_of_left_out(inputs: Array, soc: Array, folds: Sequence[Span]) -> Array:
+def temperatures(records: Sequence[ErrorSeries]) -> Array:
+    """(n,) degC at each training row, NaN where it was not measured."""
+    return np.concatenate(
+        [
+            np.full(len(r) - 1, np.nan) if r.temperature_degc is None else r.temperature_degc[:-1]
+            for r in records
+        ]
+    )
+
+
+def nearness_of_left_out(inputs: Array, soc: Array, temperature_degc: Array, folds: Sequence[Span]) -> Array:
     """(n,) what is left at each row (trained_region.py) of a correction fitted to the rows of the other folds."""
     parts = []
     for a, b in folds:
         fold = np.s_[a:b]
-        others = TrainedRegion.of(np.delete(inputs, fold, axis=0), np.delete(soc, fold))
-        parts.append(others.nearness(inputs[fold], soc[fold]))
+        others = TrainedRegion.of(
+            np.delete(inputs, fold, axis=0), np.delete(soc, fold), np.delete(temperature_degc, fold)
+        )
+        parts.append(others.nearness(inputs[fold], soc[fold], temperature_degc[fold]))
     return np.concatenate(parts)
 
 

@@ -65,8 +65,19 @@ def test_the_band_grows_from_the_shortest_horizon_to_the_whole_drive() -> None:
     assert np.all(np.diff(high) >= -1e-15)
 
 
+def test_over_a_whole_drive_it_is_as_wide_as_drives_left_out_whole_ask_for() -> None:
+    near, apart = fitted(), fitted(size=2.0)
+    both = near.no_narrower_than(apart)
+    _, current, soc = drive(32)
+    at = {h: [b.at(h, DT, current, soc)[1] for b in (near, both)] for h in (10.0, WHOLE_DRIVE)}
+    np.testing.assert_array_equal(*at[10.0])
+    np.testing.assert_array_equal(at[WHOLE_DRIVE][1], apart.at(WHOLE_DRIVE, DT, current, soc)[1])
+    same = near.no_narrower_than(fitted(size=0.5)).at(WHOLE_DRIVE, DT, current, soc)[1]
+    np.testing.assert_array_equal(same, at[WHOLE_DRIVE][0])
+
+
 def test_survives_json() -> None:
-    bands = fitted()
+    bands = fitted().no_narrower_than(fitted(size=2.0))
     text = json.dumps(bands.to_dict(), default=lambda a: a.tolist(), allow_nan=False)
     restored = FreeRunBands.from_dict(json.loads(text))
     _, current, soc = drive(31)
@@ -75,7 +86,7 @@ def test_survives_json() -> None:
 
 
 def test_bands_of_an_earlier_schema_are_refused() -> None:
-    with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/5.*run the experiment again"):
+    with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/6.*run the experiment again"):
         FreeRunBands.from_dict(fitted().to_dict() | {"schema": "aesi.free_run_bands/2"})
 
 

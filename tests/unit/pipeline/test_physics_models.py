@@ -33,7 +33,10 @@ def rms(values):
 
 
 def test_one_fitted_resistor_is_all_that_this_cell_lacks(loaded):
-    for series in (*loaded.split.test, *(each.series for each in loaded.left_out)):
+    for series in (
+        *loaded.split.test,
+        *(each.series for each in (*loaded.left_out.parts, *loaded.left_out.drives)),
+    ):
         assert rms(series.left_by(DECLARED)) > 20 * NOISE_V
         assert rms(series.left_by("ESPM, one resistor")) < 2.0 * NOISE_V
         assert rms(series.left_by(RECALIBRATED)) < 2.0 * NOISE_V
@@ -45,13 +48,21 @@ def test_the_saved_cell_is_the_one_that_is_corrected(loaded):
 
 
 def test_halves_of_training_repeats_are_left_out_under_physics_of_their_own(loaded):
-    assert len(loaded.left_out) == 2 * len(loaded.split.train)
-    for i, left in enumerate(loaded.left_out):
+    assert len(loaded.left_out.parts) == 2 * len(loaded.split.train)
+    for i, left in enumerate(loaded.left_out.parts):
         seen = loaded.split.train[i // 2]
         assert left.series.name == seen.name
         assert left.rows == (slice(0, 300), slice(300, 600))[i % 2]
         np.testing.assert_array_equal(left.series.left_by(DECLARED), seen.left_by(DECLARED))
         assert not np.array_equal(left.series.error_v, seen.error_v)
+
+
+def test_whole_repeats_are_left_out_too(loaded):
+    assert [(left.place, left.rows) for left in loaded.left_out.drives] == [
+        (k, slice(0, 600)) for k in range(3)
+    ]
+    for left, part in zip(loaded.left_out.drives, loaded.left_out.parts[::2], strict=True):
+        assert not np.array_equal(left.series.error_v, part.series.error_v)
 
 
 def test_every_table_tells_both_reductions(loaded, config):

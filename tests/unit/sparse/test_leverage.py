@@ -48,7 +48,7 @@ def test_a_model_tells_the_excess_and_keeps_it_through_json(problem, split):
     text = json.dumps(model.to_dict(), default=lambda a: a.tolist())
     again = SparseModel.from_dict(json.loads(text))
     np.testing.assert_array_equal(again.free_run(split.train[0]).excess, excess)
-    with pytest.raises(DataError, match=r"sparse_model/1.*sparse_model/5.*run the experiment again"):
+    with pytest.raises(DataError, match=r"sparse_model/1.*sparse_model/6.*run the experiment again"):
         SparseModel.from_dict(model.to_dict() | {"schema": "aesi.sparse_model/1"})
 
 

@@ -11,13 +11,13 @@ from typing import overload
 
 import numpy as np
 
-from aesi.conformal import COMPARED, Calibrated, Method, RefittedForest, RefittedIntervals
+from aesi.conformal import COMPARED, Calibrated, FreeRunBands, Method, RefittedForest, RefittedIntervals
 from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
-from aesi.records import HeldOutDrive
+from aesi.records import LeftOutDrives
 from aesi.sparse import Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -30,15 +30,16 @@ def conformalise(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[HeldOutDrive] = (),
+    left_out: LeftOutDrives | None = None,
 ) -> tuple[Fitted, ...]:
     """The models with intervals and bands, calibrated on residuals of records they were not fitted to.
 
     All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
     also the training records.
-    left_out : training drives under physics fitted without a part of them; by default the drives as they are.
+    left_out : training drives under physics fitted without some rows of them; by default the drives as they are.
+    Parts of them calibrate, and whole ones keep the band of a whole drive from being narrower than they need.
     """
-    return tuple(_conformalised(one, problem, chosen, config, left_out) for one in models)
+    return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
 
 
 def _conformalised(
@@ -46,15 +47,19 @@ def _conformalised(
     problem: Problem,
     chosen: Candidate,
     config: ExperimentConfig,
-    left_out: Sequence[HeldOutDrive],
+    left_out: LeftOutDrives,
 ) -> Fitted:
+    drives: list[Unseen] = []
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
     if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
-        pairs += fold_models(problem, chosen, one.model, left_out)
+        pairs += fold_models(problem, chosen, one.model, left_out.parts)
+        if left_out.drives and problem.folds_are_drives:
+            drives += fold_models(problem, chosen, one.model, left_out.drives, problem.spans)
         one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
     elif isinstance(one.model, Bare | Persistence):
-        pairs += [(one.model, each.series, each.rows) for each in left_out]
-        if not left_out:
+        pairs += [(one.model, each.series, each.rows) for each in left_out.parts]
+        drives += [(one.model, each.series, each.rows) for each in left_out.drives]
+        if not left_out.parts:
             pairs += [(one.model, series, WHOLE) for series in problem.split.train]
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
@@ -70,8 +75,7 @@ def _conformalised(
         except FitError as error:
             notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
     try:
-        errors = OutOfSampleErrors.of(pairs, problem.split.train, config.conformal.horizons_s)
-        bands = errors.bands(config.conformal.alpha)
+        bands = _bands(pairs, drives, problem, config)
         if any(band.extrapolated for band in bands.horizons):
             notes.append(
                 f"The bands of {one.model.name} in free run are calibrated on too few pieces inside the trained "
@@ -80,6 +84,19 @@ def _conformalised(
     except FitError as error:
         notes.append(f"{one.model.name} has no bands in free run: {error}")
     return replace(one, intervals=intervals, bands=bands, compared=compared, notes=tuple(notes))
+
+
+def _bands(
+    pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
+) -> FreeRunBands:
+    train, alpha = problem.split.train, config.conformal.alpha
+    bands = OutOfSampleErrors.of(pairs, train, config.conformal.horizons_s).bands(alpha)
+    if not drives:
+        return bands
+    try:
+        return bands.no_narrower_than(OutOfSampleErrors.of(drives, train, ()).bands(alpha))
+    except FitError:  # drives too short to be told apart
+        return bands
 
 
 @overload
