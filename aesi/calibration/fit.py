@@ -9,9 +9,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from aesi.calibration.heat import with_heat
-from aesi.calibration.model import AGEING_SD, Model
+from aesi.calibration.model import Model
 from aesi.calibration.parameters import free_parameters, with_films
-from aesi.calibration.records import Prepared, check_charge, hold_told, prepared, with_temperatures
+from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
+from aesi.calibration.records.zero import zero_of
 from aesi.calibration.result import (
     Calibration,
     RecordError,
@@ -20,7 +21,7 @@ from aesi.calibration.result import (
     intervals,
     undetermined,
 )
-from aesi.calibration.rewind import rewound, usual_share
+from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import SPAN_K, Shapes
 from aesi.calibration.start import one_branch, sized, with_activation
 from aesi.constants import ZERO_CELSIUS_K
@@ -38,7 +39,9 @@ GAIN = 1e-4
 NOTED_ZERO = 0.02
 """Of a record's typical current."""
 NOTED_AGE = 0.01
-"""Of the capacity: what a record's differs by and is told."""
+"""Of the active material: what a record's differs by and is told."""
+NOTED_SILICON = 0.05
+"""The same of silicon, a sixth of what such a cell gives."""
 
 
 def calibrate(
@@ -79,10 +82,7 @@ def calibrate(
         errors=tuple(
             RecordError(r.name, _degc(r), b, a) for r, b, a in zip(model.records, declared, rms, strict=True)
         ),
-        capacities={
-            r.name: float(np.exp(AGEING_SD * x[model.layout.age(i)])) / usual_share(model, x)
-            for i, r in enumerate(model.records)
-        },
+        capacities=capacities(model, x),
         notes=(*notes, *_told(model, x), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
@@ -105,6 +105,9 @@ def problem(
     for record in records:
         check_voltage(cell, record)
     start, notes = (cell, ()) if same_cell else sized(cell, records)
+    zero = zero_of(start, records)
+    if not same_cell:
+        start, notes = sized(cell, [zero.taken_out(r, start.nominal_capacity_ah) for r in records])
     kept = [one_branch(start, data) for data in records]
     placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
     start, typical = with_activation(start)
@@ -115,9 +118,11 @@ def problem(
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
     start = with_films(start)
-    model = Model(start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), physics)
+    model = Model(
+        start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), zero, physics
+    )
     taken = tuple(sentence for r in ready for sentence in (r.start.sentence, hold_told(r)))
-    return model, (*notes, *(n for _, more in kept for n in more), *told, *typical, *taken)
+    return model, (*notes, *zero.sentences, *(n for _, more in kept for n in more), *told, *typical, *taken)
 
 
 def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:
@@ -147,7 +152,7 @@ def _declared_errors(cell: Cell, model: Model) -> list[float]:
 def _told(model: Model, x: Array) -> tuple[str, ...]:
     """Sentences on what a record's cycler and its age were found to be."""
     out = []
-    zero_a = model.zero_a * float(x[model.layout.zero])
+    zero_a = model.zero.at(float(x[model.layout.zero]))
     for i, record in enumerate(model.records):
         typical = float(np.median(np.abs(record.rows.current_a[record.flows > 0.0])))
         if record.slow and abs(zero_a) > NOTED_ZERO * typical:
@@ -155,10 +160,14 @@ def _told(model: Model, x: Array) -> tuple[str, ...]:
                 f"{record.name}: its charge fits if its current reads {1e3 * abs(zero_a):.2g} mA too "
                 f"{'high' if zero_a > 0 else 'low'} ({100 * abs(zero_a) / typical:.1f} % of it); that is taken out."
             )
-        share = float(np.exp(AGEING_SD * x[model.layout.age(i)])) - 1.0
-        if abs(share) > NOTED_AGE:
+        material, silicon = model.material(i, x) - 1.0, model.silicon(i, x)
+        if abs(material) > NOTED_AGE:
             out.append(
-                f"{record.name}: fits with {100 * share:+.1f} % of capacity; its cell may be of another age."
+                f"{record.name}: fits with {100 * material:+.1f} % of active material; its cell may be of another age."
+            )
+        if abs(silicon - 1.0) > NOTED_SILICON:
+            out.append(
+                f"{record.name}: fits with {100 * silicon:.0f} % of the silicon in the negative electrode."
             )
     return tuple(out)
 

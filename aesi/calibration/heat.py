@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from aesi.calibration.records import Prepared
+from aesi.calibration.records.prepared import Prepared
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.calibration.parameters import Free, moved
-from aesi.calibration.records import Prepared
+from aesi.calibration.records.prepared import Prepared
+from aesi.calibration.records.zero import Zero
 from aesi.calibration.shapes import Shapes
+from aesi.calibration.silicon import SILICON_SD, silicon_edge, stretched, with_silicon
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.model import EspmModel
@@ -41,19 +43,20 @@ record` in its file)."""
 NEWER = 0.1
 """By how many AGEING_SD a record's capacity may exceed that of the file. A cell does not grow younger: the bound is
 above nought only so that a descent that starts there is inside."""
-ZERO_SHARE = 5e-4
-"""Of the largest current among the records: what a cycler's zero is uncertain by, 0.1 % of its range being usual."""
+TELL_SILICON = 2
+"""Slow discharges at the least that tell lost silicon from lost material: of one, the potentials take either."""
 STEP = 0.02
 """Of finite differences, in deviations of the prior."""
 
 
 @dataclass(frozen=True)
 class WorkingVector:
-    """Where the parts of a working vector stand."""
+    """Where the parts of a working vector stand.  silicon : has each record its own?"""
 
     globals: int
     knots: int
     records: int
+    silicon: bool = False
 
     @property
     def zero(self) -> int:
@@ -68,15 +71,20 @@ class WorkingVector:
     @property
     def size(self) -> int:
         """Of the whole vector."""
-        return self.shapes.stop + 2 * self.records
+        return self.shapes.stop + len(self.own(0)) * self.records
+
+    def own(self, record: int) -> range:
+        """Of all that a record has of its own."""
+        each = 3 if self.silicon else 2
+        return range(self.shapes.stop + each * record, self.shapes.stop + each * (record + 1))
 
     def soc(self, record: int) -> int:
         """Of a record's state of charge."""
-        return self.shapes.stop + 2 * record
+        return self.own(record)[0]
 
     def age(self, record: int) -> int:
-        """Of a record's capacity."""
-        return self.shapes.stop + 2 * record + 1
+        """Of a record's active material."""
+        return self.own(record)[1]
 
 
 class Model:
@@ -88,12 +96,14 @@ class Model:
         records: tuple[Prepared, ...],
         free: tuple[Free, ...],
         shapes: Shapes,
+        zero: Zero,
         physics: ModelName = "espm",
     ) -> None:
         self.physics = physics
-        self.cell, self.records, self.free, self.shapes = cell, records, free, shapes
-        self.layout = WorkingVector(len(free), shapes.size, len(records))
-        self.zero_a = ZERO_SHARE * max(float(np.abs(r.data.current_a).max()) for r in records)
+        self.cell, self.records, self.free, self.shapes, self.zero = cell, records, free, shapes, zero
+        silicon = sum(r.slow for r in records) >= TELL_SILICON
+        self.layout = WorkingVector(len(free), shapes.size, len(records), silicon)
+        self.edge = silicon_edge(cell.negative)
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
@@ -106,18 +116,26 @@ class Model:
         values = {f.name: f.value(float(z)) for f, z in zip(self.free, x, strict=False)}
         return self.shapes.on(moved(self.cell, values), x[self.layout.shapes])
 
+    def material(self, index: int, x: Array) -> float:
+        """Share of its active material that the cell of a record has."""
+        return float(np.exp(AGEING_SD * x[self.layout.age(index)]))
+
+    def silicon(self, index: int, x: Array) -> float:
+        """Share of its silicon that the cell of a record has."""
+        return float(np.exp(SILICON_SD * x[self.layout.own(index)[2]])) if self.layout.silicon else 1.0
+
+    def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
+        """The cell with shares of its active material and of its silicon left."""
+        n, p = with_silicon(cell.negative, self.edge, silicon), cell.positive
+        cell = replace(cell, negative=replace(n, c_max_mol_m3=n.c_max_mol_m3 * material))
+        return replace(cell, positive=replace(p, c_max_mol_m3=p.c_max_mol_m3 * material))
+
     def run(self, index: int, cell: Cell, x: Array) -> Array:
         """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`)."""
         self.simulations += 1
         record = self.records[index]
-        aged = float(np.exp(AGEING_SD * x[self.layout.age(index)]))
-        cell = replace(
-            cell,
-            negative=replace(cell.negative, c_max_mol_m3=cell.negative.c_max_mol_m3 * aged),
-            positive=replace(cell.positive, c_max_mol_m3=cell.positive.c_max_mol_m3 * aged),
-        )
         model = EspmModel(
-            cell,
+            self.aged(cell, self.material(index, x), self.silicon(index, x)),
             solid_order=SOLID_ORDER,
             electrode_points=ELECTRODE_POINTS,
             substep_s=record.longest_s,
@@ -126,7 +144,7 @@ class Model:
         soc = record.start.soc + record.soc_sd * float(x[self.layout.soc(index)])
         current = record.rows.current_a
         if record.slow:
-            current = current - self.zero_a * float(x[self.layout.zero]) * record.flows
+            current = current - self.zero.at(float(x[self.layout.zero])) * record.flows
         solve = solver(self.physics)
         return solve(model, record.rows.time_s, current, record.kelvin, soc, record.hold)[0]
 
@@ -159,9 +177,9 @@ class Model:
                 np.full(len(record.rows), cell.initial_temperature_k) if kelvin is None else kelvin
             ) - cell.reference_temperature_k
             blocks[i][:, self.layout.shapes] = self.shapes.columns(
-                x[self.layout.shapes], runs[i][1], runs[i][2], rise
+                x[self.layout.shapes], stretched(runs[i][1], self.edge, self.silicon(i, x)), runs[i][2], rise
             )
-            for j in (self.layout.soc(i), self.layout.age(i)):
+            for j in self.layout.own(i):
                 there = x.copy()
                 there[j] += 10.0 * STEP
                 blocks[i][:, j] = (self.run(i, cell, there)[0] - runs[i][0]) / (10.0 * STEP)

@@ -57,8 +57,8 @@ RATE_SD, SALT_SD = 0.8, 0.35
 """Deviations of logarithms. Wider ones let a drive at one temperature trade kinetics for a slow electrolyte, and an LG
 18650HG2 then runs out of salt under its US06."""
 RATE_ENERGY, RATE_ENERGY_SD = 55e3, 12e3
-"""J/mol: what lithium pays to leave its solvent, the mean of the sources. Lower values (24 and 40 in O'Regan et al.
-2022) are of rates that hold contacts and films too."""
+"""J/mol: what lithium pays to leave its solvent, the mean of the sources. Lower values (40 and 24 in O'Regan et al.
+2022, as PyBaMM has them) are of rates that hold contacts and films too."""
 CONTACT_V = 0.03
 """V at 1C: the prior deviation of what contacts, and films, take. With 0.06 V, and kinetics and electrolyte left as
 much wider, the calibration of an LG 18650HG2 ended at kinetics a hundred times quicker and an electrolyte a third
@@ -67,34 +67,37 @@ slower, 80 mV off at 0 degC. In `aesi bench calibrate --set evaluations=8`, whos
 two records without pulses leave this to the prior."""
 FULLEST = 0.95
 """Stoichiometry of an electrode that is as full as a charged cell's may be: beyond, its kinetics stand still."""
-RATES = "rates of commercial cells of one chemistry scatter by a factor of three either way"
-TORTUOSITY = "scatter of tortuosities, Landesfeind et al. 2016, doi:10.1149/2.1141607jes"
+RATES = (
+    "convention: rates of cells of one chemistry scatter by a factor of three either way; no source opened"
+)
+TORTUOSITY = "convention: tortuosities scatter by a third; no source opened"
 ENERGIES = (
     "graphite 30.3, NCO 80.6 kJ/mol, Ecker et al. 2015, doi:10.1149/2.0551509jes; graphite-SiOx 17.4, NMC811 12.0, "
-    "O'Regan et al. 2022, doi:10.1016/j.electacta.2022.140700"
+    "O'Regan et al. 2022, doi:10.1016/j.electacta.2022.140700; NMC811 25, O'Kane et al. 2022; all as PyBaMM has them"
 )
 KINETIC_ENERGIES = (
-    "graphite 68, NCA 50 kJ/mol, Jow, Marx & Allen 2011, ECS Trans. 33 (23) 1; graphite 53.4, NCO 43.6, Ecker et al. "
-    "2015"
+    "graphite 68, NCA 50 kJ/mol, Jow, Marx & Allen 2011, ECS Trans. 33 (23) 1, abstract; graphite 53.4, NCO 43.6, "
+    "Ecker et al. 2015, as PyBaMM has them"
 )
 SALT_ENERGIES = (
-    "17.1 kJ/mol in Ecker et al. 2015; 13 to 23 from 0.5 to 2 mol/l in Landesfeind & Gasteiger 2019"
+    "conductivity 17.1 kJ/mol, Ecker et al. 2015; 12 to 21 and diffusivity 15 to 21 from 0.5 to 2 mol/l, 0 to 25 degC, "
+    "Landesfeind & Gasteiger 2019; both as PyBaMM has them"
 )
 FILM_OHM_M2, FILM_SD = 3e-3, 1.2
-"""Between the two sources."""
+"""A convention: three times the source, whose area is that of smooth spheres under a thin film. The 10 mohm m2 that are
+told of Ramadass et al. 2004 were not found; PyBaMM's notes on that paper speak of faults in its units and values."""
 FILMS = (
-    "10 mohm m2 of true surface, Ramadass et al. 2004, doi:10.1149/1.1634273; 1 of 5 nm, Safari et al. 2009, "
-    "doi:10.1149/1.3043429"
+    "1 mohm m2 (5 nm of 2e5 ohm m) in PyBaMM's parameter sets, after Ramadass et al. 2004 as corrected by Safari et "
+    "al. 2009"
 )
 FILM_ENERGY, FILM_ENERGY_SD = 60e3, 12e3
 FILM_ENERGIES = (
-    "59 to 64 kJ/mol on graphite, J. Power Sources 153 (2006) 391, doi:10.1016/j.jpowsour.2005.05.034"
+    "0.61 to 0.66 eV (59 to 64 kJ/mol) of the film on graphite, J. Power Sources 153 (2006) 391, "
+    "doi:10.1016/j.jpowsour.2005.05.034, abstract"
 )
-FILM_COURSES = "as the charge-transfer resistances of both electrodes, Ecker et al. 2015, figure 11"
-COURSES = "a decade and more over the window of graphite and NMC, Ecker et al. 2015, figure 9"
-RATE_COURSES = (
-    "exchange currents of both electrodes leave the square root by factors, Ecker et al. 2015, figure 11"
-)
+FILM_COURSES = "convention: a factor of seven either way; no source opened"
+COURSES = "factors of 59 and 11 over the windows of graphite and NCO, Ecker et al. 2015, as PyBaMM has them"
+RATE_COURSES = "convention: exchange currents leave the square root by factors; no source opened"
 COURSE_SD = 1.2
 """Of a logarithm: a decade over the window is two of them. With 0.8 the rates of a Panasonic NCR18650PF, fitted to its
 pulses, ended at three deviations."""
@@ -102,14 +105,14 @@ FILM_COURSE_SD = 2.0
 """Of the logarithm. With 1.2 the negative film of the Panasonic NCR18650PF ended at four deviations where it is empty,
 a hundred times that of the window; its pulses at -10 degC left out."""
 DOUBLE_LAYER_F_M2, LAYER_SD = 1.0, 1.2
-"""Between a smooth and a rough surface. With 0.2 and 0.7 the same pulses ended at four deviations, 3.2 F/m2."""
-LAYERS = "0.1 to 0.5 F/m2 of true surface, Ong & Newman 1999, doi:10.1149/1.1392643; up to 50 of the smooth spheres'"
+"""A convention. With 0.2 and 0.7 the same pulses ended at four deviations, 3.2 F/m2."""
+LAYERS = "0.2 F/m2 in PyBaMM's parameter sets; convention: five times that, of a rough surface"
 FULL_SD = {"negative": 0.015, "positive": 0.03}
 """Of the stoichiometries of full charge, where the file may be of a cell that was made a little differently."""
 AGED_FULL_SD = {"negative": 0.15, "positive": 0.15}
 """The same in a check-up of the cell of the file: a tenth of its lithium lost moves the negative electrode's by 0.09.
 Measured on three made check-ups of an LG M50 with up to that: with FULL_SD a tenth of the material counts as lost."""
-HALF_CELLS = "scatter of half-cell potentials, tens of millivolts, Chen et al. 2020"
+HALF_CELLS = "convention: cells of one chemistry are balanced alike within a tenth; no source opened"
 
 
 def free_parameters(cell: Cell, span_k: float, same_cell: bool = False) -> tuple[Free, ...]:

@@ -18,7 +18,8 @@ TYPICAL_ELECTROLYTE_EA_J_MOL = 17.1e3
 """Where the file declares none: a cell answers to temperature, and data at one temperature cannot say how much. Records
 of several temperatures move them from there, see `aesi.calibration.parameters`.
 Diffusion in graphite and the conductivity as in Ecker et al., J. Electrochem. Soc. 162 (2015) A1836 (30.3, 17.1), rates
-as of graphite in O'Kane et al., Phys. Chem. Chem. Phys. 24 (2022) 7909."""
+as of graphite in O'Kane et al., Phys. Chem. Chem. Phys. 24 (2022) 7909 (35), all as PyBaMM's parameter sets have
+them."""
 OPEN_SHARE = 1e-3
 """Of the largest current of a record: below this no current flows (the relay is open), whatever the cycler reads."""
 FULL_WINDOW_V = 0.15

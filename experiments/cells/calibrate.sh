@@ -2,8 +2,7 @@
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
 # Without arguments all three, into this folder. Each takes some minutes of one processor.
-# The Panasonic's file over temperatures is what this gives today. That of the LG 18650HG2 (from its records at 25 degC
-# alone) and that of the Panasonic at 25 degC are from before electrodes had films, and are to be made again.
+# The files of this folder are what this gives today: tests/statistical/test_calibrated_cells.py makes them again.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}

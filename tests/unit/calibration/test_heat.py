@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration.heat import fitted, with_heat
-from aesi.calibration.records import prepared
+from aesi.calibration.records.prepared import prepared
 from aesi.errors import CellError
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE

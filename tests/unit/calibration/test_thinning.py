@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from aesi.calibration.model import leniency, saturated
-from aesi.calibration.records import hold_told, prepared
-from aesi.calibration.thinning import thinned
+from aesi.calibration.records.prepared import hold_told, prepared
+from aesi.calibration.records.thinning import thinned
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.calibration.records.thinning import thinned
+from aesi.calibration.records.zero import is_slow
 from aesi.calibration.start import flowing
-from aesi.calibration.thinning import thinned
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
@@ -21,8 +22,6 @@ from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
 SOC_SD = 0.005
 """Least standard deviation of an initial state of charge that was read from a voltage, since the potentials that it was
 read from are being fitted; one that the user gave keeps its own."""
-SLOW_C_RATE = 0.15
-"""Slow records: below this rate the zero offset of a cycler's current is a notable share of it, and is fitted."""
 MOST_ROWS = 4000
 """Rows of a drive that a fit sees: windows grow until there are no more."""
 
@@ -73,7 +72,6 @@ def _prepared(
     start = initial_state(cell, data, soc0, data.hold or "backward", shared=shared, model=physics)
     sd = start.sd if start.basis == "given" else max(start.sd, SOC_SD)
     temperature = thin.data.temperature_degc
-    current = np.abs(thin.data.current_a)
     return Prepared(
         data=data,
         rows=thin.data,
@@ -82,7 +80,7 @@ def _prepared(
         kelvin=None if temperature is None else np.ascontiguousarray(temperature + ZERO_CELSIUS_K),
         start=start,
         soc_sd=sd,
-        slow=float(np.quantile(current, 0.95)) <= SLOW_C_RATE * cell.nominal_capacity_ah,
+        slow=is_slow(thin.data, cell.nominal_capacity_ah),
         trusted=thin.trusted,
         flows=flowing(thin.data.current_a).astype(float),
     )

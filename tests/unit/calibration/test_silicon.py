@@ -1,0 +1,73 @@
+"""Lost silicon: the end of the negative potential, and its share of two C/20 discharges."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.calibration.fit import calibrate, problem
+from aesi.calibration.silicon import SILICON_V, silicon_edge, with_silicon
+from aesi.physics import simulate
+from aesi.records import Measurement
+
+
+def discharge(cell, name: str) -> Measurement:
+    """C/20 from full to the lower voltage, after a rest."""
+    time = np.arange(0.0, 24.0 * 3600.0, 240.0)
+    current = np.where(time > 3600.0, start_ah(cell) / 20.0, 0.0)
+    voltage = simulate(cell, time, current, 1.0, (), None, "backward", on_depletion="clip").voltage_v
+    end = int(np.argmax(voltage < cell.lower_voltage_v))
+    return Measurement(time, current, voltage, None, name).take(slice(0, end))
+
+
+def start_ah(cell) -> float:
+    return cell.nominal_capacity_ah
+
+
+@pytest.fixture(scope="module")
+def records(start) -> tuple[Measurement, ...]:
+    edge = silicon_edge(start.negative)
+    old = replace(start, negative=with_silicon(start.negative, edge, 0.7))
+    return discharge(start, "new"), discharge(old, "old")
+
+
+def test_graphite_keeps_its_potential_and_silicon_a_share_of_its_charge(start):
+    edge = silicon_edge(start.negative)
+    old = with_silicon(start.negative, edge, 0.6)
+    above = np.linspace(edge, 0.95, 50)
+    assert old.ocp(above) == pytest.approx(start.negative.ocp(above), abs=1e-4)
+    assert start.negative.ocp(np.array([edge])) == pytest.approx(SILICON_V, abs=1e-3)
+    for volts in (0.3, 0.5, 0.8):
+        x = np.linspace(1e-4, edge, 4000)
+        as_new, now = (x[int(np.argmax(e.ocp(x) < volts))] for e in (start.negative, old))
+        assert (edge - now) / (edge - as_new) == pytest.approx(0.6, abs=0.01)
+    assert np.all(np.diff(old.ocp(np.linspace(0.0, 1.0, 500))) < 0.0)
+
+
+def test_of_two_slow_discharges_the_silicon_that_one_has_lost_is_found(start, records):
+    found = calibrate(start, records, evaluations=15)
+    new, old = (found.model.silicon(i, found.x) for i in (0, 1))
+    assert old / new == pytest.approx(0.7, abs=0.07)
+    lost = records[1].time_s[-1] - 3600.0, records[0].time_s[-1] - 3600.0
+    assert found.capacities["old"] / found.capacities["new"] == pytest.approx(lost[0] / lost[1], abs=0.01)
+    assert any("old: fits with" in note and "silicon" in note for note in found.notes)
+
+
+def test_one_slow_discharge_does_not_tell_silicon(start, records):
+    assert not problem(start, records[:1], None, {})[0].layout.silicon
+
+
+def test_slopes_are_those_of_differences_with_silicon_too(start, records):
+    model = problem(start, records, None, {})[0]
+    x = 0.3 * np.random.default_rng(3).standard_normal(model.layout.size)
+    x = np.clip(x, model.low + 0.1, model.high - 0.1)
+    slopes = model.jacobian(x)
+    own = model.layout.own(1)
+    for j in (model.layout.shapes.start + 30, own[0], own[2]):
+        h = 1e-3
+        up, down = x.copy(), x.copy()
+        up[j] += h
+        down[j] -= h
+        expected = (model.residual(up) - model.residual(down)) / (2.0 * h)
+        scale = np.abs(expected).max()
+        assert np.median(np.abs(slopes[:, j] - expected)) < 0.02 * scale
