@@ -14,7 +14,6 @@ from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.reduction import with_fine_numerics
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
@@ -33,10 +32,10 @@ def seen_nats(case: BlindCase) -> float | None:
         inverse_problem(Cell.from_bpx(case.declared), case.measurements, case.soc0, model=model)
     )
     blocks = blocks_of(problem)
-    prior, archive = PRIORS[problem.trust], Archive(None, "")
+    archive = Archive(None, "")
 
     def fit(hypothesis: tuple[str, ...]) -> FittedHypothesis | None:
-        return fitted_hypothesis(problem, blocks, hypothesis, None, prior.median_v, archive)
+        return fitted_hypothesis(problem, blocks, hypothesis, None, archive)
 
     whole = fit(case.effects)
     if whole is None:

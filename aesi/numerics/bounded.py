@@ -1,68 +1,158 @@
 """Levenberg-Marquardt inside a box, for residuals that cost a simulation each.
 
-Coordinates that sit on a bound and are pushed outwards are frozen for the step; steps are clipped to the box.
-Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10 and 16.
+Coordinates that sit on a bound and are pushed outwards are frozen for the step; steps are clipped to the box. Slopes by
+finite differences cost as many simulations as there are coordinates, a step one: after each step the slopes are brought
+up to date by what the step showed (Broyden, Math. Comp. 19 (1965) 577), as long as that brings the cost down, and only
+then taken anew. Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from aesi.numerics.typing import Array
 
-Linearise = Callable[[Array], tuple[Array, Array] | None]
-Cost = Callable[[Array], float]
+TRIALS = 6
+"""Of a step with slopes taken where it starts, each time with a damping eight times as strong."""
+UPDATED_TRIALS = 2
+"""Of a step with slopes brought up to date: where it fails, they may be what is wrong."""
+
+
+class Residual(Protocol):
+    """What is minimised: half the sum of its squares."""
+
+    def residual(self, x: Array) -> Array | None:
+        """(m,) at x (n,), or None where the model fails."""
+
+    def slopes(self, x: Array, residual: Array) -> Array | None:
+        """(m, n) derivatives at x (n,), where the residual is (m,), or None where the model fails."""
 
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where a descent ended: x (n,), half the sum of squares there, and how many steps it took."""
+    """Where a descent ended: x (n,), half the sum of squares there, how often slopes were taken, and whether it ended
+    because nothing was left to gain.
+
+    known_x : (n,) as good within the tolerance, and slopes were taken there; x where it did not converge.
+    """
 
     x: Array
     cost: float
-    steps: int
+    rounds: int
+    converged: bool
+    known_x: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """x (n,), residual (m,) and slopes (m, n) there, taken or brought up to date."""
+
+    x: Array
+    residual: Array
+    slopes: Array
+
+    @property
+    def cost(self) -> float:
+        return _half_square(self.residual)
 
 
 def descend(
-    linearise: Linearise, cost: Cost, x0: Array, low: Array, high: Array, steps: int, tolerance: float
+    model: Residual,
+    x0: Array,
+    low: Array,
+    high: Array,
+    rounds: int,
+    tolerance: float,
+    slopes: Array | None = None,
 ) -> Minimum:
     """Minimise half a sum of squares within low <= x <= high.
 
-    linearise : x -> (residual (m,), jacobian of the residual (m, n)), or None where the model fails.
-    cost : x -> half the sum of squares, inf where the model fails.
-    Stops when a step gains less than `tolerance`, after `steps` steps, or when no step gains.
+    rounds : slopes are taken so many times at most.  tolerance : stops where the steps from them gain less than this.
+    slopes : (m, n) as they are near x0, to begin with; nothing is concluded from them.
     """
     x = np.clip(x0, low, high)
-    best = cost(x)
+    residual = model.residual(x)
+    if residual is None:
+        return Minimum(x, np.inf, 0, False, x)
     damping = 1e-3
-    for step in range(steps):
-        linear = linearise(x)
-        if linear is None or not np.isfinite(best):
-            return Minimum(x, best, step)
-        residual, jacobian = linear
-        gradient = jacobian.T @ residual
-        free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
-        if not free.any():
-            return Minimum(x, best, step)
-        normal = jacobian[:, free].T @ jacobian[:, free]
-        gained = False
-        for _ in range(6):
-            trial = x.copy()
-            lifted = normal + damping * np.diag(np.diag(normal) + 1e-12 * np.trace(normal) + 1e-300)
-            trial[free] -= np.linalg.lstsq(lifted, gradient[free], rcond=None)[0]
-            trial = np.clip(trial, low, high)
-            value = cost(trial)
-            if value < best:
-                gained = True
-                break
-            damping *= 8.0
-        if not gained:
-            return Minimum(x, best, step + 1)
-        gain, x, best = best - value, trial, value
-        damping = max(damping / 5.0, 1e-6)
+    if slopes is not None:
+        near = _Place(x, residual, slopes)
+        here, damping = _followed(model, near, low, high, tolerance, damping, fresh=False)
+        x, residual = here.x, here.residual
+    for count in range(rounds):
+        taken = model.slopes(x, residual)
+        if taken is None:
+            return Minimum(x, _half_square(residual), count, False, x)
+        start = _Place(x, residual, taken)
+        here, damping = _followed(model, start, low, high, tolerance, damping, fresh=True)
+        x, residual = here.x, here.residual
+        if start.cost - here.cost < tolerance:
+            return Minimum(x, here.cost, count + 1, True, start.x)
+    return Minimum(x, _half_square(residual), rounds, False, x)
+
+
+def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Array) -> float:
+    """Half a sum of squares after one step within the box, to first order."""
+    here = _Place(x, residual, slopes)
+    step = _step(here, low, high, 1e-3)
+    return here.cost if step is None else _half_square(residual + slopes @ step)
+
+
+def _followed(
+    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
+) -> tuple[_Place, float]:
+    """Steps from one place, with its slopes and then with updates of them, while each gains; and the damping.
+
+    fresh : the slopes were taken here.
+    """
+    for _ in range(1 + len(here.x)):
+        there, damping = _stepped(model, here, low, high, tolerance, damping, fresh)
+        if there is None:
+            return here, damping
+        gain, here, fresh = here.cost - there.cost, there, False
         if gain < tolerance:
-            return Minimum(x, best, step + 1)
-    return Minimum(x, best, steps)
+            break
+    return here, damping
+
+
+def _stepped(
+    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
+) -> tuple[_Place | None, float]:
+    """One step that gains, with slopes brought up to date, or None; and the damping for the next one.
+
+    What promises less than the tolerance is tried once, and only with slopes that were taken here.
+    """
+    for trial in range(TRIALS if fresh else UPDATED_TRIALS):
+        step = _step(here, low, high, damping)
+        if step is None or not step.any():
+            return None, damping
+        foreseen = here.residual + here.slopes @ step
+        if here.cost - _half_square(foreseen) < tolerance and (trial or not fresh):
+            return None, damping
+        x = here.x + step
+        residual = model.residual(x)
+        if residual is not None and _half_square(residual) < here.cost:
+            slopes = here.slopes + np.outer(residual - foreseen, step / (step @ step))
+            return _Place(x, residual, slopes), max(damping / 5.0, 1e-6)
+        damping *= 8.0
+    return None, damping
+
+
+def _step(here: _Place, low: Array, high: Array, damping: float) -> Array | None:
+    """(n,) a damped Gauss-Newton step, cut off at the box; None where every coordinate is on a bound and pushed on."""
+    gradient = here.slopes.T @ here.residual
+    free = ~(((here.x <= low) & (gradient > 0)) | ((here.x >= high) & (gradient < 0)))
+    if not free.any():
+        return None
+    normal = here.slopes[:, free].T @ here.slopes[:, free]
+    lifted = normal + damping * np.diag(np.diag(normal) + 1e-12 * np.trace(normal) + 1e-300)
+    step = np.zeros(len(here.x))
+    step[free] = -np.linalg.lstsq(lifted, gradient[free], rcond=None)[0]
+    return np.asarray(np.clip(here.x + step, low, high) - here.x)
+
+
+def _half_square(residual: Array) -> float:
+    return 0.5 * float(residual @ residual)

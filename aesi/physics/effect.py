@@ -70,6 +70,8 @@ class Effect:
     say and does not compete.
     refines : the approximation of the model itself that the effect takes back; it is settled before anything is sought
     in the cell.
+    of_design : True for what a cell is made with and keeps (potentials, geometry, transport, kinetics); a file that was
+    fitted to this very cell has it right, as far as the model goes.
     experiment : which one shows it.  told_apart : id of another effect -> which one tells the two apart.
     """
 
@@ -84,6 +86,7 @@ class Effect:
     file: str | None = None
     infers: Measurable | None = None
     refines: Refinement | None = None
+    of_design: bool = False
     experiment: str = ""
     told_apart: Mapping[str, str] = field(default_factory=dict)
 

@@ -137,7 +137,10 @@ def discover(
     def search(one: InverseProblem, kept: Archive) -> Evidence:
         return gathered(one, max_effects, kept, Thresholds(), spent)
 
-    evidence, choice = with_model(problem, model, search, lambda one: Archive(archive, context_of(one)))
+    def kept(one: InverseProblem, beside: Archive | None) -> Archive:
+        return Archive(archive, context_of(one), beside)
+
+    evidence, choice = with_model(problem, model, search, kept)
     return _told(
         evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )

@@ -48,5 +48,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=scale_rates,
+    of_design=True,
     experiment="pulses from C/10 to 5C: the kinetic drop bends with current",
 )

@@ -53,6 +53,7 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=scale_thicknesses,
+    of_design=True,
     experiment="a full C/20 discharge for the balance, and one above 3C for the way through the electrolyte",
     told_apart={
         "active_material_loss_negative": ACTIVE_MATERIAL,

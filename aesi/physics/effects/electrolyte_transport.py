@@ -60,5 +60,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=scale_transport,
+    of_design=True,
     experiment="a discharge above 3C, where the electrolyte is depleted, and its relaxation",
 )

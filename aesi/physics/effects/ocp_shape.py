@@ -95,5 +95,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=reshape,
+    of_design=True,
     experiment="C/50 discharge and charge, or GITT",
 )

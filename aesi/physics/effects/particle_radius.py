@@ -51,6 +51,7 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=scale_radii,
+    of_design=True,
     experiment="pulses at several rates with long rests: the kinetic drop gives the surface, the relaxation R^2/D",
     told_apart={
         "solid_diffusivity": "pulses from C/10 to 5C: a radius also changes the surface, and so the kinetic drop",

@@ -58,6 +58,7 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=scale_porosities,
+    of_design=True,
     experiment="a discharge above 3C, where the electrolyte is depleted, and its relaxation",
     told_apart={
         "electrolyte_transport": "the relaxation after a discharge above 3C: less pore space also holds less salt",

@@ -49,6 +49,7 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=scale_diffusivities,
+    of_design=True,
     experiment="GITT: long pulses and long rests over the range of state of charge",
     told_apart={
         "particle_size_distribution": (

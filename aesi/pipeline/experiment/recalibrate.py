@@ -165,7 +165,7 @@ def recalibrate(
     low, high = fit.bounds()
     first = np.array(begin.deviations) if begin and begin.deviations else np.zeros(len(free))
     rounds = ROUNDS if begin is None else ROUNDS_AGAIN
-    found = descend(fit.linearised, fit.cost, first, low, high, rounds, GAIN)
+    found = descend(fit, first, low, high, rounds, GAIN)
     return fit.physics(found.x if np.isfinite(found.cost) else np.zeros(len(free)))
 
 
@@ -208,14 +208,14 @@ class _Fit:
         """z : (n_free,) deviations."""
         return deviating(self.declared, self.effects, self.free, z, self.model)
 
-    def cost(self, z: Array) -> float:
+    def residual(self, z: Array) -> Array | None:
+        """(m + n_free,): what is left of the voltages and of what was known, in deviations."""
         left = self._left(z)
-        return np.inf if left is None else 0.5 * float(left @ left + z @ z)
+        return None if left is None else np.concatenate([left, z])
 
-    def linearised(self, z: Array) -> tuple[Array, Array] | None:
-        left = self._left(z)
-        if left is None:
-            return None
+    def slopes(self, z: Array, residual: Array) -> Array | None:
+        """(m + n_free, n_free) of the residual."""
+        left = residual[: -len(z)]
         _, high = self.bounds()
         slopes = np.empty((len(left), len(z)))
         for j in range(len(z)):
@@ -226,7 +226,7 @@ class _Fit:
             if there is None:
                 return None
             slopes[:, j] = (there - left) / step
-        return np.concatenate([left, z]), np.vstack([slopes, np.eye(len(z))])
+        return np.vstack([slopes, np.eye(len(z))])
 
     def _left(self, z: Array) -> Array | None:
         """What is left of the voltages, in deviations; None where the model fails."""

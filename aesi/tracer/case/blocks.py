@@ -39,6 +39,11 @@ class Blocks:
     def __len__(self) -> int:
         return len(self.record)
 
+    @property
+    def rows(self) -> list[slice]:
+        """Rows of each block."""
+        return [slice(int(a), int(b)) for a, b in pairwise(self.starts)]
+
     @cached_property
     def of_row(self) -> IntArray:
         """(n,) block of each row."""

@@ -13,14 +13,14 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import values_of
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.likelihood.growth import Explanation
+from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.search.fitted import values_without
 
-WORSE = 1.05
-"""A hypothesis may leave so much more than the better of the declared and the recalibrated model on a part left out. A
-convention: within 5 % two models do as well."""
+AS_GOOD = 1.05
+"""Times the error of another model: what is less does as well. A convention."""
 ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)
 """Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
@@ -30,44 +30,57 @@ STEP_S = 10.0
 
 @dataclass(frozen=True)
 class LeftOut:
-    """RMSE by part left out in turn, V: (k,) of one model, infinite where it could not be simulated."""
+    """What one model leaves on data left out.
+
+    rmse_v : (k,) V by part: each record left out in turn, by range of charge; infinite where it could not be simulated.
+    pooled_v : V, root mean square over the records.
+    """
 
     rmse_v: tuple[float, ...]
+    pooled_v: float
 
-    @property
-    def pooled_v(self) -> float:
-        """Over all parts, V."""
-        return float(np.sqrt(np.mean(np.square(self.rmse_v))))
+    def may_replace(self, other: LeftOut) -> bool:
+        """Is the model better than another one on the whole, and on no part worse by more than models of measured cells
+        err by?"""
+        allowed = [np.hypot(its, MEASURED_V) for its in other.rmse_v]
+        no_worse = all(own <= most for own, most in zip(self.rmse_v, allowed, strict=True))
+        return no_worse and AS_GOOD * self.pooled_v < other.pooled_v
 
-    def no_worse_than(self, others: Sequence[LeftOut]) -> bool:
-        """On every part at most `WORSE` times the best of the others."""
-        return all(
-            own <= WORSE * min(other.rmse_v[k] for other in others) for k, own in enumerate(self.rmse_v)
-        )
+    def as_good_as(self, other: LeftOut) -> bool:
+        """Does the model leave no more than another one and what models of measured cells err by?"""
+        return self.pooled_v <= np.hypot(other.pooled_v, MEASURED_V)
 
 
-def left_out_errors(problem: InverseProblem, blocks: Blocks, one: Explanation | None) -> LeftOut:
-    """What a hypothesis leaves on each record at the parameters that the others give (of a single record: on its last
-    third), simulated with the whole model at the change to first order; None: the model as declared."""
+def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None) -> LeftOut:
+    """What a hypothesis leaves on each record where the others put it (of a single record: on its last third); None:
+    the model as declared."""
+    folds = blocks.folds["record" if len(problem.records) > 1 else "end"]
+    parts, pooled = [], []
+    for k, fold in enumerate(folds):
+        residual = _left_out_residual(problem, blocks, one, k, fold)
+        pooled.append(float(np.mean(residual**2)))
+        ranges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
+        out = np.isin(blocks.of_row, fold)
+        parts += [float(np.sqrt(np.mean(residual[r[out]] ** 2))) for r in ranges if r[out].any()]
+    return LeftOut(tuple(parts), float(np.sqrt(np.mean(pooled))))
+
+
+def _left_out_residual(
+    problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None, k: int, fold: Sequence[int]
+) -> Array:
+    """(n_out,) V of the rows of a fold, which are of record k; infinite where the model fails."""
     many = len(problem.records) > 1
-    errors = []
-    for k in range(len(problem.records)):
-        try:
-            if one is None:
-                state = ModelState(problem)
-            else:
-                x = one.point.x + one.score.shifts["record" if many else "end"][k]
-                state = ModelState(problem, values_of(one.free, x), tuple(one.hypothesis))
-            record = problem.records[k]
-            run = state.simulated(record, None if many and one is not None else k, thin=True)
-        except AesiError:
-            errors.append(np.inf)
-            continue
-        rows = problem.slices[k]
-        residual = (record.thin.voltage_v - run.voltage_v)[: record.n_fit]
-        out = np.isin(blocks.of_row[rows], blocks.folds["record" if many else "end"][k])
-        errors.append(float(np.sqrt(np.mean(residual[out] ** 2))))
-    return LeftOut(tuple(errors))
+    out = np.isin(blocks.of_row[problem.slices[k]], fold)
+    record = problem.records[k]
+    try:
+        if one is None:
+            run = ModelState(problem).simulated(record, k, thin=True)
+        else:
+            state = ModelState(problem, values_without(problem, blocks, one, fold), one.hypothesis)
+            run = state.simulated(record, None if many else k, thin=True)
+    except AesiError:
+        return np.full(np.count_nonzero(out), np.inf)
+    return (record.thin.voltage_v - run.voltage_v)[: record.n_fit][out]
 
 
 def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAST_C)) -> str | None:

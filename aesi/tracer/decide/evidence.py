@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,41 +10,31 @@ import numpy as np
 from aesi.errors import DataError
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem, Trust
-from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
+from aesi.tracer.decide.carry_over import ORDINARY_C, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.one_cause import in_one
 from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
-    beyond,
     judged,
     noise_v,
     partly,
-    structured_v,
     tolerance_v,
+    unexplained_v,
 )
+from aesi.tracer.decide.written import limits_of, written
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
 from aesi.tracer.search.forward import refitted, searched
-from aesi.tracer.search.path import Path, Report, unseen_rmse_v
+from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import most_plausible
 from aesi.tracer.search.wrong_parameters import with_wrong_parameters
 
 MEASURED_EFFECTS = 1
 """Named beside `unknown`: what is left after one is mostly no larger than what models of measured cells leave, and of
 eight second names on development records of `aesi bench real` one was right. From the written model one can look on."""
-
-
-@dataclass(frozen=True, eq=False)
-class Option:
-    """A model that `after` may be: where it is from, and what it leaves on parts that were left out."""
-
-    state: ModelState
-    left_out: LeftOut
-    explanation: Explanation | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,16 +94,20 @@ def gathered(
         others.append(path_of("loose"))
     if paths["measured"].chosen.hypothesis:
         path, verdict = paths["measured"], partly(paths["measured"], verdict, thresholds)
-    return _best_carried(path, others, paths, _with_confidence(verdict), recalibrated)
+    tried = [(one.problem, fit) for one in others for fit in (one.base, one.chosen)]
+    tried = tried if recalibrated is None else [recalibrated, *tried]
+    after, why = written(problem, path.blocks, tried, path.chosen if verdict.effects else None)
+    other = ModelState(problem) if recalibrated is None else ModelState.of(*recalibrated)
+    limits = limits_of(after) if after.hypothesis else ()
+    return Evidence(path, paths, other, after, _with_confidence(verdict), why, limits)
 
 
 def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
     """Does a hypothesis leave no more on unseen data than a right one may?"""
-    white_v = float(np.sqrt(np.mean(problem.white_v**2)))
-    allowed_v = tolerance_v(white_v, thresholds)
+    allowed_v = tolerance_v(float(np.sqrt(np.mean(problem.white_v**2))), thresholds)
 
     def enough(blocks: Blocks, fit: FittedHypothesis) -> bool:
-        return beyond(unseen_rmse_v(blocks, fit), white_v) <= allowed_v
+        return unexplained_v(problem, blocks, fit, allowed_v) <= allowed_v
 
     return enough
 
@@ -146,7 +140,8 @@ def _sharpened(
         return path, verdict
     if most_plausible([path.chosen, found.chosen], len(problem.competing())) is path.chosen:
         return path, verdict
-    left, allowed = structured_v(found, found.chosen), tolerance_v(noise_v(found), thresholds)
+    allowed = tolerance_v(noise_v(found), thresholds)
+    left = unexplained_v(found.problem, found.blocks, found.chosen, allowed)
     return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
 
 
@@ -199,66 +194,4 @@ def _adopted(
     fault = range_fault(chosen, ORDINARY_C)
     if fault is not None:
         return Evidence(path, paths, other, ModelState(path.problem), verdict, fault)
-    return Evidence(path, paths, other, chosen, verdict, None, _limits(chosen))
-
-
-def _limits(state: ModelState) -> tuple[str, ...]:
-    """Where a model that is written stops short of the declared one."""
-    fast = range_fault(state, FAST_C)
-    return () if fast is None else (f"with what was found, {fast}; the declared model does not.",)
-
-
-def _best_carried(
-    path: Path,
-    others: Sequence[Path],
-    paths: dict[Trust, Path],
-    verdict: Verdict,
-    recalibrated: tuple[InverseProblem, FittedHypothesis] | None,
-) -> Evidence:
-    """What is written where nothing explains the data: what was named all the same, or else what leaves least.
-
-    Least on parts left out. Either has to run over the declared range, and to be no worse on any part than the declared
-    and the recalibrated model.
-    """
-    declared = Option(ModelState(path.problem), left_out_errors(path.problem, path.blocks, None), None)
-    basic = [declared]
-    other = declared.state
-    if recalibrated is not None:
-        problem, fit = recalibrated
-        other = ModelState.of(problem, fit)
-        if range_fault(other) is None:  # what cannot be adopted itself is no yardstick for what can
-            basic.append(Option(other, left_out_errors(problem, path.blocks, fit), fit))
-    tried = [(other.problem, fit) for other in others for fit in (other.base, other.chosen)]
-    more = [
-        Option(ModelState.of(problem, fit), left_out_errors(problem, path.blocks, fit), fit)
-        for problem, fit in dict.fromkeys(tried)
-        if recalibrated is None or fit is not recalibrated[1]
-    ]
-    fit_options = [o for o in more if o.left_out.no_worse_than([b.left_out for b in basic])]
-    ranked = sorted([*basic, *fit_options], key=lambda o: o.left_out.pooled_v)
-    named = [
-        o
-        for o in more
-        if o.explanation is path.chosen and verdict.effects and o.left_out.no_worse_than([declared.left_out])
-    ]
-    fault = None
-    for option in (*named, *ranked):
-        rates_c = ORDINARY_C if option in named else (*ORDINARY_C, *FAST_C)
-        fault = range_fault(option.state, rates_c) if option.explanation is not None else None
-        if fault is None:
-            why = _why(path, option, more, fit_options)
-            limits = () if option.explanation is None else _limits(option.state)
-            return Evidence(path, paths, other, option.state, verdict, why, limits)
-    return Evidence(path, paths, other, declared.state, verdict, fault)
-
-
-def _why(path: Path, taken: Option, more: list[Option], fitting: list[Option]) -> str | None:
-    chosen = next((o for o in more if o.explanation is path.chosen), None)
-    if chosen is None or chosen is taken or not path.chosen.hypothesis:
-        return None
-    names = " + ".join(path.chosen.hypothesis)
-    if chosen not in fitting:
-        return (
-            f"{names} does worse than the declared or the recalibrated model on a part of the data left out"
-        )
-    return f"another model leaves less than {names} on parts of the data left out"
+    return Evidence(path, paths, other, chosen, verdict, None, limits_of(chosen))

@@ -1,8 +1,9 @@
 """Single particle or porous electrode: settled before an effect is blamed on the cell.
 
+Parameters that were fitted with one of the two hold what it approximates, and are of that one.
 Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
-not where the single particle cannot explain the data and the fuller one says no more, with no effects, and leaves as
-much with the same ones: what is missing is something else then, and a search takes ten times as long.
+not where the single particle cannot explain the data, and could not though all of that difference were taken off what
+it leaves: what is missing is something else then, and a search takes ten times as long.
 What was measured may still be a single particle's (a thin electrode, a file made with one): what the two searches end
 with is weighed as any two hypotheses are.
 """
@@ -16,16 +17,14 @@ from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.evidence import Evidence, believed
+from aesi.tracer.decide.verdict import Thresholds, noise_v, structured_v, tolerance_v
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of, fitted_hypothesis
-from aesi.tracer.search.forward import HOPELESS_SHARE
-from aesi.tracer.search.path import Path, beyond_noise, lowers_error, unseen_rmse_v
-from aesi.tracer.search.plausible import ALIKE_NATS
+from aesi.tracer.search.path import Path, lowers_error, unseen_rmse_v
 
 Search = Callable[[InverseProblem, Archive], Evidence]
 """All that is searched and judged with one model of the cell."""
-Kept = Callable[[InverseProblem], Archive]
-"""The fits of a problem that are known already."""
+Kept = Callable[[InverseProblem, Archive | None], Archive]
+"""The fits of a problem that are known already, beside those with the other model of the cell."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,8 @@ class ModelChoice:
 def with_model(
     problem: InverseProblem, wanted: ModelName | None, search: Search, kept: Kept
 ) -> tuple[Evidence, ModelChoice]:
-    """The search with the model that the user named, or else with the one that the records ask for."""
+    """The search with the model that the user named, or else with the one that the parameters of the cell were fitted
+    with, or else with the one that the records ask for."""
     reduction = reduction_of(problem)
     differ = "" if reduction is None else f"; {reduction.sentence}"
 
@@ -52,20 +52,20 @@ def with_model(
         words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
         return evidence, ModelChoice(name, words, reduction)
 
-    if wanted is not None:
-        one = fine(wanted)
-        return told(search(one, kept(one)), wanted, ", as asked")
+    settled = wanted or problem.cell.fitted_with
+    if settled:
+        one = fine("dfn" if settled == "dfn" else "espm")
+        why = ", as asked" if wanted else ", with which the parameters of the cell were fitted"
+        return told(search(one, kept(one, None)), one.model, why)
     single = fine("espm")
-    first = search(single, kept(single))
+    fits = kept(single, None)
+    first = search(single, fits)
     if reduction is None or not reduction.notable:
         return told(first, "espm")
+    if first.verdict.word == "unknown" and not _explains(first.paths["tight"], reduction):
+        return told(first, "espm", ", which leaves far more than the two differ by")
     full = fine("dfn")
-    tight = first.paths["tight"]
-    if first.verdict.word == "unknown" and not (
-        _says_more(full, tight, kept) or _takes_off(full, tight, kept)
-    ):
-        return told(first, "espm", ", what it leaves the other one leaves as well")
-    second = search(full, kept(full))
+    second = search(full, kept(full, fits))
     if with_single_particle(second, first):
         return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
@@ -85,20 +85,7 @@ def with_single_particle(full: Evidence, single: Evidence) -> bool:
     return believed((full.path, full.verdict), (single.path, single.verdict))
 
 
-def _says_more(full: InverseProblem, path: Path, kept: Kept) -> bool:
-    """Does the porous electrode say more of unseen data with nothing but its own parameters moved?"""
-    base = base_of(full, path.blocks, kept(full))
-    return base is not None and base.score.total > path.base.score.total + ALIKE_NATS
-
-
-def _takes_off(full: InverseProblem, path: Path, kept: Kept) -> bool:
-    """Does the porous electrode leave notably less of unseen data with what the single particle ended with?"""
-    chosen = path.chosen
-    fit = fitted_hypothesis(
-        full, path.blocks, chosen.hypothesis, chosen.placed, chosen.score.delta_v, kept(full)
-    )
-    if fit is None:
-        return False
-    return beyond_noise(full, path.blocks, fit) < HOPELESS_SHARE * beyond_noise(
-        path.problem, path.blocks, chosen
-    )
+def _explains(path: Path, reduction: Reduction) -> bool:
+    """Could what the two models differ by be all that a search leaves beyond what a right hypothesis may?"""
+    allowed_v = tolerance_v(noise_v(path), Thresholds())
+    return structured_v(path, path.chosen) - reduction.shift_v <= allowed_v

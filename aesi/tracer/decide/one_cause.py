@@ -29,12 +29,7 @@ def in_one(path: Path, archive: Archive) -> tuple[Path, tuple[str, ...]]:
     if len(chosen.hypothesis) < 2 or not all(_tolerated(effects[name]) for name in chosen.hypothesis):
         return path, ()
     causes = [e.id for e in effects.values() if e.kind == "parameter" and not _tolerated(e)]
-    fits = [
-        fitted_hypothesis(
-            path.problem, path.blocks, (cause,), path.base.placed, chosen.score.delta_v, archive
-        )
-        for cause in causes
-    ]
+    fits = [fitted_hypothesis(path.problem, path.blocks, (cause,), path.base, archive) for cause in causes]
     inside = [fit for fit in fits if fit is not None and not fit.at_bounds]
     best = most_plausible([chosen, *inside], len(path.problem.competing()))
     if best is None or best is chosen:

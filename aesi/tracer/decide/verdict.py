@@ -11,6 +11,9 @@ from typing import Literal
 
 import numpy as np
 
+from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.likelihood.fit import held_out_residual, prediction_sd_v
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.search.path import Path, unseen_rmse_v
@@ -75,6 +78,19 @@ def structured_v(path: Path, one: Explanation) -> float:
     return beyond(unseen_rmse_v(path.blocks, one), noise_v(path))
 
 
+def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, allowed_v: float) -> float:
+    """`structured_v` of what a right hypothesis could tell of the blocks that it has not seen, V.
+
+    Rows count as far as their prediction, by the parameters that the other blocks give, is less uncertain than the
+    noise and what a right one may leave beyond it (V): a potential with nine coefficients cannot tell what it is where
+    no other block has been.
+    """
+    told_v2 = problem.white_v**2 + allowed_v**2
+    counts = told_v2 / (told_v2 + prediction_sd_v(problem, blocks, one) ** 2)
+    square = float(np.mean(counts * held_out_residual(blocks, one) ** 2))
+    return beyond(float(np.sqrt(square)), float(np.sqrt(np.mean(problem.white_v**2))))
+
+
 def tolerance_v(noise: float, thresholds: Thresholds) -> float:
     """What a right hypothesis may leave on unseen data beyond the noise, V."""
     return float(np.hypot(thresholds.noise_share * noise, thresholds.solver_v))
@@ -84,7 +100,7 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     """The verdict on a search with the declared parameters believed as of a careful parametrisation; its confidence is
     still to be read off the margin."""
     allowed = tolerance_v(noise_v(path), thresholds)
-    left = structured_v(path, path.chosen)
+    left = unexplained_v(path.problem, path.blocks, path.chosen, allowed)
     before = structured_v(path, path.base)
     if left > allowed:
         margin = float(np.log(left / allowed))
@@ -155,7 +171,8 @@ def look_alikes(
                 continue
             nats, deviation = lag(anchor, other)
             close = nats < max(thresholds.alike_nats, thresholds.alike_sds * deviation)
-            if close and structured_v(path, other) <= 1.2 * max(allowed_v, structured_v(path, anchor)):
+            left_v = [unexplained_v(path.problem, path.blocks, one, allowed_v) for one in (other, anchor)]
+            if close and left_v[0] <= 1.2 * max(allowed_v, left_v[1]):
                 alike.append((nats, added))
             else:
                 margin = min(margin, nats / max(deviation, thresholds.alike_nats))

@@ -9,12 +9,13 @@ from typing import Protocol
 import numpy as np
 
 from aesi.numerics.bounded import descend
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
+    Posterior,
     PredictiveScore,
     best_over_sizes,
     block_sums,
@@ -78,26 +79,30 @@ class HypothesisFitter:
         bounds = np.array([f.bounds for f in self.free])
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         self.simulations = 0
-        self._last: tuple[bytes, Array | None] = (b"", None)
+        self._errors: dict[bytes, Array | None] = {}
+        self._last_slopes: tuple[bytes, Array | None] = (b"", None)
 
     def residual(self, x: Array) -> Array | None:
         """(n,) V, or None where the model fails."""
         key = x.tobytes()
-        if self._last[0] != key:
+        if key not in self._errors:
             self.simulations += 1
             predicted = self.problem.predict(values_of(self.free, x))
-            self._last = (key, None if predicted is None else self.problem.measured - predicted)
-        return self._last[1]
+            self._errors[key] = None if predicted is None else self.problem.measured - predicted
+        return self._errors[key]
 
-    def jacobian(self, x: Array, residual: Array, columns: Sequence[int] | None = None) -> Array | None:
+    def jacobian(self, x: Array, residual: Array) -> Array | None:
         """(n, k) V per standard deviation of the prior, by one-sided differences within the bounds."""
-        wanted = range(len(x)) if columns is None else columns
-        out = np.zeros((len(residual), len(wanted)))
-        for place, j in enumerate(wanted):
+        if self._last_slopes[0] == x.tobytes():
+            return self._last_slopes[1]
+        columns = []
+        for j in range(len(x)):
             column = self._slope(x, j, residual)
             if column is None:
                 return None
-            out[:, place] = column
+            columns.append(column)
+        out = np.column_stack(columns)
+        self._last_slopes = (x.tobytes(), out)
         return out
 
     def _slope(self, x: Array, j: int, residual: Array) -> Array | None:
@@ -117,27 +122,22 @@ class HypothesisFitter:
                 return column
         return None
 
-    def descend(self, x: Array, delta_v: float, steps: int) -> Array:
-        """Coordinates after a descent at one size of the model error."""
+    def descend(
+        self,
+        x: Array,
+        delta_v: float,
+        rounds: int,
+        slopes_v: Array | None = None,
+        without: Sequence[int] = (),
+    ) -> Array:
+        """Coordinates after a descent at one size of the model error.
 
-        def cost(at: Array) -> float:
-            e = self.residual(at)
-            if e is None:
-                return np.inf
-            r = whitened(self.problem, self.blocks, e[:, None], delta_v)[0]
-            return 0.5 * float(np.sum(r**2) + at @ at)
-
-        def linearise(at: Array) -> tuple[Array, Array] | None:
-            e = self.residual(at)
-            jacobian = None if e is None else self.jacobian(at, e)
-            if e is None or jacobian is None:
-                return None
-            table = whitened(self.problem, self.blocks, np.column_stack([e, -jacobian]), delta_v)[0]
-            return np.concatenate([table[:, 0], at]), np.vstack([table[:, 1:], np.eye(len(at))])
-
-        return descend(
-            linearise, cost, np.clip(x, self.low, self.high), self.low, self.high, steps, GAIN_NATS
-        ).x
+        slopes_v : (n, k) V, the model's sensitivities as they are near x, to begin with.  without : blocks that are
+        not looked at.
+        """
+        whitened_one = _Whitened(self, delta_v, ~np.isin(self.blocks.of_row, without))
+        begin = None if slopes_v is None else whitened_one.columns(slopes_v)
+        return descend(whitened_one, x, self.low, self.high, rounds, GAIN_NATS, begin).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit at a point, scored."""
@@ -163,6 +163,31 @@ def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> Predic
     return best_over_sizes(out)
 
 
+@dataclass(frozen=True, eq=False)
+class _Whitened:
+    """What a descent minimises at one size of the model error: whitened residual of the rows that are looked at (n,),
+    then the coordinates."""
+
+    fitter: HypothesisFitter
+    delta_v: float
+    seen: BoolArray
+
+    def residual(self, x: Array) -> Array | None:
+        e = self.fitter.residual(x)
+        return None if e is None else np.concatenate([self._white(e[:, None])[:, 0], x])
+
+    def slopes(self, x: Array, residual: Array) -> Array | None:
+        e = self.fitter.residual(x)
+        jacobian = None if e is None else self.fitter.jacobian(x, e)
+        return None if jacobian is None else self.columns(jacobian)
+
+    def columns(self, jacobian_v: Array) -> Array:
+        return np.vstack([-self._white(jacobian_v), np.eye(jacobian_v.shape[1])])
+
+    def _white(self, columns_v: Array) -> Array:
+        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.delta_v)[0][self.seen]
+
+
 class LinearForm(Protocol):
     """A hypothesis about a point, with its score."""
 
@@ -176,3 +201,13 @@ def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
     """(n,) V: the residual of each block at the parameters that the other blocks give, linearly."""
     shifts = fit.score.shifts["block"][blocks.of_row]
     return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)
+
+
+def prediction_sd_v(problem: InverseProblem, blocks: Blocks, fit: LinearForm) -> Array:
+    """(n,) V, standard deviation of what is predicted of each block by the parameters that the others give, if the
+    hypothesis is right: with a model error as small as that of a right one."""
+    x, jacobian = fit.point.x, fit.point.jacobian_v
+    white, log_det = whitened(problem, blocks, fit.point.table(), PRIORS[problem.trust].median_v)
+    posterior = Posterior(block_sums(blocks, white, log_det), x, blocks.folds["block"])
+    spread = [jacobian[rows] @ c for rows, c in zip(blocks.rows, posterior.covariances_without, strict=True)]
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", np.concatenate(spread), jacobian)))

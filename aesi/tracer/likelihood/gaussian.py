@@ -127,6 +127,12 @@ class Posterior:
         gram = np.tensordot(kept, self.sums.gram, axes=(1, 0))
         return Solved.of(gram, kept @ self.sums.moment, self.x)
 
+    @property
+    def covariances_without(self) -> Array:
+        """(f, m, m) of the parameters without each fold."""
+        inverse = np.linalg.inv(self._solved_without.root)
+        return np.asarray(np.swapaxes(inverse, -1, -2) @ inverse)
+
     @cached_property
     def log_density(self) -> Array:
         """(f,) log p(y_F | y_-F) of each fold, nats."""

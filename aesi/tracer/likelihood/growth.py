@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from aesi.numerics.bounded import Minimum, descend
+from aesi.numerics.bounded import descend, foreseen_cost
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import FURTHEST_SDS, FreeParameter, of_effect, starts, values_of
@@ -29,9 +29,8 @@ from aesi.tracer.likelihood.gaussian import (
 )
 from aesi.tracer.likelihood.model_error import PRIORS, whitened
 
-FIRST_STEPS = 2
-FURTHER_STEPS = 5
-"""Of a descent: from each start, and on from the best."""
+ROUNDS = 6
+"""Slopes are taken so many times at most."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,18 +99,23 @@ class _Growth:
         self.simulations = 0
         basis = np.vstack([parent.white[delta_v][0][:, self.rest], np.eye(len(self.rest))])
         self.q = np.linalg.qr(basis)[0]
-        self._last: tuple[bytes, Array | None] = (b"", None)
+        self._errors: dict[bytes, Array | None] = {}
+        self._slopes: dict[bytes, Array] = {}
 
-    def residual(self, u: Array) -> Array | None:
+    def error_v(self, u: Array) -> Array | None:
+        """(n,) V, or None where the model fails."""
         key = u.tobytes()
-        if self._last[0] != key:
+        if key not in self._errors:
             self.simulations += 1
             values = {**self.held, **values_of(self.added, u)}
             predicted = self.problem.predict(values)
-            self._last = (key, None if predicted is None else self.problem.measured - predicted)
-        return self._last[1]
+            self._errors[key] = None if predicted is None else self.problem.measured - predicted
+        return self._errors[key]
 
     def jacobian(self, u: Array, e: Array) -> Array | None:
+        """(n, k) V of the model, by one-sided differences within the bounds."""
+        if u.tobytes() in self._slopes:
+            return self._slopes[u.tobytes()]
         out = np.zeros((len(e), len(u)))
         for j in range(len(u)):
             size = min(EFFECT_STEP, 0.25 * (self.high[j] - self.low[j]))
@@ -127,52 +131,64 @@ class _Growth:
                     break
             else:
                 return None
+        self._slopes[u.tobytes()] = out
         return out
 
     def projected(self, columns: Array, tail: Array) -> Array:
+        """Whitened columns over those of the rest's prior, less what the rest can take up."""
         white = whitened(self.problem, self.parent.blocks, columns, self.delta_v)[0]
         stacked = np.vstack([white, tail])
         return stacked - self.q @ (self.q.T @ stacked)
 
-    def cost(self, u: Array) -> float:
-        e = self.residual(u)
+    def residual(self, u: Array) -> Array | None:
+        """What a descent minimises: (1) with the inner minimum taken, then the coordinates."""
+        e = self.error_v(u)
         if e is None:
-            return np.inf
-        tail = -self.parent.fit.point.x[self.rest][:, None]
-        return 0.5 * float(np.sum(self.projected(e[:, None], tail) ** 2) + u @ u)
-
-    def descended(self, u: Array, steps: int) -> Minimum:
-        """Where a descent from `u` ends, within the bounds."""
-        start = np.clip(u, self.low, self.high)
-        return descend(self.linearise, self.cost, start, self.low, self.high, steps, GAIN_NATS)
-
-    def linearise(self, u: Array) -> tuple[Array, Array] | None:
-        e = self.residual(u)
-        jacobian = None if e is None else self.jacobian(u, e)
-        if e is None or jacobian is None:
             return None
-        x = self.parent.fit.point.x[self.rest]
-        tail = np.column_stack([-x, np.zeros((len(x), len(u)))])
-        table = self.projected(np.column_stack([e, -jacobian]), tail)
-        return np.concatenate([table[:, 0], u]), np.vstack([table[:, 1:], np.eye(len(u))])
+        tail = -self.parent.fit.point.x[self.rest][:, None]
+        return np.concatenate([self.projected(e[:, None], tail)[:, 0], u])
+
+    def slopes(self, u: Array, residual: Array) -> Array | None:
+        """Of the residual."""
+        e = self.error_v(u)
+        jacobian = None if e is None else self.jacobian(u, e)
+        if jacobian is None:
+            return None
+        return np.vstack([self.projected(-jacobian, np.zeros((len(self.rest), len(u)))), np.eye(len(u))])
+
+    def start(self) -> Array | None:
+        """Of the usual starts the one from which a step promises most; None where none can be simulated."""
+        promised = []
+        for u in np.clip(starts(self.added), self.low, self.high):
+            residual = self.residual(u)
+            slopes = None if residual is None else self.slopes(u, residual)
+            if residual is not None and slopes is not None:
+                promised.append((foreseen_cost(u, residual, slopes, self.low, self.high), u))
+        return min(promised, key=lambda one: one[0])[1] if promised else None
+
+    def fitted(self, u: Array) -> Array:
+        """Where a descent from `u` ends, within the bounds."""
+        return descend(self, u, self.low, self.high, ROUNDS, GAIN_NATS).known_x
 
 
-def grow(parent: Parent, effect: str, delta_v: float, known: Array | None = None) -> Grown | None:
-    """The parent and one effect more, from several starts; None where it cannot be simulated.
+def grow(
+    parent: Parent, effect: str, delta_v: float, known: Array | None = None, near: Array | None = None
+) -> Grown | None:
+    """The parent and one effect more; None where it cannot be simulated.
 
     delta_v : one of the tried sizes, at which the effect's parameters are fitted.
-    known : coordinates of the effect's parameters where an earlier descent ended.
+    known : coordinates of the effect's parameters where an earlier descent ended.  near : where one with the other
+    model of the cell did, to start from; None: from the best of several starts.
     """
     growth = _Growth(parent, effect, delta_v)
-    if known is not None:
-        u = known
+    if known is None:
+        start = growth.start() if near is None else near
+        u = None if start is None else growth.fitted(start)
     else:
-        ends = [growth.descended(start, FIRST_STEPS) for start in starts(growth.added)]
-        best = min(ends, key=lambda end: end.cost)
-        if not np.isfinite(best.cost):
-            return None
-        u = growth.descended(best.x, FURTHER_STEPS).x if best.steps == FIRST_STEPS else best.x
-    e = growth.residual(u)
+        u = known
+    if u is None:
+        return None
+    e = growth.error_v(u)
     jacobian = None if e is None else growth.jacobian(u, e)
     if e is None or jacobian is None:
         return None

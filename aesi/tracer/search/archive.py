@@ -21,10 +21,13 @@ from aesi.tracer.case.problem import InverseProblem
 
 
 class Archive:
-    """Coordinates by name of a fit, appended one JSON line each; lines of another case are passed over."""
+    """Coordinates by name of a fit, appended one JSON line each; lines of another case are passed over.
 
-    def __init__(self, path: Path | None, context: str) -> None:
-        self.path, self.context = path, context
+    beside : the archive of the same case with the other model of the cell.
+    """
+
+    def __init__(self, path: Path | None, context: str, beside: Archive | None = None) -> None:
+        self.path, self.context, self.beside = path, context, beside
         self._lock = threading.Lock()
         self._kept: dict[str, Array] = {}
         if path is not None and path.exists():
@@ -40,6 +43,10 @@ class Archive:
         """(size,) coordinates where that fit ended, or None."""
         kept = self._kept.get(name)
         return kept if kept is not None and kept.shape == (size,) else None
+
+    def near(self, name: str, size: int) -> Array | None:
+        """(size,) coordinates where that fit ended with the other model of the cell, or None."""
+        return None if self.beside is None else self.beside.get(name, size)
 
     def put(self, name: str, x: Array) -> None:
         """Keep where a fit ended, unless it is there."""

@@ -7,16 +7,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, coordinates_of
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, coordinates_of, values_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
+from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive, fit_name
 
-FIT_STEPS = 8
-"""At most; a fit that gains nothing more ends before. Measured on a blind case (asymmetric kinetics, seed 12): after
-three steps a parameter was on its bound, after six it was where the truth is."""
+FIT_ROUNDS = 8
+"""Slopes are taken so many times at most; a fit that gains nothing more ends before. Measured on a blind case
+(asymmetric kinetics, seed 12): after three steps a parameter was on its bound, after six it was where the truth is."""
 MOVED_SDS = 1.0
 """Of its spread: what is to first order about a declared parameter that moved further may be far off where it is not.
 Measured on a blind case (leakage and a contact, seed 0): growth of the contact said 1 nat more, its fit 52."""
@@ -24,27 +26,51 @@ Measured on a blind case (leakage and a contact, seed 0): growth of the contact 
 
 def base_of(problem: InverseProblem, blocks: Blocks, archive: Archive) -> FittedHypothesis | None:
     """The hypothesis without effects; None where it cannot be simulated."""
-    return fitted_hypothesis(problem, blocks, (), None, PRIORS[problem.trust].median_v, archive)
+    return fitted_hypothesis(problem, blocks, (), None, archive)
 
 
 def fitted_hypothesis(
     problem: InverseProblem,
     blocks: Blocks,
     hypothesis: Sequence[str],
-    placed: dict[tuple[str, str], float] | None,
-    delta_v: float,
+    near: Explanation | None,
     archive: Archive,
 ) -> FittedHypothesis | None:
-    """A hypothesis fitted with the whole model, from `placed` values or the middle of every prior; as the archive
-    has it where it was fitted before.  None where the model fails."""
+    """A hypothesis fitted with the whole model; as the archive has it where it was fitted before.  None where the model
+    fails.
+
+    near : where a like one ended, at whose size of the model error it is fitted; None: from the middle of every prior.
+    """
     fitter = HypothesisFitter(problem, blocks, hypothesis)
     name = fit_name(problem, "fit", hypothesis)
     x = archive.get(name, len(fitter.free))
     if x is None:
-        x0 = np.zeros(len(fitter.free)) if placed is None else coordinates_of(fitter.free, placed)
-        x = fitter.descend(x0, PRIORS[problem.trust].nearest(delta_v), FIT_STEPS)
+        prior = PRIORS[problem.trust]
+        if near is None:
+            x = fitter.descend(np.zeros(len(fitter.free)), prior.nearest(prior.median_v), FIT_ROUNDS)
+        else:
+            x0, size = coordinates_of(fitter.free, near.placed), prior.nearest(near.score.delta_v)
+            x = fitter.descend(x0, size, FIT_ROUNDS, _slopes_v(near, fitter.free))
         archive.put(name, x)
     return fitter.finished(x)
+
+
+def values_without(
+    problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, fold: Sequence[int]
+) -> dict[str, dict[str, float]]:
+    """owner -> name -> value where the data without some blocks put a hypothesis: with the whole model, by steps from
+    where all data put it and updates of the slopes that it has there."""
+    fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
+    x = fitter.descend(fit.point.x, fit.score.delta_v, 0, fit.point.jacobian_v, fold)
+    return values_of(fit.free, x)
+
+
+def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:
+    """(n, k) V of these parameters as they were at another hypothesis, None where it lacks one of them."""
+    place = {one: j for j, one in enumerate(near.free)}
+    if not all(one in place for one in free):
+        return None
+    return near.point.jacobian_v[:, [place[one] for one in free]]
 
 
 def as_declared(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> FittedHypothesis | None:

@@ -93,8 +93,7 @@ def _pruned(
         best: FittedHypothesis | None = None
         for name in chosen.hypothesis:
             rest = tuple(other for other in chosen.hypothesis if other != name)
-            start, size = chosen.placed, chosen.score.delta_v
-            fit = fitted_hypothesis(problem, blocks, rest, start, size, archive) if rest else base
+            fit = fitted_hypothesis(problem, blocks, rest, chosen, archive) if rest else base
             if fit is None:
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
@@ -126,7 +125,7 @@ def _exchanged(
         others = []
         for rest in new:
             grown_from.add(frozenset(rest))
-            fit = fitted_hypothesis(problem, blocks, rest, chosen.placed, chosen.score.delta_v, archive)
+            fit = fitted_hypothesis(problem, blocks, rest, chosen, archive)
             if fit is None:
                 continue
             step, _ = _step(problem, blocks, [fit], slopes, archive, report)
@@ -144,8 +143,7 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
     base = base_of(problem, blocks, archive)
     if base is None:
         return None
-    start, size = path.chosen.placed, path.chosen.score.delta_v
-    fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, start, size, archive)
+    fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, path.chosen, archive)
     return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
 
 
@@ -171,7 +169,7 @@ def _step(
     least_nats = admission_nats(places[0], slopes)
     fitted = []
     for one in _finalists(ranked, best):
-        fit = fitted_hypothesis(problem, blocks, one.hypothesis, dict(one.placed), one.score.delta_v, archive)
+        fit = fitted_hypothesis(problem, blocks, one.hypothesis, one, archive)
         if fit is not None:
             report(problem, fit, fit.score.total - best.score.total)
             fitted.append(fit)

@@ -34,10 +34,13 @@ def promising(parent: Parent, slopes: Mapping[str, Array]) -> list[str]:
 
 
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
-    """Not what infers a quantity that every record holds, nor what every hypothesis may move anyway."""
+    """Not what infers a quantity that every record holds, nor what every hypothesis may move anyway, nor what a file
+    has right that was fitted to this very cell."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
+    if problem.trust == "measured":
+        return not effect.of_design
     if problem.trust != "loose":
         return True
     return not all(p.spread is not None and p.spread.loose is not None for p in effect.parameters.values())
@@ -50,8 +53,8 @@ def side_by_side(wanted: Sequence[tuple[Parent, str]], archive: Archive) -> Iter
     def one(parent: Parent, name: str) -> Grown | None:
         kind = "grown as declared" if parent.fit.as_declared else "grown"
         key = fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
-        known = archive.get(key, len(parent.problem.effects[name].parameters))
-        found = grow(parent, name, _growth_size(parent), known)
+        size = len(parent.problem.effects[name].parameters)
+        found = grow(parent, name, _growth_size(parent), archive.get(key, size), archive.near(key, size))
         if found is not None:
             archive.put(key, found.u)
         return found

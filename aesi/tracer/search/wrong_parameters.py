@@ -27,9 +27,8 @@ def with_wrong_parameters(path: Path, archive: Archive) -> Path:
     """
     chosen = path.chosen
     while beyond := _beyond_spread(path.problem, chosen):
-        start, size = chosen.placed, chosen.score.delta_v
         fits = [
-            fitted_hypothesis(path.problem, path.blocks, (*chosen.hypothesis, owner), start, size, archive)
+            fitted_hypothesis(path.problem, path.blocks, (*chosen.hypothesis, owner), chosen, archive)
             for owner in beyond
         ]
         said = chosen.score.total - ALIKE_NATS

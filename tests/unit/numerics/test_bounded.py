@@ -1,45 +1,99 @@
 """Levenberg-Marquardt inside a box."""
 
+from dataclasses import dataclass, field
+
 import numpy as np
 import pytest
+from scipy.optimize import rosen
 
 from aesi.numerics.bounded import descend
 
 
-def problem(residual, jacobian):
-    def cost(x):
-        r = residual(x)
-        return 0.5 * float(r @ r)
+@dataclass
+class Counted:
+    """A residual with its slopes, and how often either was asked for."""
 
-    return (lambda x: (residual(x), jacobian(x))), cost
+    of: object
+    jacobian: object
+    asked: list = field(default_factory=lambda: [0, 0])
+
+    def residual(self, x):
+        self.asked[0] += 1
+        return self.of(x)
+
+    def slopes(self, x, residual):
+        self.asked[1] += 1
+        return self.jacobian(x)
 
 
 def rosenbrock():
-    return problem(
+    return Counted(
         lambda x: np.array([10 * (x[1] - x[0] ** 2), 1 - x[0]]),
         lambda x: np.array([[-20 * x[0], 10.0], [-1.0, 0.0]]),
     )
 
 
+def exponentials(n=40, k=6):
+    t = np.linspace(0, 2, n)
+    basis = np.cos(np.outer(t, np.arange(k)))
+    y = np.exp(0.3 * basis @ np.linspace(-1, 1, k))
+    return Counted(
+        lambda x: np.exp(0.3 * basis @ x) - y, lambda x: 0.3 * basis * np.exp(0.3 * basis @ x)[:, None]
+    ), np.linspace(-1, 1, k)
+
+
 def test_rosenbrock_from_the_usual_start():
-    linearise, cost = rosenbrock()
-    found = descend(linearise, cost, np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 100, 1e-14)
+    found = descend(rosenbrock(), np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 100, 1e-14)
     assert found.x == pytest.approx([1, 1], abs=1e-5)
+    assert found.converged
+    assert found.cost == pytest.approx(0.5 * rosen(found.x), abs=1e-12)
 
 
 def test_a_minimum_outside_the_box_is_met_on_its_face():
-    linearise, cost = problem(lambda x: x - np.array([3.0, 0.5]), lambda x: np.eye(2))
-    found = descend(linearise, cost, np.zeros(2), np.full(2, -1.0), np.full(2, 1.0), 20, 1e-12)
+    model = Counted(lambda x: x - np.array([3.0, 0.5]), lambda x: np.eye(2))
+    found = descend(model, np.zeros(2), np.full(2, -1.0), np.full(2, 1.0), 20, 1e-12)
     assert found.x == pytest.approx([1.0, 0.5], abs=1e-6)
 
 
 def test_a_start_that_fails_is_returned_as_it_is():
-    found = descend(lambda x: None, lambda x: np.inf, np.zeros(2), -np.ones(2), np.ones(2), 5, 1e-3)
+    found = descend(Counted(lambda x: None, None), np.zeros(2), -np.ones(2), np.ones(2), 5, 1e-3)
     assert found.cost == np.inf
-    assert found.steps == 0
+    assert (found.rounds, found.converged) == (0, False)
 
 
 def test_slopes_that_lead_nowhere_leave_the_start_as_it_is():
-    linearise, cost = problem(lambda x: x - 3.0, lambda x: -np.eye(2))
-    found = descend(linearise, cost, np.zeros(2), np.full(2, -5.0), np.full(2, 5.0), 10, 1e-12)
+    model = Counted(lambda x: x - 3.0, lambda x: -np.eye(2))
+    found = descend(model, np.zeros(2), np.full(2, -5.0), np.full(2, 5.0), 10, 1e-12)
     assert found.x == pytest.approx([0.0, 0.0])
+
+
+def test_updates_take_the_place_of_slopes_which_are_taken_seldom():
+    model, truth = exponentials()
+    box = np.full(6, -5.0), np.full(6, 5.0)
+    found = descend(model, np.zeros(6), *box, 20, 1e-12)
+    assert found.x == pytest.approx(truth, abs=1e-4)
+    assert found.rounds == model.asked[1] <= 3
+    assert model.asked[0] < 20
+
+
+def test_where_it_begins_with_the_slopes_of_another_place_it_ends_where_it_would_without_them():
+    model, truth = exponentials()
+    box = np.full(6, -5.0), np.full(6, 5.0)
+    wrong = descend(model, np.zeros(6), *box, 20, 1e-12, -model.jacobian(np.zeros(6)))
+    near = descend(model, truth + 0.05, *box, 20, 1e-12, model.jacobian(np.ones(6)))
+    assert wrong.x == pytest.approx(truth, abs=1e-4)
+    assert near.x == pytest.approx(truth, abs=1e-4)
+
+
+def test_a_descent_that_stops_early_has_not_converged():
+    found = descend(rosenbrock(), np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 1, 1e-14)
+    assert (found.rounds, found.converged) == (1, False)
+
+
+def test_where_slopes_were_taken_last_is_as_good_within_the_tolerance():
+    model, _ = exponentials()
+    found = descend(model, np.zeros(6), np.full(6, -5.0), np.full(6, 5.0), 20, 1e-3)
+    there = 0.5 * float(np.sum(model.of(found.known_x) ** 2))
+    assert found.converged
+    assert found.cost <= there < found.cost + 1e-3
+    assert not np.array_equal(found.x, found.known_x)

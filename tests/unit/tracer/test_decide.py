@@ -8,13 +8,15 @@ import pytest
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
-from aesi.tracer.decide.carry_over import left_out_errors, range_fault
+from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
-from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v
+from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v, unexplained_v
+from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
+from aesi.tracer.search.fitted import values_without
 from aesi.tracer.search.forward import searched
 
 NEVER = Archive(None, "")
@@ -44,9 +46,30 @@ def test_what_is_left_beyond_the_tolerance_is_unknown_and_names_nothing(path):
     bare = replace(path, chosen=path.base)
     verdict = judged(bare, Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", ())
-    assert verdict.structured_v == structured_v(path, path.base) > verdict.tolerance_v
+    left_v = unexplained_v(path.problem, path.blocks, path.base, verdict.tolerance_v)
+    assert verdict.structured_v == left_v > verdict.tolerance_v
+    assert left_v == pytest.approx(structured_v(path, path.base), rel=0.05)  # few parameters, well known
     generous = judged(bare, Thresholds(solver_v=0.1))
     assert generous.word == "none"
+
+
+def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
+    one, blocks = path.base, path.blocks
+    wild = np.zeros((len(one.point.residual_v), 1))
+    wild[blocks.rows[5]] = 1.0  # a parameter that one block alone could tell
+    point = replace(
+        one.point,
+        x=np.append(one.point.x, 0.0),
+        residual_v=one.point.residual_v + 1.0 * wild[:, 0],
+        jacobian_v=np.column_stack([one.point.jacobian_v, wild]),
+        bounds=np.vstack([one.point.bounds, [[-9.0, 9.0]]]),
+    )
+    flexible = replace(one, point=point, score=scored(path.problem, blocks, point))
+    sd_v = prediction_sd_v(path.problem, blocks, flexible)
+    assert sd_v[blocks.rows[5]] == pytest.approx(1.0, rel=1e-3)
+    assert max(sd_v[blocks.rows[4]]) < 1e-3
+    assert structured_v(path, flexible) > 0.1
+    assert unexplained_v(path.problem, blocks, flexible, 1e-3) < 2 * structured_v(path, one)
 
 
 def test_data_that_order_nothing_give_look_alikes(path):
@@ -79,6 +102,25 @@ def test_what_was_fitted_carries_to_a_part_left_out(path):
     assert range_fault(ModelState.of(path.problem, path.chosen)) is None
 
 
+def test_a_hypothesis_is_put_where_the_data_without_a_part_put_it(path):
+    fold = path.blocks.folds["end"][0]
+    values = values_without(path.problem, path.blocks, path.chosen, fold)
+    assert values["ocv_hysteresis"]["magnitude_v"] == pytest.approx(0.006, rel=0.1)
+    assert values != path.chosen.values
+    seen_all = values_without(path.problem, path.blocks, path.chosen, ())
+    assert seen_all["ocv_hysteresis"] == pytest.approx(path.chosen.values["ocv_hysteresis"], rel=0.02)
+
+
+def test_a_model_is_replaced_by_one_that_is_worse_nowhere_and_better_on_the_whole():
+    declared = LeftOut((10e-3, 30e-3), 22e-3)
+    assert LeftOut((13e-3, 20e-3), 17e-3).may_replace(declared)  # by less than such models err
+    assert not LeftOut((15e-3, 2e-3), 11e-3).may_replace(declared)  # worse on one part
+    assert not LeftOut((10e-3, 29e-3), 21.5e-3).may_replace(declared)  # as good
+    assert not LeftOut((1e-3, np.inf), np.inf).may_replace(declared)
+    assert LeftOut((14e-3, 14e-3), 14e-3).as_good_as(LeftOut((11e-3, 11e-3), 11e-3))
+    assert not LeftOut((14e-3, 14e-3), 14e-3).as_good_as(LeftOut((8e-3, 8e-3), 8e-3))
+
+
 def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refused(path):
     def fault(diffusivity_factor):
         poor = CATALOGUE["electrolyte_transport"].activate(diffusivity_factor=diffusivity_factor)
@@ -101,7 +143,10 @@ def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):
     two = Archive(tmp_path / "a.jsonl", context_of(path.problem))
     assert two.get("fit", 2).tolist() == [1.0, 2.0]
     assert two.get("fit", 3) is None
-    assert Archive(tmp_path / "a.jsonl", "another case").get("fit", 2) is None
+    other = Archive(tmp_path / "a.jsonl", "another case", beside=two)
+    assert other.get("fit", 2) is None
+    assert other.near("fit", 2).tolist() == [1.0, 2.0]
+    assert two.near("fit", 2) is None
 
 
 def test_the_map_gives_the_frequency_that_it_was_fitted_to():

@@ -1,6 +1,7 @@
 """Which model of the cell all hypotheses use: the porous electrode where it matters, the single particle where the data
 are one's, or the one that was asked for."""
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -55,6 +56,12 @@ def test_the_model_that_was_asked_for_is_used(m50):
     one = found(m50, record(m50, "dfn"), model="espm", max_effects=0)
     assert one.choice.model == "espm"
     assert "as asked" in one.choice.sentence
+
+
+def test_parameters_that_were_fitted_with_one_model_are_searched_with_that_one(m50):
+    one = found(replace(m50, fitted_with="espm"), record(m50, "dfn"), max_effects=0)
+    assert one.choice.model == "espm"
+    assert "with which the parameters of the cell were fitted" in one.choice.sentence
 
 
 def test_models_that_differ_by_less_than_the_noise_leave_the_single_particle(m50):

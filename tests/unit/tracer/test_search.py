@@ -45,7 +45,7 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
     assert max(np.abs(own_coordinates(base))) > MOVED_SDS  # a resistance that is not there, as slow kinetics
     there = as_declared(problem, blocks, base)
     assert own_coordinates(there) == [0.0] * len(own_coordinates(base))
-    whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, SIZE_V, archive)
+    whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, archive)
     gains = [
         grow(Parent(problem, blocks, one), "series_resistance", SIZE_V).score.total for one in (base, there)
     ]
