@@ -34,12 +34,16 @@ class Residual(Protocol):
 @dataclass(frozen=True, eq=False)
 class Minimum:
     """Where a descent ended: x (n,), half the sum of squares there, how often slopes were taken, and whether it ended
-    because nothing was left to gain."""
+    because nothing was left to gain.
+
+    known_x : (n,) as good within the tolerance, and slopes were taken there; x where it did not converge.
+    """
 
     x: Array
     cost: float
     rounds: int
     converged: bool
+    known_x: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,29 +70,28 @@ def descend(
 ) -> Minimum:
     """Minimise half a sum of squares within low <= x <= high.
 
-    rounds : slopes are taken so many times at most.  tolerance : stops where they promise less than this, or where no
-    step gains as much.  slopes : (m, n) as they are near x0, to begin with; nothing is concluded from them.
+    rounds : slopes are taken so many times at most.  tolerance : stops where the steps from them gain less than this.
+    slopes : (m, n) as they are near x0, to begin with; nothing is concluded from them.
     """
     x = np.clip(x0, low, high)
     residual = model.residual(x)
     if residual is None:
-        return Minimum(x, np.inf, 0, False)
+        return Minimum(x, np.inf, 0, False, x)
     damping = 1e-3
     if slopes is not None:
-        here, damping = _followed(
-            model, _Place(x, residual, slopes), low, high, tolerance, damping, UPDATED_TRIALS
-        )
+        near = _Place(x, residual, slopes)
+        here, damping = _followed(model, near, low, high, tolerance, damping, fresh=False)
         x, residual = here.x, here.residual
     for count in range(rounds):
         taken = model.slopes(x, residual)
         if taken is None:
-            return Minimum(x, _half_square(residual), count, False)
+            return Minimum(x, _half_square(residual), count, False, x)
         start = _Place(x, residual, taken)
-        here, damping = _followed(model, start, low, high, tolerance, damping, TRIALS)
-        if start.cost - here.cost < tolerance:  # there, since its slopes are known
-            return Minimum(x, start.cost, count + 1, True)
+        here, damping = _followed(model, start, low, high, tolerance, damping, fresh=True)
         x, residual = here.x, here.residual
-    return Minimum(x, _half_square(residual), rounds, False)
+        if start.cost - here.cost < tolerance:
+            return Minimum(x, here.cost, count + 1, True, start.x)
+    return Minimum(x, _half_square(residual), rounds, False, x)
 
 
 def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Array) -> float:
@@ -99,29 +102,35 @@ def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Ar
 
 
 def _followed(
-    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, trials: int
+    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
 ) -> tuple[_Place, float]:
-    """Steps from one place, with its slopes and then with updates of them, while each gains; and the damping."""
+    """Steps from one place, with its slopes and then with updates of them, while each gains; and the damping.
+
+    fresh : the slopes were taken here.
+    """
     for _ in range(1 + len(here.x)):
-        there, damping = _stepped(model, here, low, high, tolerance, damping, trials)
+        there, damping = _stepped(model, here, low, high, tolerance, damping, fresh)
         if there is None:
             return here, damping
-        gain, here, trials = here.cost - there.cost, there, UPDATED_TRIALS
+        gain, here, fresh = here.cost - there.cost, there, False
         if gain < tolerance:
             break
     return here, damping
 
 
 def _stepped(
-    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, trials: int
+    model: Residual, here: _Place, low: Array, high: Array, tolerance: float, damping: float, fresh: bool
 ) -> tuple[_Place | None, float]:
-    """One step that gains, with slopes brought up to date, or None; and the damping for the next one."""
-    for _ in range(trials):
+    """One step that gains, with slopes brought up to date, or None; and the damping for the next one.
+
+    What promises less than the tolerance is tried once, and only with slopes that were taken here.
+    """
+    for trial in range(TRIALS if fresh else UPDATED_TRIALS):
         step = _step(here, low, high, damping)
-        if step is None:
+        if step is None or not step.any():
             return None, damping
         foreseen = here.residual + here.slopes @ step
-        if here.cost - _half_square(foreseen) < tolerance:
+        if here.cost - _half_square(foreseen) < tolerance and (trial or not fresh):
             return None, damping
         x = here.x + step
         residual = model.residual(x)

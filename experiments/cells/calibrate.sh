@@ -1,8 +1,9 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
-#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
-# Without arguments all three, into this folder. Each takes some minutes of one processor.
-# The files of this folder are what this gives today: tests/statistical/test_calibrated_cells.py makes them again.
+#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc] [OUT_FOLDER]
+# Without arguments all, into this folder. Each takes some minutes of one processor.
+# The files of this folder are what this gives today (tests/statistical/test_calibrated_cells.py makes them again), but for
+# that of the LG 18650HG2 at 25 degC alone, which is from before electrodes had films.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -31,8 +32,14 @@ hg2() {
         "$p/25degC_mixed1.csv.gz" \
         --out "$out/lg_18650hg2.bpx.json"
 }
+hg2_25degc() {
+    p=$data/lg_18650hg2
+    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated at 25 degC alone" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
+        --out "$out/lg_18650hg2_25degc.bpx.json"
+}
 case $which in
-all) panasonic && panasonic_25degc && hg2 ;;
-panasonic | panasonic_25degc | hg2) "$which" ;;
+all) panasonic && panasonic_25degc && hg2 && hg2_25degc ;;
+panasonic | panasonic_25degc | hg2 | hg2_25degc) "$which" ;;
 *) echo "there is no cell $which" >&2 && exit 2 ;;
 esac

@@ -137,7 +137,7 @@ class HypothesisFitter:
         """
         whitened_one = _Whitened(self, delta_v, ~np.isin(self.blocks.of_row, without))
         begin = None if slopes_v is None else whitened_one.columns(slopes_v)
-        return descend(whitened_one, x, self.low, self.high, rounds, GAIN_NATS, begin).x
+        return descend(whitened_one, x, self.low, self.high, rounds, GAIN_NATS, begin).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit at a point, scored."""

@@ -168,7 +168,7 @@ class _Growth:
 
     def fitted(self, u: Array) -> Array:
         """Where a descent from `u` ends, within the bounds."""
-        return descend(self, u, self.low, self.high, ROUNDS, GAIN_NATS).x
+        return descend(self, u, self.low, self.high, ROUNDS, GAIN_NATS).known_x
 
 
 def grow(

@@ -88,3 +88,12 @@ def test_where_it_begins_with_the_slopes_of_another_place_it_ends_where_it_would
 def test_a_descent_that_stops_early_has_not_converged():
     found = descend(rosenbrock(), np.array([-1.2, 1.0]), np.full(2, -5.0), np.full(2, 5.0), 1, 1e-14)
     assert (found.rounds, found.converged) == (1, False)
+
+
+def test_where_slopes_were_taken_last_is_as_good_within_the_tolerance():
+    model, _ = exponentials()
+    found = descend(model, np.zeros(6), np.full(6, -5.0), np.full(6, 5.0), 20, 1e-3)
+    there = 0.5 * float(np.sum(model.of(found.known_x) ** 2))
+    assert found.converged
+    assert found.cost <= there < found.cost + 1e-3
+    assert not np.array_equal(found.x, found.known_x)
