@@ -15,7 +15,7 @@ from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.model_error import MEASURED_V
+from aesi.tracer.likelihood.model_error import MEASURED_V, MOST_MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.fitted import values_without
 
@@ -41,8 +41,8 @@ class LeftOut:
 
     def may_replace(self, other: LeftOut) -> bool:
         """Is the model better than another one on the whole, and on no part worse by more than models of measured cells
-        err by?"""
-        allowed = [np.hypot(its, MEASURED_V) for its in other.rmse_v]
+        may err by?"""
+        allowed = [np.hypot(its, MOST_MEASURED_V) for its in other.rmse_v]
         no_worse = all(own <= most for own, most in zip(self.rmse_v, allowed, strict=True))
         return no_worse and AS_GOOD * self.pooled_v < other.pooled_v
 

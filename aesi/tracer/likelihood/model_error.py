@@ -30,6 +30,8 @@ SIZES_V = tuple(float(v) for v in 1e-3 * np.geomspace(0.2, 25.6, 8))
 MEASURED_V = 9e-3
 """What calibrated and published files leave of a measured drive at the temperature that they are of: 4 to 13 mV on
 eight development records of `aesi bench real`, geometric mean 9 mV. Less is no evidence of anything missing."""
+MOST_MEASURED_V = 13e-3
+"""The most of those eight: what is worse by less is no evidence of a worse model."""
 
 
 @dataclass(frozen=True)
