@@ -164,7 +164,12 @@ class _Start:
             f"(by the open-circuit voltage {inside:.4f})."
         )
         return InitialState(
-            self._declared(1.0), sd, "full charge", words, rest_voltage_v=rest_v, by_voltage=self._declared(inside)
+            self._declared(1.0),
+            sd,
+            "full charge",
+            words,
+            rest_voltage_v=rest_v,
+            by_voltage=self._declared(inside),
         )
 
     def _declared(self, soc: float) -> float:
