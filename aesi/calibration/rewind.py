@@ -1,4 +1,4 @@
-"""The cell that is written: full and empty where the records show them, and aged as a typical record's."""
+"""The cell that is written: full and empty where the records show them, and as little aged as in the freshest."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from aesi.physics.cell import Cell
 
 def rewound(model: Model, x: Array) -> Cell:
     """The cell with full where its charged records started, and empty where it rests at its lower voltage."""
-    return _as_aged(model, x, *_usual(model, x))
+    return _as_aged(model, x, *_freshest(model, x))
 
 
 def capacities(model: Model, x: Array) -> dict[str, float]:
     """Record -> share of the written cell's capacity that the cell had then."""
-    usual_ah = rewound(model, x).capacity_ah
+    written_ah = rewound(model, x).capacity_ah
     return {
-        r.name: _as_aged(model, x, model.material(i, x), model.silicon(i, x)).capacity_ah / usual_ah
+        r.name: _as_aged(model, x, model.material(i, x), model.silicon(i, x)).capacity_ah / written_ah
         for i, r in enumerate(model.records)
     }
 
@@ -45,19 +45,15 @@ def _as_aged(model: Model, x: Array, material: float, silicon: float) -> Cell:
     return replace(model.aged(cell, material, 1.0), nominal_capacity_ah=model.cell.nominal_capacity_ah)
 
 
-def _usual(model: Model, x: Array) -> tuple[float, float]:
-    """Shares of active material and silicon of the records near the reference temperature.
+def _freshest(model: Model, x: Array) -> tuple[float, float]:
+    """Shares of active material and silicon of the record near the reference temperature that has most capacity.
 
-    A slow discharge gives more than a drive of the same cell does, and drives are what a file is used for: the mean of
-    the logarithms by rows.
+    A file is that of a cell before the tests aged it; what a record has less is its share in `capacities`.
     """
-    logs, rows = [], []
-    for i, record in enumerate(model.records):
-        kelvin = model.cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin
-        if abs(kelvin - model.cell.reference_temperature_k) <= SPAN_K:
-            logs.append(np.log([model.material(i, x), model.silicon(i, x)]))
-            rows.append(float(record.trusted.sum()))
-    if not logs:
-        return 1.0, 1.0
-    material, silicon = np.exp(np.average(logs, axis=0, weights=rows))
-    return float(material), float(silicon)
+    cell = model.cell
+    near = [
+        (model.material(i, x), model.silicon(i, x))
+        for i, r in enumerate(model.records)
+        if abs((r.mean_kelvin or cell.initial_temperature_k) - cell.reference_temperature_k) <= SPAN_K
+    ]
+    return max(near, key=lambda shares: _as_aged(model, x, *shares).capacity_ah, default=(1.0, 1.0))

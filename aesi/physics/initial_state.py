@@ -163,7 +163,14 @@ class _Start:
             f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge 1 +/- {sd:.4f} "
             f"(by the open-circuit voltage {inside:.4f})."
         )
-        return InitialState(self._declared(1.0), sd, "full charge", words, rest_voltage_v=rest_v)
+        return InitialState(
+            self._declared(1.0),
+            sd,
+            "full charge",
+            words,
+            rest_voltage_v=rest_v,
+            by_voltage=self._declared(inside),
+        )
 
     def _declared(self, soc: float) -> float:
         """In the windows of the cell file, where effects moved them."""

@@ -1,14 +1,15 @@
 """The zero of a cycler's current: what it reads too much, which at C/20 is several per cent.
 
-One discharge cannot tell it from capacity. A slow record that ends as full as it began can: a cell gives back all but
-a thousandth of a charge, so that what a discharge seems to take beyond the charge after it is the zero's,
+One discharge cannot tell it from capacity. A slow record that ends about as full as it began can: a cell gives back all
+but a thousandth of a charge, so that what a discharge seems to take beyond the charge after it is the zero's,
 
     zero = (q + Q (s_end - s_start)) / t,     q = integral of I dt over the record, I > 0 on discharge           (1)
 
-t the time in which a current flows (the relay is open at rest), Q the capacity, s the states of charge at both ends.
-The C/20 cycles of an LG 18650HG2 at 25, 40 and 0 degC say -5.0, -4.8 and -2.5 mA (the last did not end quite full),
-that of a Panasonic NCR18650PF 9.8 mA: they took 18.3, 17.7, 17.1 and 20.7 h to empty, 20.0, 19.3, 18.3 and 18.0 h to
-fill.
+t the time in which a current flows (the relay is open at rest), Q the capacity, s the states of charge at both ends by
+their rest voltages: a charge that stopped at the upper cut-off voltage is less full than one that was held there. The
+potentials of another cell tell their difference roughly, so each end is uncertain by half its distance from full, too.
+The C/20 cycles of an LG 18650HG2 at 25, 40 and 0 degC say -5.0, -4.5 and -3.7 mA, that of a Panasonic NCR18650PF
+9.2 mA: they took 18.3, 17.7, 17.1 and 20.7 h to empty, 20.0, 19.3, 18.3 and 18.0 h to fill.
 """
 
 from __future__ import annotations
@@ -70,7 +71,7 @@ def zero_of(cell: Cell, records: Sequence[Measurement]) -> Zero:
         means.append(mean)
         sds.append(sd)
         sentences.append(
-            f"{record.name}: full at both ends; by the charge that it took and gave its current reads "
+            f"{record.name}: nearly full at both ends; by the charge that it took and gave its current reads "
             f"{1e3 * abs(mean):.1f} +/- {1e3 * sd:.1f} mA too {'high' if mean > 0.0 else 'low'}."
         )
     if not means:
@@ -93,9 +94,9 @@ def _of_cycle(cell: Cell, data: Measurement) -> tuple[float, float] | None:
         began, ended = initial_state(cell, data), initial_state(cell, data.take(slice(last + 1, len(data))))
     except DataError:
         return None
-    if began.basis != "full charge" or ended.basis != "full charge":
+    if began.by_voltage is None or ended.by_voltage is None:
         return None
     flowed_h = float(steps_s[flows].sum()) / SECONDS_PER_HOUR
     sd_ah = cell.capacity_ah * float(np.hypot(began.sd, ended.sd))
-    gained_ah = cell.capacity_ah * (ended.soc - began.soc)
+    gained_ah = cell.capacity_ah * (ended.by_voltage - began.by_voltage)
     return (float(moved_ah.sum()) + gained_ah) / flowed_h, sd_ah / flowed_h

@@ -16,6 +16,7 @@ class InitialState:
     state of charge is far from that of the voltage.  rest_voltage_v : at which the cell rests there, as read.
     doubt : how far the reading of the voltage is from what was given.  ends : states of charge that the voltage would
     say two of its deviations lower and higher; on a flat potential far beyond soc -+ 2 sd.
+    by_voltage : of a full charge alone, what the open-circuit potentials say of its rest voltage instead of 1.
     """
 
     soc: float
@@ -26,6 +27,7 @@ class InitialState:
     rest_voltage_v: float | None = None
     doubt: float = 0.0
     ends: tuple[float, float] | None = None
+    by_voltage: float | None = None
 
     def off(self, soc: float) -> float:
         """How far a state of charge is from all that the voltage may mean; 0 within."""
