@@ -11,6 +11,8 @@ from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_state import ModelState
 
+NO_BETTER = "on data left out it is no better than the declared model, or worse in a range of charge"
+
 
 @dataclass(frozen=True, eq=False)
 class Option:
@@ -58,9 +60,7 @@ def _option(
 ) -> Option:
     state, left_out = ModelState.of(problem, fit), left_out_errors(problem, blocks, fit)
     if not left_out.may_replace(declared.left_out):
-        return Option(
-            state, left_out, fit, "it does worse than the declared model on a part of the data left out"
-        )
+        return Option(state, left_out, fit, NO_BETTER)
     return Option(state, left_out, fit, range_fault(state, ORDINARY_C if named else (*ORDINARY_C, *FAST_C)))
 
 
