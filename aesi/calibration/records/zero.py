@@ -8,7 +8,7 @@ but a thousandth of a charge, so that what a discharge seems to take beyond the 
 t the time in which a current flows (the relay is open at rest), Q the capacity, s the states of charge at both ends by
 their rest voltages: a charge that stopped at the upper cut-off voltage is less full than one that was held there. The
 potentials of another cell tell their difference roughly, so each end is uncertain by half its distance from full, too.
-The C/20 cycles of an LG 18650HG2 at 25, 40 and 0 degC say -5.0, -4.5 and -3.7 mA, that of a Panasonic NCR18650PF
+The C/20 cycles of an LG 18650HG2 at 25, 40 and 0 degC say -5.0, -4.5 and -3.6 mA, that of a Panasonic NCR18650PF
 9.2 mA: they took 18.3, 17.7, 17.1 and 20.7 h to empty, 20.0, 19.3, 18.3 and 18.0 h to fill.
 """
 
