@@ -4,7 +4,7 @@
 # Without arguments all three, into this folder. Each takes some minutes of one processor.
 # None of the files of this folder is what this gives today: the Panasonic's over temperatures is from before a cycler's
 # zero was read off whole cycles and records had silicon of their own, the other two also from before electrodes had films.
-# What it gives today was not shipped, for it is worse on what it is fitted to: docs/cells.md.
+# The Panasonic's as made today is no better on what it is fitted to, so that it was not shipped: docs/cells.md.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
