@@ -89,12 +89,11 @@ def gathered(
     recalibrated = _recalibrated(problem, paths["tight"], archive)
     if verdict.word != "unknown":
         return _adopted(path, paths, _with_confidence(verdict), recalibrated)
-    others = [path, path_of("measured")]
-    if len(problem.records) > 1:
-        others.append(path_of("loose"))
-    if paths["measured"].chosen.hypothesis:
-        path, verdict = paths["measured"], partly(paths["measured"], verdict, thresholds)
-    tried = [(one.problem, fit) for one in others for fit in (one.base, one.chosen)]
+    measured = path_of("measured")
+    tried = [(one.problem, one.base) for one in (path, measured)]
+    if measured.chosen.hypothesis:
+        path, verdict = measured, partly(measured, verdict, thresholds)
+        tried.append((measured.problem, measured.chosen))
     tried = tried if recalibrated is None else [recalibrated, *tried]
     after, why = written(problem, path.blocks, tried, path.chosen if verdict.effects else None)
     other = ModelState(problem) if recalibrated is None else ModelState.of(*recalibrated)

@@ -31,10 +31,11 @@ def written(
     tried: Sequence[tuple[InverseProblem, FittedHypothesis]],
     named: FittedHypothesis | None,
 ) -> tuple[ModelState, str | None]:
-    """Of all that was fitted what leaves least on parts left out, but what was named, with all else as declared, where
-    it leaves no more than models of measured cells err by; and why what was named is not what is written.
+    """Which of the fits leaves least on parts left out, or what was named, with all else as declared, where it leaves
+    no more than models of measured cells err by; and why what was named is not what is written.
 
     It has to run over the declared range and to be worth it, see `LeftOut.may_replace`; else it is the declared model.
+    tried : with own parameters alone, and what was named: an effect that nothing speaks for enough is not written.
     """
     as_it_is = Option(ModelState(declared), left_out_errors(declared, blocks, None))
     options = [_option(blocks, as_it_is, problem, fit, fit is named) for problem, fit in dict.fromkeys(tried)]
@@ -72,7 +73,5 @@ def _refusal(named: Option) -> str:
 def _instead(taken: Option, declared: Option) -> str:
     if taken.fit is None:
         return "the declared model stays"
-    added = " + ".join(taken.fit.hypothesis)
-    model = f"the recalibrated model with {added}" if added else "the recalibrated model"
     left_mv, before_mv = 1e3 * taken.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
-    return f"written is {model}, which leaves {left_mv:.1f} mV there, the declared one {before_mv:.1f}"
+    return f"written is the recalibrated model, which leaves {left_mv:.1f} mV there, the declared one {before_mv:.1f}"

@@ -34,16 +34,12 @@ def promising(parent: Parent, slopes: Mapping[str, Array]) -> list[str]:
 
 
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
-    """Not what infers a quantity that every record holds, nor what every hypothesis may move anyway, nor what a file
-    has right that was fitted to this very cell."""
+    """Not what infers a quantity that every record holds, nor what a file has right that was fitted to this very
+    cell."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
-    if problem.trust == "measured":
-        return not effect.of_design
-    if problem.trust != "loose":
-        return True
-    return not all(p.spread is not None and p.spread.loose is not None for p in effect.parameters.values())
+    return not (problem.trust == "measured" and effect.of_design)
 
 
 def side_by_side(wanted: Sequence[tuple[Parent, str]], archive: Archive) -> Iterable[Grown | None]:
