@@ -42,7 +42,7 @@ class Blocks:
     @property
     def rows(self) -> list[slice]:
         """Rows of each block."""
-        return [slice(int(a), int(b)) for a, b in pairwise(self.starts)]
+        return _slices(self.starts)
 
     @cached_property
     def of_row(self) -> IntArray:
@@ -64,7 +64,7 @@ def blocks_of(problem: InverseProblem) -> Blocks:
         starts += edges.tolist()
         record += [i] * pieces
     bounds = np.array([*starts, total])
-    rows_of = [slice(int(a), int(b)) for a, b in pairwise(bounds)]
+    rows_of = _slices(bounds)
     current = np.concatenate([m.current_a for m in problem.seen])
     rate = np.array([np.sqrt(np.mean(current[r] ** 2)) for r in rows_of])
     charge = np.array([np.mean(problem.declared_soc[r]) for r in rows_of])
@@ -77,6 +77,10 @@ def blocks_of(problem: InverseProblem) -> Blocks:
         folds[name] = _ranges(size)
     folds["end"] = (tuple(b for b in range(len(record)) if b >= round(SEEN_SHARE * len(record))),)
     return Blocks(bounds, np.array(record), folds)
+
+
+def _slices(bounds: IntArray) -> list[slice]:
+    return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
 
 
 def _ranges(size: Array) -> tuple[tuple[int, ...], ...]:

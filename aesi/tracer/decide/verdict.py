@@ -171,8 +171,7 @@ def look_alikes(
                 continue
             nats, deviation = lag(anchor, other)
             close = nats < max(thresholds.alike_nats, thresholds.alike_sds * deviation)
-            left_v = [unexplained_v(path.problem, path.blocks, one, allowed_v) for one in (other, anchor)]
-            if close and left_v[0] <= 1.2 * max(allowed_v, left_v[1]):
+            if close and _as_adequate(path, other, anchor, allowed_v):
                 alike.append((nats, added))
             else:
                 margin = min(margin, nats / max(deviation, thresholds.alike_nats))
@@ -180,6 +179,12 @@ def look_alikes(
         if alike:
             groups.append((name, *(other for _, other in alike[: GROUP_SIZE - 1])))
     return tuple(groups), float(min(margin, _weakest_sds(path, tried), MOST_SDS))
+
+
+def _as_adequate(path: Path, other: Explanation, anchor: Explanation, allowed_v: float) -> bool:
+    """Does a rival leave about as little of what it could tell as what it is held against?"""
+    left_v = [unexplained_v(path.problem, path.blocks, one, allowed_v) for one in (other, anchor)]
+    return left_v[0] <= 1.2 * max(allowed_v, left_v[1])
 
 
 def _weakest_sds(path: Path, tried: Mapping[frozenset[str], Explanation]) -> float:

@@ -64,9 +64,8 @@ def block_sums(blocks: Blocks, table: Array, log_det: Array) -> BlockSums:
     m = table.shape[1]
     count = len(blocks)
     products = np.empty((count, m, m))
-    for k in range(count):
-        part = table[blocks.starts[k] : blocks.starts[k + 1]]
-        products[k] = part.T @ part
+    for k, rows in enumerate(blocks.rows):
+        products[k] = table[rows].T @ table[rows]
     return BlockSums(
         products[:, 0, 0],
         products[:, 1:, 0],
