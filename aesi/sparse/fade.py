@@ -17,10 +17,9 @@ It is for models whose terms are free of the error: in one that feeds back, an a
 SE, that one, is the rule of one standard error. Over the development splits of the NMC drive in `aesi bench splits`
 (16 candidates; per cent taken off the declared model's squared error, mean; off the recalibrated one's, mean and worst;
 each half of a drive counted as a drive in these): 65.5; 24.4, -7.0 with it, 64.4; 21.9, -10.4 with half of it, 63.2;
-19.2, -14.1 with none. DOUBT: 65.1; 23.4, -8.5 with
-0.003 and 65.5; 24.3, -6.5 with 0.1. KAPPA, which was 0 in all of these: 65.3; 23.4, -2.3 with 0.1, 61.3; 12.1, 1.3 with
-1: it is what keeps a correction from harm, and takes from it where it helps. With drives
-in place of their halves and t in place of 1, beside KAPPA: 63.9; 23.6, -1.4 instead of 64.0; 24.1, -2.4.
+19.2, -14.1 with none. DOUBT: 65.1; 23.4, -8.5 with 0.003 and 65.5; 24.3, -6.5 with 0.1. KAPPA, which was 0 in all of
+these: 65.3; 23.4, -2.3 with 0.1, 61.3; 12.1, 1.3 with 1: it is what keeps a correction from harm, and takes from it
+where it helps. With drives in place of their halves, and t in place of 1: 63.9; 23.6, -1.4 instead of 64.0; 24.1, -2.4.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from typing import overload
 import numpy as np
 
 from aesi.conformal import COMPARED, Calibrated, FreeRunBands, Method, RefittedForest, RefittedIntervals
+from aesi.conformal.horizon_band import MIN_PIECES
 from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
@@ -88,11 +89,11 @@ def _bands(
     pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
 ) -> FreeRunBands:
     train, alpha = problem.split.train, config.conformal.alpha
-    bands = OutOfSampleErrors.of(pairs, train, config.conformal.horizons_s).bands(alpha)
-    if not drives:
+    bands = OutOfSampleErrors.of(pairs, train, config.conformal.horizons_s).bands(alpha, len(pairs))
+    if len(drives) < MIN_PIECES:
         return bands
     try:
-        return bands.no_narrower_than(OutOfSampleErrors.of(drives, train, ()).bands(alpha))
+        return bands.no_narrower_than(OutOfSampleErrors.of(drives, train, ()).bands(alpha, len(pairs)))
     except FitError:  # drives too short to be told apart
         return bands
 
