@@ -48,20 +48,18 @@ def carries_best(options: Sequence[Option]) -> Option | None:
 def written(
     declared: Option, recalibrated: Sequence[Option], named: Option | None
 ) -> tuple[ModelState, str | None]:
-    """Which model carries best, or what was named where that does as well; and why what was named is not what is
-    written.
+    """Which model carries best, or what was named, or the declared one, where that does as well; and why what was named
+    is not what is written.
 
     It may do harm in no range of charge, and has to run over the declared range.  recalibrated : with own parameters
     alone; an effect that nothing speaks for enough is not written.
     """
     own = [one for one in recalibrated if _fault(one, declared, (*ORDINARY_C, *FAST_C)) is None]
-    options = [declared, *own]
     fault = None if named is None else _fault(named, declared, ORDINARY_C)
-    if named is not None and fault is None:
-        options.append(named)
-        if worst_ratio(named, options) <= AS_GOOD:
-            return named.state, None
-    best = carries_best(options) or declared
+    preferred = [declared] if named is None or fault is not None else [named, declared]
+    options = [*preferred, *own]
+    as_good = [one for one in preferred if worst_ratio(one, options) <= AS_GOOD]
+    best = as_good[0] if as_good else carries_best(options) or declared
     if named is None or best is named:
         return best.state, None
     names = " + ".join(named.state.hypothesis)
