@@ -144,6 +144,7 @@ def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
     assert written(declared, [harmful], None)[0] is declared.state
     assert written(declared, [option(21.5, 9.0, 29.0)], None)[0] is declared.state  # as good
     assert written(declared, [harmful, may_err], None)[0] is may_err.state
+    assert written(declared, [chance], None)[0] is chance.state
     assert "worse than the declared model in a range of charge" in str(written(declared, [], harmful)[1])
 
 
