@@ -137,6 +137,7 @@ def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
         return Option(ModelState(path.problem), LeftOut((1e-3 * record_mv,), ranges))
 
     declared = option(22.0, 10.0, 30.0)
+    chance = option(18.0, 10.0, 36.0)  # by a fifth an RMS of some seven independent samples may be off
     harmful, may_err = (
         option(12.0, 17.0, 2.0),
         option(18.0, 16.0, 20.0),
