@@ -1,9 +1,9 @@
 """Levenberg-Marquardt inside a box, for residuals that cost a simulation each.
 
-Coordinates that sit on a bound and are pushed outwards are frozen for the step; steps are clipped to the box. Slopes by
-finite differences cost as many simulations as there are coordinates, a step one: after each step the slopes are brought
-up to date by what the step showed (Broyden, Math. Comp. 19 (1965) 577), as long as that brings the cost down, and only
-then taken anew. Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16.
+A step is the least of the damped quadratic model within the box. Slopes by finite differences cost as many simulations
+as there are coordinates, a step one: after each step the slopes are brought up to date by what the step showed
+(Broyden, Math. Comp. 19 (1965) 577), as long as that brings the cost down, and only then taken anew.
+Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def foreseen_cost(x: Array, residual: Array, slopes: Array, low: Array, high: Ar
     """Half a sum of squares after one step within the box, to first order."""
     here = _Place(x, residual, slopes)
     step = _step(here, low, high, 1e-3)
-    return here.cost if step is None else _half_square(residual + slopes @ step)
+    return _half_square(residual + slopes @ step)
 
 
 def _followed(
@@ -127,7 +127,7 @@ def _stepped(
     """
     for trial in range(TRIALS if fresh else UPDATED_TRIALS):
         step = _step(here, low, high, damping)
-        if step is None or not step.any():
+        if not step.any():
             return None, damping
         foreseen = here.residual + here.slopes @ step
         if here.cost - _half_square(foreseen) < tolerance and (trial or not fresh):
@@ -141,17 +141,31 @@ def _stepped(
     return None, damping
 
 
-def _step(here: _Place, low: Array, high: Array, damping: float) -> Array | None:
-    """(n,) a damped Gauss-Newton step, cut off at the box; None where every coordinate is on a bound and pushed on."""
+def _step(here: _Place, low: Array, high: Array, damping: float) -> Array:
+    """(n,) a damped Gauss-Newton step: the least of the damped quadratic model within the box."""
     gradient = here.slopes.T @ here.residual
-    free = ~(((here.x <= low) & (gradient > 0)) | ((here.x >= high) & (gradient < 0)))
-    if not free.any():
-        return None
-    normal = here.slopes[:, free].T @ here.slopes[:, free]
+    normal = here.slopes.T @ here.slopes
     lifted = normal + damping * np.diag(np.diag(normal) + 1e-12 * np.trace(normal) + 1e-300)
-    step = np.zeros(len(here.x))
-    step[free] = -np.linalg.lstsq(lifted, gradient[free], rcond=None)[0]
-    return np.asarray(np.clip(here.x + step, low, high) - here.x)
+    step = -np.linalg.lstsq(lifted, gradient, rcond=None)[0]
+    least, most = low - here.x, high - here.x
+    if ((step < least) | (step > most)).any():
+        step = _within(lifted, gradient, least, most)
+    return np.asarray(step)
+
+
+def _within(curvature: Array, gradient: Array, least: Array, most: Array) -> Array:
+    """(n,) s of the least s' curvature s / 2 + gradient' s, least <= s <= most.
+
+    A free step that is cut off at the box is another one: what was to make up for the part that is cut off stays in it,
+    so that it may lead uphill however strong the damping.
+    """
+    from scipy.optimize import lsq_linear
+
+    unit = np.sqrt(np.diag(curvature))
+    root = np.linalg.cholesky(curvature / np.outer(unit, unit)).T
+    target = -np.linalg.solve(root.T, gradient / unit)
+    found = lsq_linear(root, target, (least * unit, most * unit), method="bvls")
+    return np.clip(found.x / unit, least, most)
 
 
 def _half_square(residual: Array) -> float:

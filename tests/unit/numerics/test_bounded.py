@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from scipy.optimize import rosen
+from scipy.optimize import lsq_linear, rosen
 
 from aesi.numerics.bounded import descend
 
@@ -97,3 +97,16 @@ def test_where_slopes_were_taken_last_is_as_good_within_the_tolerance():
     assert found.converged
     assert found.cost <= there < found.cost + 1e-3
     assert not np.array_equal(found.x, found.known_x)
+
+
+def test_a_minimum_on_the_edge_is_reached_where_the_free_step_cut_off_leads_uphill():
+    # Two nearly collinear slopes: the free step is 10 along the one and -9 along the other, cut off at 0 the latter.
+    slopes = np.array([[1.0, 1.0], [0.0, 0.1], [0.1, 0.0]])
+    target = np.array([1.0, -0.9, 1.0])
+    model = Counted(lambda x: slopes @ x - target, lambda x: slopes)
+    box = np.zeros(2), np.full(2, 20.0)
+    found = descend(model, np.array([0.9, 0.1]), *box, 20, 1e-9)
+    expected = lsq_linear(slopes, target, box)
+    assert found.x == pytest.approx(expected.x, abs=1e-4)
+    assert found.cost == pytest.approx(expected.cost, abs=1e-6)
+    assert found.converged
