@@ -238,4 +238,3 @@ def _errors(cell: Cell, data: Measurement, soc0: float) -> tuple[Array, BoolArra
         cell, data.time_s, data.current_a, soc0, (), data.temperature_degc, "backward", on_depletion="clip"
     )
     return data.voltage_v - run.voltage_v, run.series["depleted"] > 0.0
-

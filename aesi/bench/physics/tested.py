@@ -59,7 +59,7 @@ TESTED = {
 
 
 def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
-    """State of health (1) of the cell of a set when a record of it was tested; None where no day or no share is known."""
+    """State of health (1) of the cell of a set on the day of a record; None where no day or no share is known."""
     days = TESTED.get(data, {})
     known = {name: share for name, share in cell.capacity_shares if name in days}
     if record not in days or not known:

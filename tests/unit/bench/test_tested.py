@@ -16,7 +16,9 @@ NCR = "panasonic_ncr18650pf"
 @pytest.fixture(scope="module")
 def cell() -> Cell:
     bare = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
-    return replace(bare, capacity_shares=(("25degC_hppc", 1.0), ("0degC_hppc", 0.97), ("n10degC_hppc", 0.952)))
+    return replace(
+        bare, capacity_shares=(("25degC_hppc", 1.0), ("0degC_hppc", 0.97), ("n10degC_hppc", 0.952))
+    )
 
 
 def test_a_record_of_the_calibration_has_its_own_share(cell):
