@@ -126,9 +126,7 @@ class Model:
 
     def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
         """The cell with shares of its active material and of its silicon left."""
-        n, p = with_silicon(cell.negative, self.edge, silicon), cell.positive
-        cell = replace(cell, negative=replace(n, c_max_mol_m3=n.c_max_mol_m3 * material))
-        return replace(cell, positive=replace(p, c_max_mol_m3=p.c_max_mol_m3 * material))
+        return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_soh(material)
 
     def run(self, index: int, cell: Cell, x: Array) -> Array:
         """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`)."""

@@ -6,11 +6,12 @@ keep rows that are dense after each step of the current and ever sparser with th
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import cast
 
 import numpy as np
 
-from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import Measurement
 
 STEP_C_RATE = 0.01
@@ -43,36 +44,75 @@ def _steady(data: Measurement, steps: BoolArray) -> bool:
     return uneven or float(np.mean(steps)) < STEADY_SHARE
 
 
+@dataclass(frozen=True)
+class Window:
+    """Centred averages over `factor` rows, one every `factor` rows; the first row stays as it is."""
+
+    factor: int
+
+    def averages(self, column: Array) -> Array:
+        """(m,) of a column (n,)."""
+        weights = np.ones(2 * self._half + 1)
+        weights[[0, -1]] = 0.5 if self.factor % 2 == 0 else 1.0
+        around = np.lib.stride_tricks.sliding_window_view(column, len(weights))[:: self.factor]
+        kept = self._centres(column) - self._half
+        return np.concatenate([column[:1], (around @ (weights / weights.sum()))[: len(kept)]])
+
+    def centres(self, column: Array) -> Array:
+        """(m,) the values at the middle of each."""
+        return np.concatenate([column[:1], column[self._centres(column)]])
+
+    @property
+    def _half(self) -> int:
+        return self.factor // 2
+
+    def _centres(self, column: Array) -> IntArray:
+        return np.arange(self._half, len(column) - self._half, self.factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Averaged(Measurement):
+    """A record whose rows are averages of those of a finer one.
+
+    finer : that.  window : what was averaged over.  rows : which of the averages these are.
+    """
+
+    finer: Measurement = field(kw_only=True)
+    window: Window = field(kw_only=True)
+    rows: IntArray = field(kw_only=True)
+
+    def take(self, rows: slice | Array) -> Averaged:
+        """The given rows, of the same finer record."""
+        return replace(cast(Averaged, super().take(rows)), rows=self.rows[rows])
+
+    def with_record(self, time_s: Array, current_a: Array) -> Averaged:
+        """The averages of another time and current of the finer record."""
+        time, current = self.window.centres(time_s), self.window.averages(current_a)
+        return replace(self, time_s=time[self.rows], current_a=current[self.rows])
+
+
 def averaged_over(data: Measurement, step_s: float) -> Measurement:
     """At most one sample in `step_s`: centred averages of current, voltage and temperature.
 
     Records sampled more slowly than 0.75 of `step_s` on average are returned as they are.
     """
-    t = data.time_s
-    typical = float(np.median(np.diff(t)))
-    factor = round(step_s / typical)
+    factor = round(step_s / float(np.median(np.diff(data.time_s))))
     if factor < 2:
         return data
-    half = factor // 2
-    centres = np.arange(half, len(t) - half, factor)
-    width = 2 * half + 1
-    weights = np.ones(width)
-    weights[[0, -1]] = 0.5 if factor % 2 == 0 else 1.0
-    weights /= weights.sum()
-
-    def averaged(column: Array) -> Array:
-        return np.convolve(column, weights, mode="valid")[centres - half]
-
-    temperature = None if data.temperature_degc is None else averaged(data.temperature_degc)
-    first = data.take(slice(0, 1))
-    return replace(
-        data,
-        time_s=np.concatenate([first.time_s, t[centres]]),
-        current_a=np.concatenate([first.current_a, averaged(data.current_a)]),
-        voltage_v=np.concatenate([first.voltage_v, averaged(data.voltage_v)]),
-        temperature_degc=None
-        if temperature is None or first.temperature_degc is None
-        else np.concatenate([first.temperature_degc, temperature]),
+    window = Window(factor)
+    time = window.centres(data.time_s)
+    return Averaged(
+        time,
+        window.averages(data.current_a),
+        window.averages(data.voltage_v),
+        None if data.temperature_degc is None else window.averages(data.temperature_degc),
+        data.name,
+        data.source,
+        data.notes,
+        data.hold,
+        finer=data,
+        window=window,
+        rows=np.arange(len(time)),
     )
 
 

@@ -42,6 +42,7 @@ def simulate_file(
     say_notes: SayNotes | None = None,
     model: ModelName | None = None,
     self_heating: bool = False,
+    soh: float | None = None,
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
@@ -51,12 +52,13 @@ def simulate_file(
     say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
     model : "espm" or "dfn"; None takes that of a saved model, else "espm".
     self_heating : the cell warms itself, by the thermal data of its file.
+    soh : share of the file's capacity that the cell had then; None takes all of it.
     Raises DataError where a measurement cannot be of this cell.
     """
     say = say_notes or _silent
     profile = read_current(current, reading)
     say(profile.notes)
-    declared = declared_model(cell)
+    declared = _aged(declared_model(cell), soh)
     active = (*declared.effects, *activated(effects, effect_files))
     if self_heating:
         active = warmed(declared.cell, active)
@@ -92,18 +94,19 @@ def predict_file(
     reading: Reading | None = None,
     say_notes: SayNotes | None = None,
     self_heating: bool = False,
+    soh: float | None = None,
 ) -> int:
     """Predict the voltage of the profile in `current`, write it with its band to `out`; the number of rows.
 
     measured : one step ahead from the file's voltage; otherwise a free run.  hold : None takes the saved model's.
-    say_notes : as in `simulate_file`.  Raises DataError where a measurement cannot be of this cell.
+    say_notes, soh : as in `simulate_file`.  Raises DataError where a measurement cannot be of this cell.
     """
     say = say_notes or _silent
     profile = read_current(current, reading)
     say(profile.notes)
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
-    saved = HybridModel.load(model)
+    saved = _aged(HybridModel.load(model), soh)
     hybrid = replace(saved, hold=hold or saved.hold)
     if self_heating:
         hybrid = replace(hybrid, effects=warmed(hybrid.cell, hybrid.effects))
@@ -194,6 +197,11 @@ def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measureme
         file.name.split(".")[0],
         hold=hold,
     )
+
+
+def _aged(model: HybridModel, soh: float | None) -> HybridModel:
+    """The model with its cell at a state of health; as it is without one."""
+    return model if soh is None else replace(model, cell=model.cell.with_soh(soh))
 
 
 def _start(model: HybridModel, record: Measurement, soc0: float | None) -> InitialState:

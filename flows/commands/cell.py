@@ -19,6 +19,7 @@ def simulate(
     current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, temperature_degc].")],
     out: Annotated[Path, typer.Option(help="CSV to write: time, current, voltage and states.")],
     soc0: options.Soc0 = None,
+    soh: options.Soh = None,
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
@@ -33,6 +34,7 @@ def simulate(
         current,
         out,
         soc0=soc0,
+        soh=soh,
         effects=[options.effect_values(text) for text in effect or []],
         effect_files=effect_file or [],
         hold=hold,
@@ -56,6 +58,7 @@ def predict(
         bool, typer.Option("--measured", help="Use the measured voltage: one step ahead, not free run.")
     ] = False,
     soc0: options.Soc0 = None,
+    soh: options.Soh = None,
     hold: options.HoldOption = None,
     self_heating: options.SelfHeating = False,
 ) -> None:
@@ -68,6 +71,7 @@ def predict(
         out,
         measured=measured,
         soc0=soc0,
+        soh=soh,
         hold=hold,
         reading=reading,
         say_notes=options.say_notes,

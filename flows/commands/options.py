@@ -33,6 +33,13 @@ Soc0 = Annotated[
     float | None,
     typer.Option("--soc0", callback=_share, help="State of charge at the first row, from 0 to 1."),
 ]
+Soh = Annotated[
+    float | None,
+    typer.Option(
+        "--soh",
+        help="State of health: share of the cell file's capacity that the cell had when this was measured.",
+    ),
+]
 Effects = Annotated[
     list[str] | None, typer.Option("--effect", help="An effect to add: id or id:parameter=value,...")
 ]

@@ -2,8 +2,9 @@
 
 Each record is simulated whole, from the state of charge that `initial_state` finds: as the start file of its cell
 declares it (for a cell with published parameters: as published), with the cell file of this project that was calibrated
-on other records of it, with that file at the record's measured temperature, and the same with the capacity that the
-calibration found on the pulses of the same month (`aged`): a cell that was tested for five months is not the same cell.
+on other records of it, with that file at the record's measured temperature, and the same at the state of health that
+the calibration gives the cell for the day of the record (`aged`, see `aesi.bench.physics.tested`): a cell that was
+tested for five months is not the same cell.
 `windows` is ours under a protocol of others: windows of 1,024 rows, each from rest at a state of charge that is given.
 
 A model that runs out (a surface or the electrolyte, see `aesi.physics.depletion`) is held at its edge to the end of the
@@ -20,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
@@ -43,7 +45,6 @@ class MeasuredRecord:
     """A record: its set and file, whether its cell's file was fitted to it, and what others print on it.
 
     until_s : where it is read to.  others_mv, protocol : the best figure known, and how it was had.
-    same_month : a record of the calibration whose capacity the cell had then.
     """
 
     data: str
@@ -52,7 +53,6 @@ class MeasuredRecord:
     until_s: float | None = None
     others_mv: float | None = None
     protocol: str = ""
-    same_month: str | None = None
 
 
 FILES = {NCR: (START, NCR), HG2: (START, HG2), NMC: (None, None), M50T: (START, None)}
@@ -65,9 +65,9 @@ RECORDS = (
     MeasuredRecord(NCR, "25degC_la92", others_mv=19.4, protocol=ECM_UDE),
     MeasuredRecord(NCR, "25degC_hwfet", others_mv=73.4, protocol=ECM_UDE),
     *(MeasuredRecord(NCR, f"25degC_cycle_{k}") for k in (1, 2, 3)),
-    MeasuredRecord(NCR, "10degC_cycle_1", others_mv=43.5, protocol=f"UDDS; {ECM_UDE}", same_month="10degC_hppc"),
-    MeasuredRecord(NCR, "0degC_cycle_1", others_mv=71.0, protocol=f"UDDS; {ECM_UDE}", same_month="0degC_hppc"),
-    MeasuredRecord(NCR, "n10degC_cycle_1", others_mv=127.4, protocol=f"UDDS; {ECM_UDE}", same_month="n10degC_hppc"),
+    MeasuredRecord(NCR, "10degC_cycle_1", others_mv=43.5, protocol=f"UDDS; {ECM_UDE}"),
+    MeasuredRecord(NCR, "0degC_cycle_1", others_mv=71.0, protocol=f"UDDS; {ECM_UDE}"),
+    MeasuredRecord(NCR, "n10degC_cycle_1", others_mv=127.4, protocol=f"UDDS; {ECM_UDE}"),
     MeasuredRecord(NCR, "25degC_1c_start"),
     *(MeasuredRecord(NCR, f"{name}", fitted=True)
         for name in ("25degC_c20_ocv", "25degC_hppc", "10degC_hppc", "0degC_hppc")),
@@ -176,10 +176,10 @@ def _figures(cells: Path, record: MeasuredRecord) -> dict[str, Any]:
         runs["calibrated"] = free_run(best_cell, bare)
         if measured is not None:
             runs["with_temperature"] = free_run(best_cell, data)
-        share = dict(best_cell.capacity_shares).get(record.same_month or "")
-        if share is not None:
-            out["capacity_share"] = round(share, 3)
-            runs["aged"] = free_run(aged(best_cell, share), data)
+        soh = soh_on_its_day(best_cell, record.data, record.name)
+        if soh is not None:
+            out["soh"] = round(soh, 3)
+            runs["aged"] = free_run(best_cell.with_soh(soh), data)
     if "windows" in record.protocol:
         out["windows_mv"] = windows_mv(best_cell, data)
     out |= {f"{name}_mv": run.rmse_mv for name, run in runs.items()}
@@ -238,10 +238,3 @@ def _errors(cell: Cell, data: Measurement, soc0: float) -> tuple[Array, BoolArra
         cell, data.time_s, data.current_a, soc0, (), data.temperature_degc, "backward", on_depletion="clip"
     )
     return data.voltage_v - run.voltage_v, run.series["depleted"] > 0.0
-
-
-def aged(cell: Cell, share: float) -> Cell:
-    """The cell with a share of its capacity, all else the same."""
-    n, p = cell.negative, cell.positive
-    cell = cell.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share)
-    return cell.with_positive(c_max_mol_m3=p.c_max_mol_m3 * share)

@@ -95,6 +95,10 @@ class Electrolyte:
     diffusivity_ea_j_mol: float = 0.0
 
 
+MOST_SOH = 1.5
+"""A file may be of an aged cell; beyond this it is of another."""
+
+
 @dataclass(frozen=True)
 class CellParameters:
     """Everything a simulation needs to know about a cell; `aesi.Cell` adds how it is read and written.
@@ -186,6 +190,22 @@ class CellParameters:
     def with_electrolyte(self, **changes: Any) -> Self:
         """A copy with fields of the electrolyte replaced."""
         return replace(self, electrolyte=replace(self.electrolyte, **changes))
+
+    def with_soh(self, soh: float) -> Self:
+        """The cell at a state of health: this share of its capacity left.
+
+        Both electrodes lost active material alike, full of its lithium: the stoichiometries of full and empty stay.
+        Raises CellError for a share that is not in (0, `MOST_SOH`].
+        """
+        if not 0.0 < soh <= MOST_SOH:
+            raise CellError(
+                f"a state of health of {soh:g}: it is the share of the cell file's capacity that the cell had, above 0 "
+                f"and at most {MOST_SOH:g}; 97 % is 0.97."
+            )
+        n, p = self.negative, self.positive
+        return self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * soh).with_positive(
+            c_max_mol_m3=p.c_max_mol_m3 * soh
+        )
 
 
 def require_positive(what: str, **values: float) -> None:

@@ -18,9 +18,9 @@ PARAMETERS = {
     "shift_k": Parameter(
         -10.0,
         "K",
-        bounds=(-40.0, 40.0),
+        bounds=(-65.0, 60.0),
         neutral=0.0,
-        source="a climatic chamber from -15 to 65 degC against 25 degC",
+        source="-40 to 85 degC, what ISO 16750-4 asks of parts in a vehicle, against 25 degC",
         description="true minus declared temperature",
     )
 }

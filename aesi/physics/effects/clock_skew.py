@@ -3,7 +3,7 @@
     t_true = t_first + (t_logged - t_first) / (1 + skew),   V_read(t) = V_true(t - lag)
 
 Leaves out jitter of single stamps. Holds for a lag that is short against the record; before the first sample
-the voltage is taken as constant.
+the current is taken as constant.
 
 Source: definition; range from quartz oscillators (100 ppm) to two unsynchronised loggers.
 """
@@ -12,9 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.numerics.typing import Array
 from aesi.parameters import Parameter, Spread
-from aesi.physics.effect import Effect, Record, Trace
+from aesi.physics.effect import Effect, Record
 
 PARAMETERS = {
     "skew": Parameter(
@@ -39,17 +38,13 @@ PARAMETERS = {
 }
 
 
-def true_time(record: Record, *, skew: float, lag_s: float) -> Record:
-    """The record on the cell's own clock; the lag acts on the reading alone."""
+def true_record(record: Record, *, skew: float, lag_s: float) -> Record:
+    """The record on the cell's own clock, the current as much later as the voltage is read: the same reading."""
     first = record.time_s[0]
-    return replace(record, time_s=first + (record.time_s - first) / (1.0 + skew))
-
-
-def delayed(trace: Trace, *, skew: float, lag_s: float) -> Array:
-    """(n,) V, the voltage of `lag_s` earlier."""
+    time = first + (record.time_s - first) / (1.0 + skew)
     if lag_s == 0.0:
-        return trace.voltage_v
-    return np.interp(trace.time_s - lag_s, trace.time_s, trace.voltage_v)
+        return replace(record, time_s=time)
+    return replace(record, time_s=time, current_a=np.interp(time - lag_s, time, record.current_a))
 
 
-EFFECT = Effect("clock_skew", "instrument", __doc__, PARAMETERS, on_record=true_time, on_reading=delayed)
+EFFECT = Effect("clock_skew", "instrument", __doc__, PARAMETERS, on_record=true_record)

@@ -25,6 +25,7 @@ from aesi.tracer.case.free_parameter import (
     own,
     state_of_charge,
 )
+from aesi.tracer.case.instruments import instruments_undone
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.case.stepping import FEWER_POINTS, stepping
 
@@ -136,7 +137,8 @@ class InverseProblem:
     ) -> Run:
         """One simulation, at the measured temperature where there is one; stoichiometries that run out are clipped, so
         that a search is not stopped by them."""
-        needed = [a for a in effects if a.effect.infers is None or data.temperature_degc is None]
+        needed = tuple(a for a in effects if a.effect.infers is None or data.temperature_degc is None)
+        data, needed = instruments_undone(data, needed)
         spared = (FEWER_POINTS,) if self.model == "dfn" else ()
         return simulate(
             self.cell,

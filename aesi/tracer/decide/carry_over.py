@@ -12,57 +12,61 @@ from aesi.errors import AesiError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
-from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.blocks import RANGES, Blocks
+from aesi.tracer.case.problem import INDEPENDENT_CHARGE, InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.model_error import MEASURED_V, MOST_MEASURED_V
+from aesi.tracer.likelihood.model_error import MOST_MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.fitted import values_without
 
-AS_GOOD = 1.05
-"""Times the error of another model: what is less does as well. A convention."""
 ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)
 """Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
+BY_CHANCE = 1.0 + (2.0 / RANGES / INDEPENDENT_CHARGE) ** -0.5
+"""Times an error over one range of charge, by which it may be off as the errors of measured cells last: an RMS of N
+independent samples has a relative standard deviation of one over the root of 2 N."""
 STEP_S = 10.0
 """Between rows of a full discharge or charge."""
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What one model leaves on data left out.
+    """What one model leaves on data that it has not seen, V RMS; infinite where it could not be simulated.
 
-    rmse_v : (k,) V by part: each record left out in turn, by range of charge; infinite where it could not be simulated.
-    pooled_v : V, root mean square over the records.
+    by_record : (k,) each record where the others put the model.  by_range : (p,) those in turn, by range of charge.
     """
 
-    rmse_v: tuple[float, ...]
-    pooled_v: float
+    by_record: tuple[float, ...]
+    by_range: tuple[float, ...]
 
-    def may_replace(self, other: LeftOut) -> bool:
-        """Is the model better than another one on the whole, and on no part worse by more than models of measured cells
-        may err by?"""
-        allowed = [np.hypot(its, MOST_MEASURED_V) for its in other.rmse_v]
-        no_worse = all(own <= most for own, most in zip(self.rmse_v, allowed, strict=True))
-        return no_worse and AS_GOOD * self.pooled_v < other.pooled_v
+    @property
+    def pooled_v(self) -> float:
+        """Root mean square over the records, V."""
+        return float(np.sqrt(np.mean(np.square(self.by_record))))
 
-    def as_good_as(self, other: LeftOut) -> bool:
-        """Does the model leave no more than another one and what models of measured cells err by?"""
-        return self.pooled_v <= np.hypot(other.pooled_v, MEASURED_V)
+    def harms(self, other: LeftOut) -> bool:
+        """Is the model worse than another one in a range of charge, by more than models of measured cells err by and
+        by more than chance?"""
+        allowed = np.maximum(np.hypot(other.by_range, MOST_MEASURED_V), BY_CHANCE * np.array(other.by_range))
+        return bool(np.any(np.array(self.by_range) > allowed))
 
 
 def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None) -> LeftOut:
     """What a hypothesis leaves on each record where the others put it (of a single record: on its last third); None:
     the model as declared."""
     folds = blocks.folds["record" if len(problem.records) > 1 else "end"]
-    parts, pooled = [], []
+    charges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
+    by_record, by_range = [], []
     for k, fold in enumerate(folds):
         residual = _left_out_residual(problem, blocks, one, k, fold)
-        pooled.append(float(np.mean(residual**2)))
-        ranges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
         out = np.isin(blocks.of_row, fold)
-        parts += [float(np.sqrt(np.mean(residual[r[out]] ** 2))) for r in ranges if r[out].any()]
-    return LeftOut(tuple(parts), float(np.sqrt(np.mean(pooled))))
+        by_record.append(_rms(residual))
+        by_range += [_rms(residual[charge[out]]) for charge in charges if charge[out].any()]
+    return LeftOut(tuple(by_record), tuple(by_range))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _left_out_residual(

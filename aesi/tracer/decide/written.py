@@ -5,49 +5,65 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_state import ModelState
 
-NO_BETTER = "on data left out it is no better than the declared model, or worse in a range of charge"
+AS_GOOD = 1.05
+"""Times the error of another model: what is less does as well. A convention."""
+HARM = "on data left out it is worse than the declared model in a range of charge"
+LESS_ELSEWHERE = "another model leaves less on records left out"
 
 
 @dataclass(frozen=True, eq=False)
 class Option:
-    """A model that may be written: what it leaves on parts left out, the fit that it is from (None: the declared one),
-    and why it cannot be simulated over the declared range, None where it can."""
+    """A model that may be written, and what it leaves on records that it has not seen."""
 
     state: ModelState
     left_out: LeftOut
-    fit: FittedHypothesis | None = None
-    fault: str | None = None
+
+    @classmethod
+    def of(cls, problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis | None) -> Option:
+        """A fit, None for the declared model."""
+        state = ModelState(problem) if fit is None else ModelState.of(problem, fit)
+        return cls(state, left_out_errors(problem, blocks, fit))
+
+
+def worst_ratio(one: Option, options: Sequence[Option]) -> float:
+    """How many times what the best of the others leaves a model leaves, on the record left out where that is most."""
+    least = np.min([other.left_out.by_record for other in options], axis=0)
+    return float(np.max(np.array(one.left_out.by_record) / least))
+
+
+def carries_best(options: Sequence[Option]) -> Option | None:
+    """The model that is never far worse than another one on a record left out: of the least worst ratio, the first
+    where several are as good. A mean over the records would let one gain much and another lose it."""
+    return min(options, key=lambda one: worst_ratio(one, options), default=None)
 
 
 def written(
-    declared: InverseProblem,
-    blocks: Blocks,
-    tried: Sequence[tuple[InverseProblem, FittedHypothesis]],
-    named: FittedHypothesis | None,
+    declared: Option, recalibrated: Sequence[Option], named: Option | None
 ) -> tuple[ModelState, str | None]:
-    """Which of the fits leaves least on parts left out, or what was named, with all else as declared, where it leaves
-    no more than models of measured cells err by; and why what was named is not what is written.
+    """Which model carries best, or what was named, or the declared one, where that does as well; and why what was named
+    is not what is written.
 
-    It has to run over the declared range and to be worth it, see `LeftOut.may_replace`; else it is the declared model.
-    tried : with own parameters alone, and what was named: an effect that nothing speaks for enough is not written.
+    It may do harm in no range of charge, and has to run over the declared range.  recalibrated : with own parameters
+    alone; an effect that nothing speaks for enough is not written.
     """
-    as_it_is = Option(ModelState(declared), left_out_errors(declared, blocks, None))
-    options = [_option(blocks, as_it_is, problem, fit, fit is named) for problem, fit in dict.fromkeys(tried)]
-    best = min(
-        [as_it_is, *(one for one in options if one.fault is None)], key=lambda one: one.left_out.pooled_v
-    )
-    wanted = next((one for one in options if one.fit is named), None)
-    if wanted is None:
+    own = [one for one in recalibrated if _fault(one, declared, (*ORDINARY_C, *FAST_C)) is None]
+    fault = None if named is None else _fault(named, declared, ORDINARY_C)
+    preferred = [declared] if named is None or fault is not None else [named, declared]
+    options = [*preferred, *own]
+    as_good = [one for one in preferred if worst_ratio(one, options) <= AS_GOOD]
+    best = as_good[0] if as_good else carries_best(options) or declared
+    if named is None or best is named:
         return best.state, None
-    if wanted.fault is None and wanted.left_out.as_good_as(best.left_out):
-        return wanted.state, None
-    return best.state, f"{_refusal(wanted)}; {_instead(best, as_it_is)}"
+    names = " + ".join(named.state.hypothesis)
+    return best.state, f"{names}: {fault or LESS_ELSEWHERE}; {_instead(best, declared)}"
 
 
 def limits_of(state: ModelState) -> tuple[str, ...]:
@@ -56,22 +72,12 @@ def limits_of(state: ModelState) -> tuple[str, ...]:
     return () if fast is None else (f"with what was found, {fast}; the declared model does not.",)
 
 
-def _option(
-    blocks: Blocks, declared: Option, problem: InverseProblem, fit: FittedHypothesis, named: bool
-) -> Option:
-    state, left_out = ModelState.of(problem, fit), left_out_errors(problem, blocks, fit)
-    if not left_out.may_replace(declared.left_out):
-        return Option(state, left_out, fit, NO_BETTER)
-    return Option(state, left_out, fit, range_fault(state, ORDINARY_C if named else (*ORDINARY_C, *FAST_C)))
-
-
-def _refusal(named: Option) -> str:
-    names = " + ".join(named.state.hypothesis)
-    return f"{names}: {named.fault or 'another model leaves far less on parts of the data left out'}"
+def _fault(one: Option, declared: Option, rates_c: Sequence[float]) -> str | None:
+    return HARM if one.left_out.harms(declared.left_out) else range_fault(one.state, rates_c)
 
 
 def _instead(taken: Option, declared: Option) -> str:
-    if taken.fit is None:
+    if taken is declared:
         return "the declared model stays"
     left_mv, before_mv = 1e3 * taken.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
     return f"written is the recalibrated model, which leaves {left_mv:.1f} mV there, the declared one {before_mv:.1f}"

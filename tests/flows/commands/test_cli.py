@@ -105,6 +105,18 @@ def test_an_effect_of_the_catalogue_can_be_added(call, cell, current, tmp_path):
     assert np.allclose(a["voltage_v"] - b["voltage_v"], 1e-3 * a["current_a"], atol=1e-6)
 
 
+def test_a_state_of_health_makes_the_same_charge_a_larger_share(call, cell, current, tmp_path):
+    arguments = ("simulate", "--cell", cell, "--current", current, "--soc0", 0.6, "--out")
+    call(*arguments, tmp_path / "a.csv")
+    code, _, err = call(*arguments, tmp_path / "b.csv", "--soh", 0.8)
+    assert code == 0, err
+    a, b = (pd.read_csv(tmp_path / name)["soc"].to_numpy() for name in ("a.csv", "b.csv"))
+    assert np.allclose(0.8 * (b - b[0]), a - a[0], atol=1e-6)
+    code, _, err = call(*arguments, tmp_path / "c.csv", "--soh", 80)
+    assert code == 2
+    assert "a state of health of 80" in err
+
+
 def test_without_a_voltage_the_start_has_to_be_given(call, cell, current, tmp_path):
     code, _, err = call("simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o.csv")
     assert code == 2

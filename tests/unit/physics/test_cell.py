@@ -187,3 +187,17 @@ def test_a_rest_voltage_out_of_range_says_which_range(lg_m50):
 @pytest.mark.parametrize("path", sorted(CELLS.glob("*.bpx.json")), ids=lambda path: path.name)
 def test_the_standards_own_reader_takes_each_shipped_file(path):
     assert bpx.parse_bpx_obj(json.loads(path.read_text(encoding="utf-8"))) is not None
+
+
+def test_a_state_of_health_takes_capacity_and_leaves_the_rest_voltages(lg_m50):
+    aged = lg_m50.with_soh(0.9)
+    assert aged.capacity_ah == pytest.approx(0.9 * lg_m50.capacity_ah)
+    soc = np.linspace(0.0, 1.0, 5)
+    assert np.array_equal(aged.rest_voltage_v(soc), lg_m50.rest_voltage_v(soc))
+    assert lg_m50.with_soh(1.0) == lg_m50
+
+
+@pytest.mark.parametrize("soh", [0.0, -0.1, 97.0, float("nan")])
+def test_a_state_of_health_that_is_no_share_is_refused(lg_m50, soh):
+    with pytest.raises(CellError, match="share of the cell file"):
+        lg_m50.with_soh(soh)

@@ -11,6 +11,7 @@ from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
 from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v, unexplained_v
+from aesi.tracer.decide.written import Option, carries_best, worst_ratio, written
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
@@ -111,14 +112,39 @@ def test_a_hypothesis_is_put_where_the_data_without_a_part_put_it(path):
     assert seen_all["ocv_hysteresis"] == pytest.approx(path.chosen.values["ocv_hysteresis"], rel=0.02)
 
 
-def test_a_model_is_replaced_by_one_that_is_worse_nowhere_and_better_on_the_whole():
-    declared = LeftOut((10e-3, 30e-3), 22e-3)
-    assert LeftOut((16e-3, 20e-3), 18e-3).may_replace(declared)  # by less than such models may err
-    assert not LeftOut((17e-3, 2e-3), 12e-3).may_replace(declared)  # worse on one part
-    assert not LeftOut((10e-3, 29e-3), 21.5e-3).may_replace(declared)  # as good
-    assert not LeftOut((1e-3, np.inf), np.inf).may_replace(declared)
-    assert LeftOut((14e-3, 14e-3), 14e-3).as_good_as(LeftOut((11e-3, 11e-3), 11e-3))
-    assert not LeftOut((14e-3, 14e-3), 14e-3).as_good_as(LeftOut((8e-3, 8e-3), 8e-3))
+def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_out(path):
+    def option(*left_mv):
+        left_v = tuple(1e-3 * v for v in left_mv)
+        return Option(ModelState(path.problem), LeftOut(left_v, left_v))
+
+    cold = option(8.0, 32.0)  # gains in the cold, as much as it loses at the temperature of the first record
+    declared, both = option(5.0, 41.0), option(5.5, 38.0)
+    assert cold.left_out.pooled_v < both.left_out.pooled_v < declared.left_out.pooled_v
+    assert worst_ratio(cold, [cold, declared, both]) == pytest.approx(1.6)
+    assert carries_best([declared, cold, both]) is both
+    assert carries_best([declared, option(1.0, np.inf)]) is declared
+    assert written(declared, [cold, both], None)[0] is both.state
+    state, why = written(declared, [both], cold)
+    assert state is both.state
+    assert "another model leaves less on records left out" in str(why)
+    named = option(5.2, 38.5)  # within 5 % of the best on either
+    assert written(declared, [option(5.4, 38.0)], named) == (named.state, None)
+
+
+def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
+    def option(record_mv, *range_mv):
+        ranges = tuple(1e-3 * v for v in range_mv)
+        return Option(ModelState(path.problem), LeftOut((1e-3 * record_mv,), ranges))
+
+    declared = option(22.0, 10.0, 30.0)
+    chance = option(18.0, 10.0, 36.0)  # by a fifth an RMS of some seven independent samples may be off
+    harmful = option(12.0, 17.0, 2.0)
+    may_err = option(18.0, 16.0, 20.0)  # models of measured cells err by 13 mV at most
+    assert written(declared, [harmful], None)[0] is declared.state
+    assert written(declared, [option(21.5, 9.0, 29.0)], None)[0] is declared.state  # as good
+    assert written(declared, [harmful, may_err], None)[0] is may_err.state
+    assert written(declared, [chance], None)[0] is chance.state
+    assert "worse than the declared model in a range of charge" in str(written(declared, [], harmful)[1])
 
 
 def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refused(path):

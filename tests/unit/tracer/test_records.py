@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from aesi.data.thinning import averaged_over
+from aesi.physics import simulate
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
 from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test
+from aesi.tracer.discovery import inverse_problem
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):
@@ -25,6 +27,24 @@ def test_thinning_keeps_charge_and_the_first_row(cell, rng):
     whole = np.trapezoid(current, time)
     # windows are centred: the ends differ by half a second of a current that wanders by a tenth an instant
     assert np.trapezoid(thin.current_a, thin.time_s) == pytest.approx(whole, rel=5e-3)
+
+
+def test_a_lag_of_half_a_second_is_seen_in_rows_of_a_second(cell, rng):
+    time = np.arange(0.0, 600.0, 0.1)
+    current = np.interp(time, np.arange(0.0, 601.0, 2.0), np.append(0.0, rng.normal(0.0, 10.0, 300)))
+    true = simulate(cell, time, current, soc0=0.8).voltage_v
+    late = Measurement(time, current, np.interp(time - 0.54, time, true), name="late")
+    problem = inverse_problem(cell, [late], soc0=0.8)
+    assert len(problem.measured) < len(time) / 10
+
+    def left_v(lag_s):
+        predicted = problem.predict({"soc0": {"0": 0.8}, "clock_skew": {"skew": 0.0, "lag_s": lag_s}})
+        return float(np.sqrt(np.mean((problem.measured - predicted) ** 2)))
+
+    assert left_v(0.54) < 0.25 * min(left_v(0.44), left_v(0.64))
+    bare = problem.predict({"soc0": {"0": 0.8}})
+    still = problem.predict({"soc0": {"0": 0.8}, "clock_skew": {"skew": 0.0, "lag_s": 0.0}})
+    assert np.array_equal(still, bare)
 
 
 def pulses(amplitude_a):

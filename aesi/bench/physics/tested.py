@@ -1,0 +1,73 @@
+"""When measured records were tested, and the state of health that a calibration gives their cell for that day.
+
+A cell that is tested for weeks ages on the way, so that a record is of the capacity of its day and not of the file's.
+The records of a calibration each have a share of the file's capacity (`Cell.capacity_shares`); between two of them it
+is taken to fall evenly with the days, before the first and after the last to stay,
+
+    soh(t) = soh_k + (soh_{k+1} - soh_k) (t - t_k)/(t_{k+1} - t_k)                                             (1)
+
+Leaves out that cells age by use more than by days, and whatever a record itself would say of its cell's capacity.
+Dates of the Panasonic NCR18650PF are those in the names of its published files, of the LG 18650HG2 the first time stamp
+of its published files; of 25degC_la92, mixed1 to mixed3, 40degC_la92 and 0degC_mixed1 the day of the tests of the same
+series beside them. They belong to the data, as temperatures do, and nothing was fitted to choose them.
+"""
+
+from __future__ import annotations
+
+from datetime import date
+
+import numpy as np
+
+from aesi.physics import Cell
+
+TESTED = {
+    "panasonic_ncr18650pf": {
+        "25degC_1c_start": "2017-03-09",
+        "25degC_hppc": "2017-03-11",
+        "25degC_cycle_1": "2017-03-18",
+        "25degC_cycle_2": "2017-03-19",
+        "25degC_cycle_3": "2017-03-19",
+        "25degC_us06": "2017-03-20",
+        "25degC_hwfet": "2017-03-20",
+        "25degC_la92": "2017-03-21",
+        "10degC_hppc": "2017-03-27",
+        "10degC_cycle_1": "2017-03-28",
+        "25degC_c20_ocv": "2017-05-08",
+        "0degC_hppc": "2017-05-20",
+        "0degC_cycle_1": "2017-05-30",
+        "n10degC_hppc": "2017-06-07",
+        "n10degC_cycle_1": "2017-06-10",
+    },
+    "lg_18650hg2": {
+        "25degC_c20_ocv": "2018-10-26",
+        "25degC_cap_1c": "2018-10-28",
+        "25degC_la92": "2018-10-29",
+        "25degC_us06": "2018-10-29",
+        "25degC_mixed1": "2018-10-29",
+        "25degC_mixed2": "2018-10-29",
+        "25degC_cap_1c_b": "2018-10-30",
+        "25degC_mixed3": "2018-10-30",
+        "40degC_c20_ocv": "2018-11-03",
+        "40degC_la92": "2018-11-06",
+        "10degC_us06": "2018-11-13",
+        "0degC_c20_ocv": "2018-11-27",
+        "0degC_mixed1": "2018-11-30",
+        "n10degC_cap_1c": "2018-12-07",
+    },
+}
+"""Set -> record -> day."""
+
+
+def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
+    """State of health (1) of the cell of a set on the day of a record; None where no day or no share is known."""
+    days = TESTED.get(data, {})
+    known = {name: share for name, share in cell.capacity_shares if name in days}
+    if record not in days or not known:
+        return None
+    told = sorted((_ordinal(days[name]), share) for name, share in known.items())
+    at, shares = np.array(told).T
+    return float(np.interp(_ordinal(days[record]), at, shares))
+
+
+def _ordinal(day: str) -> int:
+    return date.fromisoformat(day).toordinal()

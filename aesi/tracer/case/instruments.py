@@ -1,0 +1,36 @@
+"""What instruments did to a record they did to its rows as measured, before those were averaged for fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+from aesi.data.thinning import Averaged
+from aesi.physics.effect import ActiveEffect, Effect, Record
+from aesi.records import Measurement
+
+
+def instruments_undone(
+    data: Measurement, effects: Sequence[ActiveEffect]
+) -> tuple[Measurement, tuple[ActiveEffect, ...]]:
+    """The record that the cell saw behind its instruments, and what the effects do beside that.
+
+    A lag of half a second cannot be told from rows of a second: a jump of the current is spread over them. Records that
+    were not averaged are returned as they are, with all effects.
+    """
+    acting = [a for a in effects if a.effect.kind == "instrument" and a.effect.on_record is not None]
+    if not acting or not isinstance(data, Averaged):
+        return data, tuple(effects)
+    record = Record(data.finer.time_s, data.finer.current_a)
+    for active in acting:
+        assert active.effect.on_record is not None
+        record = active.effect.on_record(record, **active.parameters)
+    rest = tuple(replace(a, effect=_elsewhere(a.effect)) if a in acting else a for a in effects)
+    return data.with_record(record.time_s, record.current_a), rest
+
+
+@lru_cache(maxsize=64)
+def _elsewhere(effect: Effect) -> Effect:
+    """The effect with all but what it does to the record."""
+    return replace(effect, on_record=None)
