@@ -113,11 +113,14 @@ def calibrated_band(
     inside: Sequence[BoolArray],
     alpha: float,
     dt_s: float,
+    stretches: int | None = None,
 ) -> HorizonBand:
     """One horizon (s) calibrated at miss rate `alpha`, records sampled every dt_s (s).
 
     errors : one (n_i,) array a record, V, NaN where there is no prediction.  columns : one (n_i, p), see
     `local_scale.covariates`.  inside : one (n_i,), True inside the trained range of the model that predicted.
+    stretches : how many stretches of the rows err independently over a whole drive; by default, and where they are too
+    few to be told apart, the pieces that they are cut into.
     Raises InputError where lengths differ, FitError for too few pieces or errors all zero.
     """
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
@@ -138,6 +141,9 @@ def calibrated_band(
     scales = [_scale([other for other in pieces if other is not piece], alpha) for piece in pieces]
     scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
     counts = np.array([float(score.size) for score in scores])
+    independent = float(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum())
+    if stretches is not None and stretches >= MIN_PIECES and horizon == WHOLE_DRIVE:
+        independent = stretches
     everywhere = np.quantile(np.concatenate(scores), 1 - alpha, method="higher")
     return HorizonBand(
         horizon,
@@ -145,7 +151,7 @@ def calibrated_band(
         tuple(scales),
         np.array([np.quantile(score, np.linspace(0, 1, N_LEVELS)) for score in scores]),
         counts,
-        _widening(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum(), alpha),
+        _widening(independent, alpha),
         tuple(float(np.mean(score <= everywhere)) for score in scores),
         extrapolated,
     )

@@ -1,7 +1,14 @@
 """Ensemble sparse learning of the voltage error: library, STRidge, ensembles, free run, search problem."""
 
 from aesi.sparse.model import SparseModel
-from aesi.sparse.search.evaluate import Candidate, FitnessWeights, OutOfFoldResiduals, evaluate, fitness
+from aesi.sparse.search.evaluate import (
+    ENSEMBLES,
+    Candidate,
+    FitnessWeights,
+    OutOfFoldResiduals,
+    evaluate,
+    fitness,
+)
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.problem import Options, Problem
 from aesi.sparse.stridge import STRidge
@@ -9,6 +16,7 @@ from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library, Term
 
 __all__ = [
+    "ENSEMBLES",
     "Candidate",
     "FitnessWeights",
     "Genome",

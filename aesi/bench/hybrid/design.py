@@ -23,7 +23,7 @@ from aesi.errors import FitError
 from aesi.numerics.metrics import mser
 from aesi.physics import Cell
 from aesi.records import ErrorModel, Split
-from aesi.sparse import FitnessWeights, Options, Problem, evaluate
+from aesi.sparse import ENSEMBLES, FitnessWeights, Options, Problem, evaluate
 from aesi.sparse.baselines.sindy_c import tuned_sindy_c
 from aesi.sparse.search.evolution import fittest
 from aesi.sparse.search.genome_space import GenomeSpace
@@ -84,7 +84,7 @@ def _reached(split: Split, options: Options, candidates: int, sindy: bool) -> di
         chosen = fittest(space, judge, candidates, POPULATION, rng)
     except FitError:
         return {}
-    models: list[ErrorModel] = [chosen.bagging, chosen.stability]
+    models: list[ErrorModel] = [*chosen.ensembles]
     if sindy:
         models.append(tuned_sindy_c(problem, options.seed, candidates, POPULATION, space))
     return {model.name: _reduction(model, split) for model in models}
@@ -98,7 +98,7 @@ def _reduction(model: ErrorModel, split: Split) -> float:
 
 def _summary(reached: Sequence[Mapping[str, float]]) -> dict[str, Any]:
     line: dict[str, Any] = {}
-    for name in ("AESI I", "AESI II", "SINDy-C"):
+    for name in (*ENSEMBLES, "SINDy-C"):
         values = np.array([cell[name] for cell in reached if name in cell])
         if not len(values):
             continue

@@ -53,9 +53,7 @@ def score(problem: Problem, config: ExperimentConfig, genome: Genome) -> ScoredC
 def _with_intervals(outcome: Candidate, problem: Problem, config: ExperimentConfig) -> ScoredCandidate:
     slim = replace(outcome, residuals=())
     try:
-        one, stable = (
-            _scores(problem, config, outcome, model) for model in (outcome.bagging, outcome.stability)
-        )
+        one, stable = (_scores(problem, config, outcome, model) for model in outcome.ensembles)
     except AesiError as error:
         return ScoredCandidate(slim, note=str(error))
     return ScoredCandidate(

@@ -40,9 +40,10 @@ NO_ROLES = "give `train` and `test` records, or one `record` with `repeats`"
 def model_names() -> tuple[str, ...]:
     """Every model that an experiment can compare: the physics, the two ensembles, the baselines."""
     from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
+    from aesi.sparse import ENSEMBLES
     from aesi.sparse.baselines import BASELINES
 
-    return (*PHYSICS_NAMES, "AESI I", "AESI II", *BASELINES)
+    return (*PHYSICS_NAMES, *ENSEMBLES, *BASELINES)
 
 
 class ExperimentConfig(Section):

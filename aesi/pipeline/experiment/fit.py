@@ -17,7 +17,7 @@ from aesi.pipeline.experiment.drives import cuts
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
-from aesi.sparse import Candidate, Options, Problem
+from aesi.sparse import ENSEMBLES, Candidate, Options, Problem
 from aesi.sparse.baselines import BASELINES, Judge, Tuning
 from aesi.sparse.yardsticks import Bare, Persistence
 
@@ -78,10 +78,9 @@ def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) 
 
 
 def _model(name: str, problem: Problem, chosen: Candidate, tuning: Tuning) -> tuple[ErrorModel, int]:
-    if name == "AESI I":
-        return chosen.bagging, len(chosen.bagging.terms)
-    if name == "AESI II":
-        return chosen.stability, len(chosen.stability.terms)
+    if name in ENSEMBLES:
+        ensemble = chosen.ensembles[ENSEMBLES.index(name)]
+        return ensemble, len(ensemble.terms)
     if name in PHYSICS_NAMES:
         return Bare(name), 0
     if name == "persistence":

@@ -73,9 +73,8 @@ class TrainingDrives:
 
         fitted : to all training rows."""
         pieces = self.pieces()
-        refitted = [self._refitted(fitted, *piece) for piece in pieces.parts]
-        seen = [self._left_out(physics, piece) for physics, piece in zip(refitted, pieces.parts, strict=True)]
-        slopes = np.array([slope_on(each) for each in seen])
+        refitted = [self._refitted(fitted, piece) for piece in pieces.parts]
+        slopes = np.array([self._slope(*each) for each in zip(refitted, pieces.parts, strict=True)])
         places = np.array([place for place, _ in pieces.parts])
         parted = [
             self._left_out(physics.carried(carried_over(np.delete(slopes, number))), piece)
@@ -83,7 +82,7 @@ class TrainingDrives:
         ]
         whole = [
             self._left_out(
-                self._refitted(fitted, *drive).carried(carried_over(slopes[places != drive[0]])), drive
+                self._refitted(fitted, drive).carried(carried_over(slopes[places != drive[0]])), drive
             )
             for drive in pieces.drives
         ]
@@ -110,9 +109,8 @@ class TrainingDrives:
         ]
         return LeftOutDrives(made[0], made[1] if len(train) > 1 else ())
 
-    def _refitted(self, fitted: PhysicsModels, place: int, part: slice) -> PhysicsModels:
-        name, rows = self.drives[place]
-        others = without(self.records, name, slice(rows.start + part.start, rows.start + part.stop))
+    def _refitted(self, fitted: PhysicsModels, piece: Piece) -> PhysicsModels:
+        others = without(self.records, *self._rows(piece))
         declared, cell = fitted.by_name[DECLARED], self.config.cell
         return physics_models(
             declared.cell,
@@ -123,6 +121,22 @@ class TrainingDrives:
             fitted,
             declared.model,
         )
+
+    def _slope(self, physics: PhysicsModels, piece: Piece) -> float:
+        """`slope_on` the piece; only the one record, under the two models that it takes, is simulated."""
+        name, rows = self._rows(piece)
+        record, hold = self.records[name], self.config.data.hold
+        declared_v, recalibrated_v = (
+            physics.by_name[model].simulate(record.measurement, record.soc0, hold).voltage_v[rows]
+            for model in (DECLARED, RECALIBRATED)
+        )
+        return slope_on(record.measurement.voltage_v[rows] - declared_v, recalibrated_v - declared_v)
+
+    def _rows(self, piece: Piece) -> TrainingDrive:
+        """The record that a piece is of, and its rows there."""
+        place, part = piece
+        name, rows = self.drives[place]
+        return name, slice(rows.start + part.start, rows.start + part.stop)
 
 
 def series_under(
@@ -140,11 +154,8 @@ def series_under(
     return series, empty
 
 
-def slope_on(left_out: HeldOutDrive) -> float:
-    """<e, c> / |c|**2 of (1); NaN where the recalibration changes nothing."""
-    part = left_out.series.take(left_out.rows)
-    error = part.left_by(DECLARED)
-    taken_off = error - part.left_by(RECALIBRATED)
+def slope_on(error: Array, taken_off: Array) -> float:
+    """<e, c> / |c|**2 of (1), both (n,) V; NaN where the recalibration changes nothing."""
     square = float(taken_off @ taken_off)
     return float(error @ taken_off) / square if square > 0.0 else float("nan")
 

@@ -21,12 +21,11 @@ from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import tables, write_figures, write_run_report
 from aesi.pipeline.report.figures import paper_figures
 from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
-from aesi.sparse import Candidate, Problem, SparseModel
+from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
-ENSEMBLES = ("AESI I", "AESI II")
 SHORT: Mapping[ModelName, str] = {"espm": DECLARED, "dfn": "DFN"}
 """How tables and figures call the physics."""
 

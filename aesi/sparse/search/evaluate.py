@@ -45,6 +45,10 @@ class OutOfFoldResiduals:
     stable_v: Array
 
 
+ENSEMBLES = ("AESI I", "AESI II")
+"""Names of the models of a candidate: by bagging, and by stability selection."""
+
+
 @dataclass(frozen=True, eq=False)
 class Candidate:
     """A genome, fitted and judged.
@@ -77,6 +81,11 @@ class Candidate:
     residuals: tuple[OutOfFoldResiduals, ...]
     fold_sums: Array
     valid_losses: tuple[float, float]
+
+    @property
+    def ensembles(self) -> tuple[SparseModel, SparseModel]:
+        """AESI I and AESI II, in the order of ENSEMBLES."""
+        return self.bagging, self.stability
 
     @property
     def better(self) -> SparseModel:
@@ -128,7 +137,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
             sparse_model(problem, active, coefficients, memory, name, ensemble), problem, runs.amplitudes[k]
         )
         for k, (name, coefficients) in enumerate(
-            (("AESI I", ensemble.bagging), ("AESI II", ensemble.stability))
+            zip(ENSEMBLES, (ensemble.bagging, ensemble.stability), strict=True)
         )
     )
     valid, valid_stable = on_validation(problem, runs, (bagging, stability))

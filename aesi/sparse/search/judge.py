@@ -132,7 +132,8 @@ def _without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
         given = problem.nearness[:, None] * given
         sums = _sums(problem, given)
         amplitudes = [
-            amplitude(problem.unseen_target, column, problem.folds, problem.row_weights) for column in given.T
+            amplitude(problem.unseen_target, column, problem.folds, problem.fold_drives, problem.row_weights)
+            for column in given.T
         ]
         given = given * amplitudes
     memory = memory_of(problem, [given[a:b, 0] for a, b in problem.folds])

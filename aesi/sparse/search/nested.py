@@ -39,7 +39,8 @@ def picked(
         return None
     weights = np.array([problem.row_weights[a] for a, _ in problem.folds])
     sums = [(weights[:, None] * c.fold_sums[ensemble])[folds] for c in known]
-    amplitudes = [shrunken(each) if problem.options.fade else 1.0 for each in sums]
+    drives = problem.fold_drives[folds]
+    amplitudes = [shrunken(each, drives) if problem.options.fade else 1.0 for each in sums]
     left = [_left(each, a).sum() for each, a in zip(sums, amplitudes, strict=True)]
     best = int(np.argmin(left))
     return NestedPick(known[best], amplitudes[best])

@@ -228,6 +228,12 @@ class Problem:
         """True where folds are whole records, or the parts that `Options.cuts` asks of each, not pieces of rows."""
         return self.options.fold is None and len(self.spans) > 1
 
+    @cached_property
+    def fold_drives(self) -> IntArray:
+        """(n_folds,) the number of the training record that each fold is of."""
+        ends = [b for _, b in self.spans]
+        return np.searchsorted(ends, [a for a, _ in self.folds], side="right")
+
     @property
     def zero(self) -> float:
         """The scaled error at which the physics model is exact."""

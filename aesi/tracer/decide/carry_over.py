@@ -12,8 +12,8 @@ from aesi.errors import AesiError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
-from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.blocks import RANGES, Blocks
+from aesi.tracer.case.problem import INDEPENDENT_CHARGE, InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_error import MOST_MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
@@ -22,6 +22,9 @@ from aesi.tracer.search.fitted import values_without
 ORDINARY_C = (1.0, -0.5)
 FAST_C = (2.0, 3.0)
 """Full discharges and charges that a model has to be good for; fast ones can deplete the electrolyte of a real cell."""
+BY_CHANCE = 1.0 + (2.0 / RANGES / INDEPENDENT_CHARGE) ** -0.5
+"""Times an error over one range of charge, by which it may be off as the errors of measured cells last: an RMS of N
+independent samples has a relative standard deviation of one over the root of 2 N."""
 STEP_S = 10.0
 """Between rows of a full discharge or charge."""
 
@@ -42,8 +45,9 @@ class LeftOut:
         return float(np.sqrt(np.mean(np.square(self.by_record))))
 
     def harms(self, other: LeftOut) -> bool:
-        """Is the model worse than another one in a range of charge, by more than models of measured cells err by?"""
-        allowed = np.hypot(other.by_range, MOST_MEASURED_V)
+        """Is the model worse than another one in a range of charge, by more than models of measured cells err by and
+        by more than chance?"""
+        allowed = np.maximum(np.hypot(other.by_range, MOST_MEASURED_V), BY_CHANCE * np.array(other.by_range))
         return bool(np.any(np.array(self.by_range) > allowed))
 
 

@@ -61,8 +61,9 @@ def gathered(
     def path_of(trust: Trust) -> Path:
         if trust not in paths:
             most = min(max_effects, MEASURED_EFFECTS) if trust == "measured" else max_effects
+            allowed_v = np.inf if trust == "measured" else _allowed_v(problem, thresholds)
             found = searched(
-                replace(problem, trust=trust), most, _enough(problem, thresholds), archive, report
+                replace(problem, trust=trust), most, _enough(problem, thresholds), archive, report, allowed_v
             )
             if found is None:
                 raise DataError(
@@ -106,12 +107,17 @@ def gathered(
 
 def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
     """Does a hypothesis leave no more on unseen data than a right one may?"""
-    allowed_v = tolerance_v(float(np.sqrt(np.mean(problem.white_v**2))), thresholds)
+    allowed_v = _allowed_v(problem, thresholds)
 
     def enough(blocks: Blocks, fit: FittedHypothesis) -> bool:
         return unexplained_v(problem, blocks, fit, allowed_v) <= allowed_v
 
     return enough
+
+
+def _allowed_v(problem: InverseProblem, thresholds: Thresholds) -> float:
+    """What a right hypothesis may leave beyond the noise on unseen data, V."""
+    return tolerance_v(float(np.sqrt(np.mean(problem.white_v**2))), thresholds)
 
 
 def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:

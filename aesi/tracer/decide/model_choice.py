@@ -88,4 +88,5 @@ def with_single_particle(full: Evidence, single: Evidence) -> bool:
 def _explains(path: Path, reduction: Reduction) -> bool:
     """Could what the two models differ by be all that a search leaves beyond what a right hypothesis may?"""
     allowed_v = tolerance_v(noise_v(path), Thresholds())
-    return structured_v(path, path.chosen) - reduction.shift_v <= allowed_v
+    left_v = structured_v(path, path.chosen) if path.beyond_reach_v is None else path.beyond_reach_v
+    return left_v - reduction.shift_v <= allowed_v

@@ -22,6 +22,7 @@ from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.grown import promising, side_by_side
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible
+from aesi.tracer.search.reach import REACH, least_left_v
 
 FINALISTS = 6
 """Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
@@ -41,16 +42,22 @@ round takes minutes. One effect may leave all of it: on a blind case (a contact,
 of three said 256 nats and did not lower the error, and the three were found."""
 
 
+_Growths = tuple[list[Grown], list[str]]
+"""What was grown, and why some of it could not be simulated."""
+
+
 def searched(
     problem: InverseProblem,
     max_effects: int,
     enough: Callable[[Blocks, FittedHypothesis], bool],
     archive: Archive,
     report: Report = lambda problem, one, gain: None,
+    allowed_v: float = np.inf,
 ) -> Path | None:
     """Grow from the bare model until nothing more is admitted, at most `max_effects` effects.
 
     enough : is what a hypothesis leaves within what a right one leaves? Then nothing is added that does not say much.
+    allowed_v : V beyond noise that a right one may leave; where all effects together leave far more, none is fitted.
     """
     blocks = blocks_of(problem)
     base = base_of(problem, blocks, archive)
@@ -60,8 +67,15 @@ def searched(
     notes: list[str] = []
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
+    first = _grown([Parent(problem, blocks, base)], slopes, archive) if max_effects else ([], [])
+    least_v = least_left_v(base, first[0], problem.white_v)
+    if least_v > REACH * allowed_v:
+        for one in first[0]:
+            report(problem, one, one.score.total - base.score.total)
+        step = Step((base,), tuple(_ranked(first[0])), (), None)
+        return Path(problem, blocks, base, (step,), base, tuple(dict.fromkeys(first[1])), least_v)
     for _ in range(max_effects):
-        step, refused = _step(problem, blocks, parents, slopes, archive, report)
+        step, refused = _step(problem, blocks, parents, slopes, archive, report, first if not steps else None)
         slopes = slopes or {g.hypothesis[-1]: g.slopes_v for g in step.grown}
         notes += refused
         steps.append(step)
@@ -154,10 +168,12 @@ def _step(
     slopes: Mapping[str, Array],
     archive: Archive,
     report: Report,
+    known: _Growths | None = None,
 ) -> tuple[Step, list[str]]:
-    """parents : the hypothesis that was chosen so far, then others to grow from."""
+    """parents : the hypothesis that was chosen so far, then others to grow from.  known : what they grow, where that is
+    known."""
     best, places = parents[0], [Parent(problem, blocks, fit) for fit in parents]
-    grown, refused = _grown(places, slopes, archive)
+    grown, refused = known or _grown(places, slopes, archive)
     slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
     declared = as_declared(problem, blocks, best)
     if declared is not None:
@@ -179,9 +195,7 @@ def _step(
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
 
-def _grown(
-    parents: Sequence[Parent], slopes: Mapping[str, Array], archive: Archive
-) -> tuple[list[Grown], list[str]]:
+def _grown(parents: Sequence[Parent], slopes: Mapping[str, Array], archive: Archive) -> _Growths:
     """All that is worth growing on these parents, and why some of it could not be simulated."""
     wanted = [(parent, name) for parent in parents for name in promising(parent, slopes)]
     grown, refused = [], []

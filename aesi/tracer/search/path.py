@@ -34,7 +34,10 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Path:
-    """A search that is over: the base without effects, the steps, and the hypothesis that was chosen."""
+    """A search that is over: the base without effects, the steps, and the hypothesis that was chosen.
+
+    beyond_reach_v : V beyond noise that all effects together leave, where that is so much that none was fitted.
+    """
 
     problem: InverseProblem
     blocks: Blocks
@@ -42,6 +45,7 @@ class Path:
     steps: tuple[Step, ...]
     chosen: FittedHypothesis
     notes: tuple[str, ...] = ()
+    beyond_reach_v: float | None = None
 
     def explanations(self) -> list[Explanation]:
         """All that was tried, each at its best: fits with the whole model before first-order ones."""

@@ -203,3 +203,15 @@ def test_missing_predictions_are_left_out() -> None:
     inside = np.arange(N) >= 60
     other = FreeRunBands.fit({60.0: [error]}, DT, [current], inside=[inside])
     np.testing.assert_array_equal(bands.horizons[0].scores, other.horizons[0].scores)
+
+
+def test_the_band_of_a_whole_drive_allows_for_as_few_stretches_as_it_is_told_of() -> None:
+    errors, currents, _ = zip(*(drive(seed) for seed in range(4)), strict=True)
+    by_horizon = {10.0: list(errors), WHOLE_DRIVE: list(errors)}
+    pieces, four, two = (FreeRunBands.fit(by_horizon, DT, currents, stretches=n) for n in (None, 4, 2))
+    # Student's t with three degrees of freedom at 0.95, by its printed table, over the normal quantile.
+    assert four.horizons[-1].widening == pytest.approx(2.353 / 1.645, rel=1e-3)
+    assert pieces.horizons[-1].widening < four.horizons[-1].widening
+    # Two cannot be told apart: their pieces stand for them. Short horizons forget within a stretch.
+    assert two.horizons[-1].widening == pieces.horizons[-1].widening
+    assert four.horizons[0].widening == pieces.horizons[0].widening

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 from sparse_records import make_record
 
 from aesi.records import Split
@@ -35,13 +36,30 @@ def sums(slopes, size=1.0):
 
 
 def test_an_amplitude_that_drives_agree_on_is_kept_and_one_they_dispute_is_not():
-    assert shrunken(sums([0.8] * 4)) == pytest.approx(0.8 / (1.0 + DOUBT))
-    assert shrunken(sums([2.0, -1.8, 2.0, -1.8])) == 0.0
-    assert shrunken(sums([-1.0] * 4)) == 0.0
+    four = np.arange(4)
+    assert shrunken(sums([0.8] * 4), four) == pytest.approx(0.8 / (1.0 + DOUBT))
+    assert shrunken(sums([2.0, -1.8, 2.0, -1.8]), four) == 0.0
+    assert shrunken(sums([-1.0] * 4), four) == 0.0
 
 
 def test_what_left_out_drives_hardly_see_is_not_believed():
-    assert shrunken(sums([1.0] * 4, size=1e-3)) < 0.05
+    assert shrunken(sums([1.0] * 4, size=1e-3), np.arange(4)) < 0.05
+
+
+def test_halves_of_two_drives_are_two_witnesses_and_not_four():
+    slopes, halves = [0.9, 0.9, 0.7, 0.7], np.array([0, 0, 1, 1])
+    # Two drives: the slopes without either differ by 0.2 / (1 + DOUBT), so the standard error is half of that, and
+    # Student's t with one degree of freedom, the Cauchy distribution, has tan(pi (p - 1 / 2)) for its quantile.
+    error = 0.5 * 0.2 / (1.0 + DOUBT)
+    expected = 0.8 / (1.0 + DOUBT) - np.tan(np.pi * (norm.cdf(1.0) - 0.5)) * error
+    assert shrunken(sums(slopes), halves) == pytest.approx(expected)
+    assert shrunken(sums(slopes), halves) < shrunken(sums(slopes), np.arange(4))
+
+
+def test_pieces_of_a_single_drive_stand_for_drives():
+    one = np.zeros(4, dtype=int)
+    assert shrunken(sums([2.0, -1.8, 2.0, -1.8]), one) == 0.0
+    assert shrunken(sums([0.5]), one[:1]) == pytest.approx(0.5 / (1.0 + DOUBT))
 
 
 def test_records_are_the_folds_and_a_true_error_is_kept():
@@ -84,3 +102,8 @@ def test_peers_fit_the_same_rows():
     linear = dmd_with_control(problem)
     assert linear.has_feedback
     assert set(linear.terms) <= {"1", *(f"T1({name})" for name in problem.library.variables)}
+
+
+def test_each_fold_knows_the_drive_that_it_is_a_part_of():
+    problem = Problem.build(Split(drives(range(3)), (), ()), replace(OPTIONS, cuts=2))
+    assert problem.fold_drives.tolist() == [0, 0, 1, 1, 2, 2]

@@ -68,8 +68,10 @@ class OutOfSampleErrors:
             reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
         )
 
-    def bands(self, alpha: float) -> FreeRunBands:
-        """Calibrated on these. Raises FitError where they are too few, or zero."""
+    def bands(self, alpha: float, stretches: int | None = None) -> FreeRunBands:
+        """Calibrated on these; `stretches` of them err independently over a whole drive, by default all their pieces.
+
+        Raises FitError where they are too few, or zero."""
         return FreeRunBands.fit(
             self.by_horizon,
             self.dt_s,
@@ -79,6 +81,7 @@ class OutOfSampleErrors:
             excess=self.excess,
             gap=self.gap,
             seen=self.seen,
+            stretches=stretches,
         )
 
 

@@ -12,17 +12,16 @@ from typing import overload
 import numpy as np
 
 from aesi.conformal import COMPARED, Calibrated, FreeRunBands, Method, RefittedForest, RefittedIntervals
+from aesi.conformal.horizon_band import MIN_PIECES
 from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, Unseen
 from aesi.records import LeftOutDrives
-from aesi.sparse import Candidate, Problem, SparseModel
+from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
 from aesi.sparse.yardsticks import Bare, Persistence
-
-SEARCHED = ("AESI I", "AESI II")
 
 
 def conformalise(
@@ -51,7 +50,7 @@ def _conformalised(
 ) -> Fitted:
     drives: list[Unseen] = []
     pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
-    if isinstance(one.model, SparseModel) and one.model.name in SEARCHED:
+    if isinstance(one.model, SparseModel) and one.model.name in ENSEMBLES:
         pairs += fold_models(problem, chosen, one.model, left_out.parts)
         if left_out.drives and problem.folds_are_drives:
             drives += fold_models(problem, chosen, one.model, left_out.drives, problem.spans)
@@ -69,7 +68,7 @@ def _conformalised(
         intervals = _intervals(pairs, config, method(config))
     except FitError as error:
         notes.append(f"{one.model.name} has no intervals one step ahead: {error}")
-    for name in config.conformal.compare if one.model.name in SEARCHED else ():
+    for name in config.conformal.compare if one.model.name in ENSEMBLES else ():
         try:
             compared[name] = _intervals(pairs, config, COMPARED[name])
         except FitError as error:
@@ -90,11 +89,11 @@ def _bands(
     pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
 ) -> FreeRunBands:
     train, alpha = problem.split.train, config.conformal.alpha
-    bands = OutOfSampleErrors.of(pairs, train, config.conformal.horizons_s).bands(alpha)
-    if not drives:
+    bands = OutOfSampleErrors.of(pairs, train, config.conformal.horizons_s).bands(alpha, len(pairs))
+    if len(drives) < MIN_PIECES:
         return bands
     try:
-        return bands.no_narrower_than(OutOfSampleErrors.of(drives, train, ()).bands(alpha))
+        return bands.no_narrower_than(OutOfSampleErrors.of(drives, train, ()).bands(alpha, len(pairs)))
     except FitError:  # drives too short to be told apart
         return bands
 

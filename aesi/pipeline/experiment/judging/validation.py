@@ -26,12 +26,9 @@ from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES
 from aesi.records import ErrorSeries, HeldOutDrive
-from aesi.sparse import Candidate, Problem
+from aesi.sparse import ENSEMBLES, Candidate, Problem
 from aesi.sparse.search.fold_models import fold_models, fold_samples
 from aesi.sparse.search.nested import nested_shares, picked
-
-ENSEMBLES = ("AESI I", "AESI II")
-
 
 SquaresLeft = dict[str, float]
 """Model -> sum of squares, V**2, that it leaves on a left-out piece."""
@@ -40,7 +37,7 @@ SquaresLeft = dict[str, float]
 def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> dict[str, float]:
     """Model -> reduction of the squared error against the declared physics, per cent, on a typical left-out piece.
 
-    Physics is refitted without each piece, and AESI I and II are chosen without it (`picked`).
+    Physics is refitted without each piece, and the ensembles are chosen without it (`picked`).
     Empty where the search left out other pieces than drives or their parts.
     """
     if len(problem.folds) < 2 or not problem.folds_are_drives:
@@ -53,7 +50,7 @@ def validation_mser(loaded: Loaded, problem: Problem, candidates: Sequence[Candi
 
 
 def _parts(loaded: Loaded, problem: Problem, candidates: Sequence[Candidate]) -> Iterator[SquaresLeft]:
-    """The folds of the search; what AESI I and II leave of the error of physics that saw a fold is taken for what they
+    """The folds of the search; what the ensembles leave of the error of physics that saw a fold is taken for what they
     leave of the error of physics that did not."""
     shares = [nested_shares(problem, candidates, number) for number in range(len(ENSEMBLES))]
     for d, ((a, b), out) in enumerate(zip(problem.folds, loaded.left_out.parts, strict=True)):
@@ -86,7 +83,7 @@ def _without(
     if pick is None:
         return np.zeros(len(out.series))
     chosen = pick.candidate
-    model = (chosen.bagging, chosen.stability)[ensemble]
+    model = chosen.ensembles[ensemble]
     if model.fade is not None:
         model = replace(model, fade=replace(model.fade, amplitude=pick.amplitude))
     for fitted, series, _ in fold_models(problem, chosen, model, (out,), (span,)):
