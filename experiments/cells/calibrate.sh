@@ -2,10 +2,9 @@
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
 # Without arguments all three, into this folder. Each takes some minutes of one processor.
-# None of the files of this folder is what this gives today: the Panasonic's over temperatures is from before a cycler's
-# zero was read off whole cycles and records had silicon of their own, the other two also from before electrodes had films.
-# The Panasonic's over temperatures as made today is no better on what it is fitted to and was not shipped, nor was one of
-# the LG 18650HG2 with its C/20 at 0 and 40 degC: docs/cells.md.
+# panasonic_25degc is what this gives today; the other two are from before a cycler's zero was read off whole cycles, the LG
+# 18650HG2's also from before electrodes had films. Made again they are no better on what they are fitted to, or need the
+# capacity of each record's day: docs/cells.md.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}

@@ -21,7 +21,7 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
     [
         pytest.param("hg2", "lg_18650hg2", "lg_18650hg2", marks=OLDER),
         pytest.param("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf", marks=OLDER),
-        pytest.param("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf", marks=OLDER),
+        ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
     ],
 )
 def test_the_command_gives_the_file_again(name, file, data, tmp_path):
