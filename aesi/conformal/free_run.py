@@ -46,9 +46,11 @@ import numpy as np
 from aesi.conformal.horizon_band import HorizonBand, calibrated_band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
-from aesi.conformal.seen import Seen
+from aesi.conformal.seen import gap as gap_of
+from aesi.conformal.seen import growth
 from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, SavedState
+from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
 
 SCHEMA = "aesi.free_run_bands/6"
@@ -61,7 +63,7 @@ class FreeRunBands:
 
     alpha: float
     horizons: tuple[HorizonBand, ...]
-    seen: Seen | None = None
+    seen: Visited | None = None
     drives: HorizonBand | None = None
 
     def __repr__(self) -> str:
@@ -77,7 +79,7 @@ class FreeRunBands:
         inside: Sequence[BoolArray] | None = None,
         excess: Sequence[Array | None] | None = None,
         gap: Sequence[Array | None] | None = None,
-        seen: Seen | None = None,
+        seen: Visited | None = None,
         stretches: int | None = None,
     ) -> FreeRunBands:
         """Calibrate on out-of-sample prediction errors: of records, or pieces, that the model was not fitted to.
@@ -89,7 +91,7 @@ class FreeRunBands:
         inside : one (n_i,) array a record, True inside the trained range of the model that predicted; None for
         everywhere.
         excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it keeps no leverage.
-        gap : one (n_i,) array a record, `Seen.gap` of that model.  seen : of the model that the bands are for.
+        gap : one (n_i,) array a record, of that model (seen.py).  seen : of the model that the bands are for.
         stretches : how many stretches of the records err independently over a whole drive; by default their pieces.
 
         Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
@@ -173,7 +175,7 @@ class FreeRunBands:
                 f"bands have schema {state.get('schema')!r}, this version reads {SCHEMA!r}; run the experiment again."
             )
         alpha = float(state["alpha"])
-        seen = None if state["seen"] is None else Seen.from_state(state["seen"])
+        seen = None if state["seen"] is None else Visited.from_state(state["seen"])
         drives = None if state["drives"] is None else HorizonBand.from_state(state["drives"], alpha)
         return cls(
             alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]), seen, drives
@@ -184,7 +186,7 @@ class FreeRunBands:
         return replace(self, drives=drives.horizons[-1])
 
     def _gap(self, soc: Array) -> Array | None:
-        return None if self.seen is None else self.seen.gap(soc)
+        return None if self.seen is None else gap_of(self.seen, soc)
 
     def _around(
         self, elapsed_s: Array, columns: Array, reach_v: Array | float, temperature_degc: Array | None
@@ -194,7 +196,7 @@ class FreeRunBands:
             halves[-1] = np.maximum(halves[-1], self.drives.half_width(columns))
         half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
         if self.seen is not None:
-            half = half * self.seen.growth(temperature_degc)
+            half = half * growth(self.seen, temperature_degc)
         return -half, half
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Self
+
 import numpy as np
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, SavedState
 
 RESOLUTION = 0.005
 """Of a state of charge: no model of an error tells places apart that are closer."""
@@ -22,37 +25,53 @@ TemperatureSpan = tuple[float, float]
 """Lowest and highest temperature, degC."""
 
 
-def visited(places: Array) -> Array:
-    """(k,) the places (n,), rounded to RESOLUTION, sorted, each once."""
-    return np.asarray(RESOLUTION * np.unique(np.round(places / RESOLUTION)))
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """charge : (k,) states of charge, rounded to RESOLUTION, sorted, each once.
+    temperature_degc : the lowest and the highest, None where none was measured."""
 
+    charge: Array
+    temperature_degc: TemperatureSpan | None = None
 
-def distance_to_visited(places: Array, known: Array) -> Array:
-    """(n,) from each place to the nearest of `known` (k,), sorted; 0 within the resolution, inf where none is known."""
-    if not len(known):
-        return np.full(len(places), np.inf)
-    last = len(known) - 1
-    place = np.clip(np.searchsorted(known, places), 1, max(last, 1))
-    below, above = np.abs(places - known[place - 1]), np.abs(places - known[np.minimum(place, last)])
-    return np.asarray(np.maximum(np.minimum(below, above) - RESOLUTION / 2, 0.0))
+    @classmethod
+    def of(cls, soc: Array, temperature_degc: Array | None = None) -> Self:
+        """By rows with states of charge and temperatures (n,), NaN where not measured."""
+        charge = np.asarray(RESOLUTION * np.unique(np.round(soc / RESOLUTION)))
+        if temperature_degc is None or not np.isfinite(temperature_degc).any():
+            return cls(charge)
+        return cls(charge, (float(np.nanmin(temperature_degc)), float(np.nanmax(temperature_degc))))
 
+    def distance(self, soc: Array) -> Array:
+        """(n,) from each state of charge to the nearest visited one; 0 within the resolution, inf where none is."""
+        if not len(self.charge):
+            return np.full(len(soc), np.inf)
+        last = len(self.charge) - 1
+        place = np.clip(np.searchsorted(self.charge, soc), 1, max(last, 1))
+        below, above = (np.abs(soc - self.charge[i]) for i in (place - 1, np.minimum(place, last)))
+        return np.asarray(np.maximum(np.minimum(below, above) - RESOLUTION / 2, 0.0))
 
-def correlation(distance: Array) -> Array:
-    """(n,) exp(-(d / LENGTH)**2 / 2), of a model's errors at states of charge a distance apart."""
-    return np.asarray(np.exp(-0.5 * (distance / LENGTH) ** 2))
+    def correlation(self, soc: Array) -> Array:
+        """(n,) exp(-(d / LENGTH)**2 / 2), of a model's errors there and at the nearest visited state of charge."""
+        return np.asarray(np.exp(-0.5 * (self.distance(soc) / LENGTH) ** 2))
 
+    def thermal_distance(self, temperature_degc: Array | None) -> Array | float:
+        """(n,) E / R |1 / T - 1 / T_near|, >= 0: log of what overpotentials change by from the nearest temperature of
+        the span, with an activation energy E between those of kinetics and diffusion. 0 where none was measured."""
+        if self.temperature_degc is None or temperature_degc is None:
+            return 0.0
+        near = np.clip(temperature_degc, *self.temperature_degc) + ZERO_CELSIUS_K
+        apart = np.abs(1.0 / (temperature_degc + ZERO_CELSIUS_K) - 1.0 / near)
+        return np.asarray(np.nan_to_num(ENERGY_J_MOL / GAS_CONSTANT_J_MOL_K * apart))
 
-def temperature_span(temperature_degc: Array) -> TemperatureSpan | None:
-    """The lowest and the highest of (n,) degC, NaN where not measured; None where none was."""
-    measured = temperature_degc[np.isfinite(temperature_degc)]
-    return (float(measured.min()), float(measured.max())) if len(measured) else None
+    def to_state(self) -> SavedState:
+        """Plain values."""
+        span = None if self.temperature_degc is None else list(self.temperature_degc)
+        return {"charge": self.charge.tolist(), "temperature_degc": span}
 
-
-def thermal_distance(temperature_degc: Array | None, span: TemperatureSpan | None) -> Array | float:
-    """(n,) E / R |1 / T - 1 / T_near|, >= 0: log of what overpotentials change by from the nearest temperature of
-    the span, with an activation energy E between those of kinetics and diffusion. 0 where none was measured."""
-    if span is None or temperature_degc is None:
-        return 0.0
-    near = np.clip(temperature_degc, *span) + ZERO_CELSIUS_K
-    apart = np.abs(1.0 / (temperature_degc + ZERO_CELSIUS_K) - 1.0 / near)
-    return np.asarray(np.nan_to_num(ENERGY_J_MOL / GAS_CONSTANT_J_MOL_K * apart))
+    @classmethod
+    def from_state(cls, state: SavedState) -> Self:
+        """Inverse of `to_state`; what else the state holds is left alone."""
+        span = state["temperature_degc"]
+        return cls(
+            np.array(state["charge"], dtype=float), None if span is None else (float(span[0]), float(span[1]))
+        )

@@ -18,14 +18,7 @@ from typing import Any, Self
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.numerics.visited import (
-    TemperatureSpan,
-    correlation,
-    distance_to_visited,
-    temperature_span,
-    thermal_distance,
-    visited,
-)
+from aesi.numerics.visited import Visited
 
 DISTANCE = 0.3
 """Of a scaled input, half a range being 1. Over the development splits of the NMC drive in `aesi bench splits` (16
@@ -36,40 +29,30 @@ same): 62.3, 26.2; 17.0, -11.2 with 0.1 and 64.9, 30.1; 23.2, -7.9 with 0.2, 65.
 
 @dataclass(frozen=True, eq=False)
 class TrainedRegion:
-    """low, high : (n_inputs,) the trained range, scaled.  charge : (k,) states of charge that were visited, sorted.
-    temperature_degc : the lowest and the highest, None where none was measured."""
+    """low, high : (n_inputs,) the trained range, scaled.  visited : the charges and temperatures of the fitted rows."""
 
     low: Array
     high: Array
-    charge: Array
-    temperature_degc: TemperatureSpan | None = None
+    visited: Visited
 
     @classmethod
     def of(cls, scaled: Array, soc: Array, temperature_degc: Array) -> Self:
         """Of rows with scaled inputs (n, n_inputs), states of charge and temperatures (n,), NaN where not measured."""
-        return cls(scaled.min(axis=0), scaled.max(axis=0), visited(soc), temperature_span(temperature_degc))
+        return cls(scaled.min(axis=0), scaled.max(axis=0), Visited.of(soc, temperature_degc))
 
     def nearness(self, scaled: Array, soc: Array, temperature_degc: Array | None) -> Array:
         """(n,) of (1), 0 to 1; scaled : (n, n_inputs), not held at the edge; a temperature that was not measured counts
         as fitted."""
         beyond = np.maximum(self.low - scaled, 0.0) + np.maximum(scaled - self.high, 0.0)
-        squared = np.sum(beyond**2, axis=1) + thermal_distance(temperature_degc, self.temperature_degc) ** 2
-        along_inputs = np.exp(-0.5 * squared / DISTANCE**2)
-        return np.asarray(along_inputs * correlation(distance_to_visited(soc, self.charge)))
+        squared = np.sum(beyond**2, axis=1) + self.visited.thermal_distance(temperature_degc) ** 2
+        return np.asarray(np.exp(-0.5 * squared / DISTANCE**2) * self.visited.correlation(soc))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""
-        span = None if self.temperature_degc is None else list(self.temperature_degc)
-        return {
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "charge": self.charge.tolist(),
-            "temperature_degc": span,
-        }
+        return {"low": self.low.tolist(), "high": self.high.tolist(), **self.visited.to_state()}
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Self:
         """Inverse of `to_dict`."""
-        low, high, charge = (np.array(data[key], dtype=float) for key in ("low", "high", "charge"))
-        span = data["temperature_degc"]
-        return cls(low, high, charge, None if span is None else (float(span[0]), float(span[1])))
+        low, high = (np.array(data[key], dtype=float) for key in ("low", "high"))
+        return cls(low, high, Visited.from_state(data))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE
+from aesi.conformal.seen import gap
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors
 from aesi.records import ErrorSeries, FreeRun
 
@@ -89,4 +90,4 @@ def test_a_left_out_piece_is_as_far_from_the_charges_of_the_others_as_they_lie(d
     assert (np.diff(left[half][10:]) >= 0).all()
     assert left[-1] > 0.9
     assert nothing.max() < 1e-6
-    assert errors.seen.gap(drive.soc).max() < 1e-6
+    assert gap(errors.seen, drive.soc).max() < 1e-6

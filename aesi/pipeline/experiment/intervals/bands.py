@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.conformal import WHOLE_DRIVE, FreeRunBands
-from aesi.conformal.seen import Seen
+from aesi.conformal.seen import gap
 from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.visited import Visited
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -40,7 +41,7 @@ class OutOfSampleErrors:
     inside: list[BoolArray]
     excess: list[Array | None]
     gap: list[Array | None]
-    seen: Seen
+    seen: Visited
     reach: dict[float, list[Array]]
 
     @classmethod
@@ -63,7 +64,7 @@ class OutOfSampleErrors:
             soc=[series.soc for _, series, _ in pairs],
             inside=[_inside(model, series, rows, train) for model, series, rows in pairs],
             excess=[run.excess for run in runs],
-            gap=[_seen(train, series, rows).gap(series.soc) for _, series, rows in pairs],
+            gap=[gap(_seen(train, series, rows), series.soc) for _, series, rows in pairs],
             seen=_seen(train),
             reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
         )
@@ -128,18 +129,20 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     return np.asarray(((series.inputs >= low) & (series.inputs <= high)).all(axis=1))
 
 
-def _seen(train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE) -> Seen:
+def _seen(train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE) -> Visited:
     """Of the training records without the given rows of one of them, where that is one."""
     kept = [
         _others(len(record), rows) if left_out is not None and record.name == left_out.name else slice(None)
         for record in train
     ]
-    return Seen.of(
-        [record.soc[rows] for record, rows in zip(train, kept, strict=True)],
-        [
-            None if r.temperature_degc is None else r.temperature_degc[k]
-            for r, k in zip(train, kept, strict=True)
-        ],
+    return Visited.of(
+        np.concatenate([record.soc[rows] for record, rows in zip(train, kept, strict=True)]),
+        np.concatenate(
+            [
+                np.full(len(r), np.nan)[k] if r.temperature_degc is None else r.temperature_degc[k]
+                for r, k in zip(train, kept, strict=True)
+            ]
+        ),
     )
 
 
