@@ -131,7 +131,7 @@ def discover(
     declared = ModelState(problem)
     for index, record in enumerate((*records, *tested)):
         run = declared.simulated(record, index if index < len(records) else None, thin=True)
-        check_same_cell(record.name, record.thin.voltage_v - run.voltage_v, cell)
+        check_same_cell(problem, record, run.voltage_v)
     spent = _Spent(progress)
 
     def search(one: InverseProblem, kept: Archive) -> Evidence:

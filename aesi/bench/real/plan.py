@@ -38,6 +38,8 @@ WARMING: dict[str, tuple[str, ...]] = {
     PANASONIC: ("25degC_us06", "25degC_1c_start"),
 }
 SLOW_OR_PULSES = ("c20", "hppc")
+UNTIL_S = {"n10degC_hppc": 78_611.0}
+"""Where nine hours are missing from a record: what the cell did in them is unknown."""
 CONTROLS: dict[str, tuple[str, ...]] = {
     HG2: ("25degC_mixed1", "25degC_mixed2", "25degC_mixed3", "25degC_la92", "25degC_us06", "25degC_cap_1c_b"),
     PANASONIC: (
@@ -106,7 +108,7 @@ def chosen(
 
 
 def _stop(file: str) -> float | None:
-    return None if any(word in file for word in SLOW_OR_PULSES) else WINDOW_S
+    return UNTIL_S.get(file) if any(word in file for word in SLOW_OR_PULSES) else WINDOW_S
 
 
 def _soc0(cell: str, file: str) -> float | None:

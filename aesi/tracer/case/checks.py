@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError
+from aesi.errors import AesiError, DataError
 from aesi.numerics.typing import Array
 from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
+from aesi.physics.effect import ActiveEffect
+from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord
 
 FEWEST_SAMPLES = 200
@@ -22,6 +26,8 @@ FOREIGN_CELL_V = 0.25
 """A model of the right chemistry, however badly parametrised, is closer than this to the voltage in the median. The
 file of an LG M50, sized to cells of other makes, errs by 50 to 110 mV RMS on their drives from 10 to 40 degC
 (`aesi bench cells`, declared). At 0 degC and below it errs by 100 to 300 mV."""
+CONDITIONS = 5
+"""Of an unmeasured quantity, over its range: a cell at -10 degC whose temperature nobody gives is off by 290 mV."""
 
 
 def check_record(cell: Cell, record: PreparedRecord) -> None:
@@ -60,11 +66,37 @@ def _discharged_ah(record: PreparedRecord) -> Array:
     return np.concatenate([[0.0], np.cumsum(mean * np.diff(record.data.time_s))]) / SECONDS_PER_HOUR
 
 
-def check_same_cell(name: str, residual_v: Array, cell: Cell) -> None:
-    """Raises DataError where the declared model is so far off that the data must come from another cell."""
-    typical = float(np.median(np.abs(residual_v)))
-    if typical > FOREIGN_CELL_V:
-        raise DataError(
-            f"{name}: the model of {cell.name} is {1e3 * typical:.0f} mV off in the median, which no single effect "
-            "does; the file seems to come from another cell, or soc0 is wrong."
-        )
+def check_same_cell(problem: InverseProblem, record: PreparedRecord, voltage_v: Array) -> None:
+    """Raises DataError where the declared model is so far off that the data must come from another cell.
+
+    voltage_v : (n_thin,) V of the declared model.  Where an effect infers what the record does not hold (temperature),
+    the model has to be so far off over all of its range.
+    """
+    typical = _typical_v(record, voltage_v)
+    if typical <= FOREIGN_CELL_V:
+        return
+    for condition in _unmeasured(problem, record):
+        try:
+            run = problem.run(record.thin, record.soc0, (*problem.fixed, condition), record.thin_hold)
+        except AesiError:
+            continue
+        if _typical_v(record, run.voltage_v) <= FOREIGN_CELL_V:
+            return
+    raise DataError(
+        f"{record.name}: the model of {problem.cell.name} is {1e3 * typical:.0f} mV off in the median, which no single "
+        "effect does; the file seems to come from another cell, or soc0 is wrong."
+    )
+
+
+def _typical_v(record: PreparedRecord, voltage_v: Array) -> float:
+    return float(np.median(np.abs(record.thin.voltage_v - voltage_v)))
+
+
+def _unmeasured(problem: InverseProblem, record: PreparedRecord) -> Iterator[ActiveEffect]:
+    """Over the range of each effect of one parameter that infers what the record does not hold."""
+    for effect in problem.effects.values():
+        if effect.infers is None or record.data.temperature_degc is not None or len(effect.parameters) != 1:
+            continue
+        (name, parameter), *_ = effect.parameters.items()
+        for value in np.linspace(*parameter.bounds, CONDITIONS):
+            yield effect.activate(**{name: float(value)})

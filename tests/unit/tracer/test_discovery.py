@@ -8,6 +8,8 @@ import pytest
 from aesi.errors import DataError
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
+from aesi.tracer.case.checks import FOREIGN_CELL_V, check_same_cell
+from aesi.tracer.discovery import inverse_problem
 
 
 def test_an_ohmic_drop_is_found_with_its_size(cell, few, make):
@@ -101,6 +103,26 @@ def test_what_cannot_decide_is_refused_in_one_sentence(cell, few, make, change, 
     with pytest.raises(DataError, match=sentence) as caught:
         discover(cell, [change(make())], soc0=0.9, effects=few)
     assert "\n" not in str(caught.value)
+
+
+def test_a_cell_far_colder_than_its_file_is_not_taken_for_another_one(cell, make):
+    cold = make((CATALOGUE["ambient_temperature"].activate(shift_k=-62.0),))
+    names = ("series_resistance", "ambient_temperature")
+    known, unknown = (
+        inverse_problem(
+            cell, [replace(cold, temperature_degc=degc)], 0.9, effects={n: CATALOGUE[n] for n in names}
+        )
+        for degc in (np.full(len(cold), 25.0), None)
+    )
+    for problem in (known, unknown):
+        (record,) = problem.records
+        voltage = problem.run(record.thin, 0.9, (), record.thin_hold).voltage_v
+        assert np.median(np.abs(record.thin.voltage_v - voltage)) > FOREIGN_CELL_V
+        if problem is known:
+            with pytest.raises(DataError, match="another cell"):
+                check_same_cell(problem, record, voltage)
+        else:
+            check_same_cell(problem, record, voltage)
 
 
 def test_no_measurement_is_refused(cell, few):
