@@ -41,7 +41,7 @@ def weighted_grams(rows: Array, weights: CountArray) -> Array:
     whole = n // CELL * CELL
     by_cell = weights[:, :whole].reshape(len(weights), -1, CELL).min(axis=2)
     as_float = by_cell.astype(float)
-    grams = np.zeros((len(weights), m, m))  # what is below the diagonal is added to, too, and must be a number
+    grams = np.zeros((len(weights), m, m))  # below the diagonal too: it is added to
     cells = rows[:whole].reshape(-1, CELL, m)
     for start in range(0, m, _COLUMNS_AT_ONCE):
         stop = min(start + _COLUMNS_AT_ONCE, m)
