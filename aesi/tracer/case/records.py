@@ -137,7 +137,10 @@ def prepare(
     notes = (*notes, hold_sentence(data.name, hold, data.hold is not None), *_temperature_noted(data))
     noise_full = noise_floor_v(data.voltage_v, data.current_a)
     if rows is None:
-        noise = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
+        averaged = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
+        noise = min(
+            averaged, noise_full
+        )  # averages have no more: where a drive never rests, what they move by is taken for it
         white = np.full(len(thin), noise)
     else:  # what lies between rows that far apart is no noise
         white = np.maximum(noise_full / np.sqrt(rows), SMALLEST_NOISE_V)

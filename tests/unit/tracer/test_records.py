@@ -77,6 +77,15 @@ def test_a_long_discharge_needs_few_rows(cell):
     assert np.diff(record.thin.time_s).max() < 100.0
 
 
+def test_averages_are_not_noisier_than_the_rows_of_a_drive_that_never_rests(cell, rng):
+    time = np.arange(0.0, 900.0, 0.1)
+    current = 10.0 + np.convolve(rng.normal(0.0, 30.0, len(time)), np.ones(15) / 15, mode="same")
+    voltage = simulate(cell, time, current, soc0=0.8).voltage_v + 1e-3 * rng.normal(size=len(time))
+    record = prepare(cell, Measurement(time, current, voltage, name="restless"), 0.8, 0.0)
+    assert noise_floor_v(record.thin.voltage_v, record.thin.current_a) > 1.5 * record.noise_full_v
+    assert record.noise_v == pytest.approx(record.noise_full_v)
+
+
 def test_noise_floor_is_found_under_a_drive(rng):
     n = 5000
     current = np.repeat(rng.normal(0, 10, n // 50), 50)
