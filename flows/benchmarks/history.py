@@ -60,6 +60,11 @@ WATCHED = {
         higher={"effect_exact_pct": RATE, "effect_grouped_pct": RATE, "stranger_unknown_pct": RATE},
         lower={"none_false_name_pct": RATE},
     ),
+    "real": Watch(
+        ("summary", "cases"),
+        higher={"withheld_named_pct": RATE, "fault_named_pct": RATE, "control_silent_pct": RATE},
+        lower={"after_worse_pct": RATE},
+    ),
     "tracking": Watch(("rows", "terms", "resamples", "artifact_kb"), lower={"overhead_pct": TIMING}),
     "scale": Watch(("runner", "rows", "terms", "workers"), higher={"ratio_by_processor": RESULT}),
 }
@@ -141,7 +146,7 @@ def regressions(entries: Sequence[Entry], lines: Iterable[Line]) -> list[str]:
 
 
 def _worse(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
-    watch = WATCHED[now["bench"]]
+    watch = _watch(now)
     old, new = figures(before), figures(now)
     found = []
     for name in [each for each in old if each in new]:

@@ -125,6 +125,11 @@ def test_what_is_worse_than_when_it_was_last_recorded_is_named(now, worse):
     assert all("espm (drive): " in text and "2026-01-01, abcdef0" in text for text in found)
 
 
+def test_a_benchmark_that_nobody_watches_is_recorded_again():
+    line = {"bench": "left_out", "summary": True, "no_worse": 17}
+    assert regressions([Entry("2026-01-01", "abcdef0", "a machine", 0.5, [line])], [line]) == []
+
+
 def test_the_newest_of_each_case_counts():
     entries = [entry(), entry(case="pulse"), entry("2026-03-01")]
     assert {key: each.date for key, (each, _) in latest(entries).items()} == {
