@@ -111,14 +111,15 @@ def dfn_curve() -> str:
 
 
 def columns_of(bench: str) -> str:
-    """A figure a row and a recorded run a column, oldest first: what a change of method brought stays to be seen."""
+    """A figure a row and a recorded run with a label a column, oldest first: what a change of method brought stays to be
+    seen."""
     from flows.benchmarks.history import read_history
 
     runs = [
         (entry, line)
         for entry in read_history(ROOT / "docs" / "benchmarks.json")
         for line in entry.lines
-        if line["bench"] == bench and line.get("strict")
+        if line["bench"] == bench and line.get("label")
     ]
     if not runs:
         return f"No run has been recorded in this checkout; `aesi bench {bench}` makes one."

@@ -2,6 +2,7 @@
 
     python docs/hooks/record.py [NAME ...]                 run the named ones, or all
     python docs/hooks/record.py --lines FILE [FILE ...]    take what `aesi bench --json` has printed to files
+    python docs/hooks/record.py --label TEXT ...           head the column of blind or measured cases with it
 
 Says what got worse since it was last recorded, and then exits with 1; the entry is added all the same.
 """
@@ -26,12 +27,14 @@ TARGET = ROOT / "docs" / "benchmarks.json"
 def main(arguments: list[str]) -> int:
     """Add an entry; the number of regressions."""
     load: float | None = None
+    label = arguments[1] if arguments[:1] == ["--label"] else ""
+    arguments = arguments[2:] if label else arguments
     if arguments[:1] == ["--lines"]:
         lines = [line for path in arguments[1:] for line in parsed(Path(path).read_text(encoding="utf-8"))]
     else:
         load = round(os.getloadavg()[0], 2)
         lines = [line for name in arguments or [""] for line in run(name)]
-    kept = worth_keeping(lines)
+    kept = [line | {"label": label} if label else line for line in worth_keeping(lines)]
     entries = read_history(TARGET)
     worse = regressions(entries, kept)
     entry = Entry(datetime.now(UTC).date().isoformat(), commit(), machine(), load, kept)
