@@ -111,8 +111,7 @@ def dfn_curve() -> str:
 
 
 def columns_of(bench: str) -> str:
-    """A figure a row and a recorded run with a label a column, oldest first: what a change of method brought stays to be
-    seen."""
+    """A figure a row and a labelled run a column, oldest first: what a change of method brought stays to be seen."""
     from flows.benchmarks.history import read_history
 
     runs = [
