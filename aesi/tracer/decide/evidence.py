@@ -167,15 +167,6 @@ def _with_confidence(verdict: Verdict) -> Verdict:
     return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
 
 
-def _borne_out(problem: InverseProblem) -> tuple[Trust, ...]:
-    """How far own parameters may be moved in a model that is written: far only where another record can bear it out.
-
-    On five development records of `aesi bench real`, each by itself, what was open wide left 14.4, 201, 12.2, 137 and
-    3.9 mV on its last part, what was not 12.2, 84.7, 18.4, 63.0 and 3.5.
-    """
-    return ("tight", "loose") if len(problem.records) > 1 else ("tight",)
-
-
 def _borne_out(one: Option) -> bool:
     """Can a recalibration be written? What was open wide only where another record can bear it out.
 
