@@ -68,7 +68,7 @@ def searched(
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
     first = _grown([Parent(problem, blocks, base)], slopes, archive) if max_effects else ([], [])
-    least_v = least_left_v(base, first[0], problem.white_v)
+    least_v = least_left_v(base, first[0], problem.white_v) if np.isfinite(allowed_v) else 0.0
     if least_v > REACH * allowed_v:
         for one in first[0]:
             report(problem, one, one.score.total - base.score.total)
