@@ -138,9 +138,8 @@ def prepare(
     noise_full = noise_floor_v(data.voltage_v, data.current_a)
     if rows is None:
         averaged = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
-        noise = min(
-            averaged, noise_full
-        )  # averages have no more: where a drive never rests, what they move by is taken for it
+        # Averages have no more of it than rows: what a drive that never rests moves them by is not noise.
+        noise = min(averaged, noise_full)
         white = np.full(len(thin), noise)
     else:  # what lies between rows that far apart is no noise
         white = np.maximum(noise_full / np.sqrt(rows), SMALLEST_NOISE_V)
