@@ -126,6 +126,11 @@ def case_of(line: Mapping[str, Any]) -> tuple[Any, ...]:
     return (line["bench"], *(_plain(line.get(name)) for name in watch.case))
 
 
+def case_fields(line: Mapping[str, Any]) -> tuple[str, ...]:
+    """The fields that tell a line apart, as far as it has them: lines of one benchmark may be of several kinds."""
+    return tuple(name for name in _watch(line).case if name in line)
+
+
 def figures(line: Mapping[str, Any]) -> dict[str, float]:
     """The watched figures of a line."""
     watch = _watch(line)

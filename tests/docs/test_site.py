@@ -52,7 +52,7 @@ def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
     generate = hook("generate")
     (tmp_path / "docs").mkdir()
     monkeypatch.setattr(generate, "ROOT", tmp_path)
-    assert "No benchmark has been recorded" in generate.benchmarks()
+    assert "No run has been recorded" in generate.recorded("scale")
     line = {
         "bench": "scale",
         "runner": "dask",
@@ -68,19 +68,42 @@ def test_benchmarks_come_from_the_recorded_lines_alone(tmp_path, monkeypatch):
         {**entry, "date": "2026-02-01", "lines": [{**line, "ratio_by_processor": 1.8}]},
     ]
     (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": entries}))
-    page = generate.benchmarks()
+    page = generate.recorded("scale")
     assert "Measured on a machine, 2026-02-01, commit `0123456`, load 0.5 at the start." in page
     assert "2026-01-01, commit" not in page  # the newest of each case alone
     assert "| one_s | 0.1235 |" in page
     assert "| peer_s | – |" in page
-    assert "| scale | dask, 9, 3, 2 | ratio_by_processor | 1.9 (2026-01-01) → 1.8 (2026-02-01) |" in page
+    moved = "| scale | dask, 9, 3, 2 | ratio_by_processor | 1.9 (2026-01-01) → 1.8 (2026-02-01) |"
+    assert moved in generate.over_time()
 
 
-def test_runs_of_one_benchmark_stand_side_by_side_with_their_intervals(tmp_path, monkeypatch):
+def test_lines_of_two_kinds_stand_in_two_tables_and_many_are_folded_away(tmp_path, monkeypatch):
     generate = hook("generate")
     (tmp_path / "docs").mkdir()
     monkeypatch.setattr(generate, "ROOT", tmp_path)
-    assert "No run has been recorded" in generate.columns_of("blind")
+    curve = [{"bench": "dfn", "load": f"load {k}", "who": "ours", "rmse_mv": 0.1} for k in range(20)]
+    lines = [*curve, {"bench": "dfn", "summary": True, "ratio": 78.7}]
+    entry = {"machine": "a machine", "commit": "0123456789", "load": None, "date": "2026-01-01"}
+    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": [{**entry, "lines": lines}]}))
+    page = generate.recorded("dfn")
+    assert "| figure | value |\n|---|---:|\n| ratio | 78.7 |" in page
+    assert '??? note "20 lines"\n\n    | load | who | rmse_mv |\n' in page
+
+
+def test_every_recorded_benchmark_has_its_place_on_the_page():
+    from flows.benchmarks.history import read_history
+
+    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    entries = read_history(ROOT / "docs" / "benchmarks.json")
+    recorded = {line["bench"] for entry in entries for line in entry.lines}
+    assert {name for name in recorded if f"<!-- generated: bench {name} -->" not in page} == set()
+
+
+def test_the_newest_of_labelled_runs_comes_first_and_all_of_them_stand_side_by_side(tmp_path, monkeypatch):
+    generate = hook("generate")
+    (tmp_path / "docs").mkdir()
+    monkeypatch.setattr(generate, "ROOT", tmp_path)
+    assert "No run has been recorded" in generate.recorded("blind")
     line = {"bench": "blind", "strict": True, "summary": True, "cases": 15, "seed": 3}
     rate = {"effect_exact_pct": 50.0, "effect_exact_95_pct": [18.7, 81.3], "effect_exact_cases": 10}
     entry = {"machine": "a machine", "date": "2026-01-01", "load": 0.5}
@@ -89,9 +112,12 @@ def test_runs_of_one_benchmark_stand_side_by_side_with_their_intervals(tmp_path,
         {**entry, "commit": "abcdef0123", "lines": [{**line, "label": "after"}]},
     ]
     (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": entries}))
-    page = generate.columns_of("blind")
-    assert "| | before, seed 3, commit `0123456` | after, seed 3, commit `abcdef0` |" in page
-    assert "| effects named exactly | 50 % [19, 81] of 10 | – |" in page
+    page = generate.recorded("blind")
+    newest, every = page.split("???")
+    assert "| | seed 3, commit `abcdef0`, 2026-01-01 |" in newest
+    assert "| effects named exactly | – |" in newest
+    assert "| | before, seed 3, commit `0123456` | after, seed 3, commit `abcdef0` |" in every
+    assert "| effects named exactly | 50 % [19, 81] of 10 | – |" in every
 
 
 def test_formulas_become_mathml_and_code_is_left_alone():

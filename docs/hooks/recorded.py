@@ -1,0 +1,177 @@
+"""Tables of docs/benchmarks.json: the newest lines that `aesi bench --json` printed, and how watched figures moved."""
+
+from __future__ import annotations
+
+import json
+import textwrap
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from flows.benchmarks.history import Entry, case_fields, case_of, figures, latest
+
+Line = dict[str, Any]
+LONG = 12
+"""Rows beyond which a table is folded away."""
+
+
+def table_of(bench: str, entries: Sequence[Entry]) -> str:
+    """What was recorded of a benchmark last: its lines, or where its runs are judged as a whole, the newest one."""
+    if bench in IN_COLUMNS:
+        return _side_by_side(bench, entries)
+    found = [(entry, line) for entry, line in latest(entries).values() if line["bench"] == bench]
+    if not found:
+        return _nothing(bench)
+    origins = dict.fromkeys(_origin(entry) for entry, _ in found)
+    return "\n".join([*(f"{text}\n" for text in origins), *_tables([line for _, line in found])])
+
+
+def over_time(entries: Sequence[Entry]) -> str:
+    """Every recorded value of the figures that should not get worse, folded away."""
+    moved: dict[tuple[Any, ...], list[str]] = {}
+    for entry in entries:
+        for line in entry.lines:
+            for figure, value in figures(line).items():
+                moved.setdefault((*case_of(line), figure), []).append(f"{_cell(float(value))} ({entry.date})")
+    rows = [
+        f"| {bench} | {', '.join(_cell(each) for each in case)} | {figure} | {' → '.join(values)} |"
+        for (bench, *case, figure), values in moved.items()
+    ]
+    table = ["| benchmark | case | figure | recorded |", "|---|---|---|---|", *rows]
+    return _folded(f"{len(rows)} figures", table)
+
+
+def _side_by_side(bench: str, entries: Sequence[Entry]) -> str:
+    """The newest labelled run, and folded away all of them, oldest first: what a change of method brought is seen."""
+    runs = [
+        (entry, line)
+        for entry in entries
+        for line in entry.lines
+        if line["bench"] == bench and line.get("label")
+    ]
+    if not runs:
+        return _nothing(bench)
+    newest, line = runs[-1]
+    shown = [(f"seed {line['seed']}, commit `{newest.commit[:7]}`, {newest.date}", line)]
+    every = [
+        (f"{line['label']}, seed {line['seed']}, commit `{entry.commit[:7]}`", line) for entry, line in runs
+    ]
+    parts = [*_columns(bench, shown), ""]
+    if len(every) > 1:
+        parts.append(
+            _folded(f"All {len(every)} recorded runs, each by the code of its day", _columns(bench, every))
+        )
+    return "\n".join(parts)
+
+
+def _columns(bench: str, runs: Sequence[tuple[str, Line]]) -> list[str]:
+    """A figure a row, and a run a column."""
+    rows = [
+        f"| {title} | " + " | ".join(_figure(line, key) for _, line in runs) + " |"
+        for key, title in IN_COLUMNS[bench]
+    ]
+    return ["| | " + " | ".join(head for head, _ in runs) + " |", "|---|" + "---:|" * len(runs), *rows]
+
+
+def _figure(line: Line, key: str) -> str:
+    """A rate with its interval and its cases, or a plain figure."""
+    if f"{key}_pct" not in line:
+        return _cell(line.get(key))
+    if line[f"{key}_pct"] is None or not line.get(f"{key}_95_pct"):
+        return "–"
+    low, high = line[f"{key}_95_pct"]
+    return f"{line[f'{key}_pct']:.0f} % [{low:.0f}, {high:.0f}] of {line[f'{key}_cases']}"
+
+
+def _tables(lines: Iterable[Line]) -> list[str]:
+    """One table for the lines of one kind: those that name their case by the same fields."""
+    kinds: dict[tuple[str, ...], list[Line]] = {}
+    for line in lines:
+        kinds.setdefault(case_fields(line), []).append(line)
+    return [_table(kinds[fields]) for fields in sorted(kinds, key=len)]
+
+
+def _table(lines: Sequence[Line]) -> str:
+    """Few values stand below each other; several lines become rows, many of them folded away."""
+    keys = [
+        key for key in dict.fromkeys(key for line in lines for key in line) if key not in ("bench", "summary")
+    ]
+    if len(lines) == 1:
+        (line,) = lines
+        body = [f"| {key} | {_cell(line[key])} |" for key in keys]
+        return "\n".join(["| figure | value |", "|---|---:|", *body, ""])
+    body = ["| " + " | ".join(_cell(line.get(key)) for key in keys) + " |" for line in lines]
+    table = ["| " + " | ".join(keys) + " |", "|" + "---|" * len(keys), *body]
+    return _folded(f"{len(lines)} lines", table) if len(lines) > LONG else "\n".join([*table, ""])
+
+
+def _folded(title: str, table: Sequence[str]) -> str:
+    return f'??? note "{title}"\n\n' + textwrap.indent("\n".join(table), "    ") + "\n"
+
+
+def _nothing(bench: str) -> str:
+    return f"No run has been recorded in this checkout; `aesi bench {bench}` makes one."
+
+
+def _origin(entry: Entry) -> str:
+    load = "" if entry.load is None else f", load {entry.load:.1f} at the start"
+    return f"Measured on {entry.machine}, {entry.date}, commit `{entry.commit[:7]}`{load}."
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, dict | list):
+        return f"`{json.dumps(value)}`"
+    return str(value).replace("|", "\\|")
+
+
+IN_COLUMNS = {
+    "blind": (
+        ("cases", "cases"),
+        ("not_made", "beside them, that the laboratory could not make"),
+        ("no_answer", "without an answer (out of time, or refused)"),
+        ("effect_exact", "effects named exactly"),
+        ("seen_exact", "the same, of those that say enough of unseen data to be named at all"),
+        ("effect_grouped", "effects named within a group of three"),
+        ("effect_lenient", "the same, listed alternatives counted as right"),
+        ("pair_both_named", "pairs, both named"),
+        ("stranger_unknown", "strangers called `unknown`"),
+        ("stranger_false_name", "names given to strangers"),
+        ("none_false_name", "names given where nothing is missing"),
+        ("effect_false_name", "names beside the right ones, or instead of them"),
+        ("false_name_beside_unknown", "wrong names beside `unknown`"),
+        ("fitted_called_found", "right and fitted to the noise, called `found`"),
+        ("after_over_noise_median", "error on unseen data over the noise, median"),
+        ("parameter_error_median", "largest relative error of a parameter, median"),
+        ("parameters_covered", "parameters inside their 90 % interval"),
+        ("processor_s_median", "processor seconds a case, median"),
+    ),
+    "real": (
+        ("ran", "cases"),
+        ("no_answer", "without an answer (out of time, or refused)"),
+        ("withheld_named", "temperatures named"),
+        ("withheld_within_2k", "temperatures within 2 K"),
+        ("withheld_course_rms_k_median", "course of the temperatures named, RMS, K, median"),
+        ("withheld_error_halved", "error on unseen data at least halved, of those named"),
+        ("warming_named", "records that warm up: heat or temperature named"),
+        ("fault_named", "faults named"),
+        ("wrong_soc0_silent", "wrong initial states without a name"),
+        ("wrong_soc0_error_median", "share of the wrong initial state left, median"),
+        ("physics_named", "contacts and capacity named"),
+        ("size_error_median", "relative error of the size, median"),
+        ("size_covered", "sizes inside their 90 % interval"),
+        ("control_silent", "controls without a name"),
+        ("control_matched_false", "controls with the name of a case matched to them"),
+        ("ageing_named", "ageing named, or rightly not"),
+        ("ageing_within_2pp", "capacity within 2 percentage points of the measured one"),
+        ("witness_within_15pct", "resistances within 15 % of the spectra's"),
+        ("witness_ohmic_off_median", "ohmic resistance off the spectrum's, share, median"),
+        ("witness_transfer_off_median", "charge transfer off the spectrum's, share, median"),
+        ("after_worse", "worse on unseen data than the better of declared and recalibrated"),
+        ("processor_s_median", "processor seconds a case, median"),
+        ("processor_s_total", "processor seconds of all"),
+    ),
+}
+"""Benchmarks whose runs stand side by side: key of a figure and what it is."""
