@@ -36,6 +36,7 @@ def discover(
     hold: Hold | None = None,
     effect_files: Sequence[str | PathLike[str]] = (),
     model: ModelName | None = None,
+    soh: float | None = None,
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Finding:
@@ -48,11 +49,12 @@ def discover(
     hold : how the current runs between rows; None takes what the records say.
     effect_files : Python files with effects of your own; they are run, so name only files that you trust.
     model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably.
+    soh : share of the cell file's capacity that the cell had then; None takes all of it.
     out : a folder for discovery.json, report.html and model/, and for fits, so that an interrupted search goes on.
 
     Raises AesiError, one sentence, for what cannot be read, decided or be of this cell.
     """
-    given, looked, tested = declared_model(cell), _listed(data), _listed(tests)
+    given, looked, tested = declared_model(cell).with_soh(soh), _listed(data), _listed(tests)
     rows = MOST_ROWS // max(1, len(looked) + len(tested))
     measurements, judged = (tuple(_read(one, rows, hold) for one in part) for part in (looked, tested))
     check_belongs(given.cell, [*measurements, *judged])

@@ -31,13 +31,15 @@ def impedance_file(
     effects: Sequence[tuple[str, Mapping[str, float]]] = (),
     effect_files: Sequence[Path] = (),
     model: ModelName | None = None,
+    soh: float | None = None,
 ) -> ComplexArray:
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
 
     cell : a BPX file, or a folder of a saved model, whose effects are taken.  frequencies : LOW:HIGH:N in Hz,
     log-spaced, or a CSV with a column frequency_hz.  model : "espm" or "dfn"; None takes that of a saved model.
+    soh : share of the file's capacity that the cell had then; None takes all of it.
     """
-    declared = declared_model(cell)
+    declared = declared_model(cell).with_soh(soh)
     hz = read_frequencies(frequencies)
     active = (*declared.effects, *activated(effects, effect_files))
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)

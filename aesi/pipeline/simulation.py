@@ -58,7 +58,7 @@ def simulate_file(
     say = say_notes or _silent
     profile = read_current(current, reading)
     say(profile.notes)
-    declared = _aged(declared_model(cell), soh)
+    declared = declared_model(cell).with_soh(soh)
     active = (*declared.effects, *activated(effects, effect_files))
     if self_heating:
         active = warmed(declared.cell, active)
@@ -106,7 +106,7 @@ def predict_file(
     say(profile.notes)
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
-    saved = _aged(HybridModel.load(model), soh)
+    saved = HybridModel.load(model).with_soh(soh)
     hybrid = replace(saved, hold=hold or saved.hold)
     if self_heating:
         hybrid = replace(hybrid, effects=warmed(hybrid.cell, hybrid.effects))
@@ -197,11 +197,6 @@ def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measureme
         file.name.split(".")[0],
         hold=hold,
     )
-
-
-def _aged(model: HybridModel, soh: float | None) -> HybridModel:
-    """The model with its cell at a state of health; as it is without one."""
-    return model if soh is None else replace(model, cell=model.cell.with_soh(soh))
 
 
 def _start(model: HybridModel, record: Measurement, soc0: float | None) -> InitialState:

@@ -143,6 +143,7 @@ def impedance(
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     model: options.ModelOption = None,
+    soh: options.Soh = None,
 ) -> None:
     """The physics model in the frequency domain, at rest."""
     from aesi.pipeline.impedance import impedance_file
@@ -156,6 +157,7 @@ def impedance(
         [options.effect_values(text) for text in effect or []],
         effect_file or [],
         model,
+        soh,
     )
     typer.echo(
         f"{out}: {len(z):,} frequencies, {1e3 * z.real.min():.4g} to {1e3 * z.real.max():.4g} mOhm", err=True
@@ -182,6 +184,7 @@ def discover(
         list[Path] | None, typer.Option("--test", help="Measurement that chooses nothing; may be repeated.")
     ] = None,
     soc0: options.Soc0 = None,
+    soh: options.Soh = None,
     holdout: Annotated[
         float, typer.Option(min=0.05, max=0.9, help="Last share of the data kept back, without --test.")
     ] = 0.3,
@@ -237,6 +240,7 @@ def discover(
         only or [],
         without or [],
         model,
+        soh,
     )
     options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
     flow(case, out, prefect)

@@ -27,9 +27,7 @@ EXPERIMENT = "discover"
 
 def check(case: Case) -> None:
     """Raise AesiError, one sentence, for a cell or an effect file that cannot be used."""
-    from aesi.pipeline.product.declared import declared_model
-
-    declared_model(case.cell)
+    case.declared()
     case.tried()
 
 
@@ -155,6 +153,7 @@ def _track_result(
             "data_digest": ", ".join(m.digest for m in case.measurements),
             "test": ", ".join(m.name for m in case.tests),
             "soc0": case.soc0,
+            "soh": case.soh,
             "holdout": case.holdout,
             "max_effects": case.max_effects,
             "seed": case.seed,

@@ -34,15 +34,17 @@ def case_of_files(
     only: Sequence[str] = (),
     without: Sequence[str] = (),
     model: ModelName | None = None,
+    soh: float | None = None,
 ) -> Case:
     """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
 
+    soh : share of the file's capacity that the cell had then; None takes all of it.
     Raises DataError where a file cannot be of the cell.
     """
     paths = (*data, *tests)
     rows = MOST_ROWS // max(1, len(paths))
     records = [read(path, reading or Reading(), max_rows=rows).held(hold) for path in paths]
-    check_belongs(declared_model(cell).cell, records)
+    check_belongs(declared_model(cell).with_soh(soh).cell, records)
     return Case(
         cell,
         tuple(records[: len(data)]),
@@ -55,6 +57,7 @@ def case_of_files(
         tuple(only),
         tuple(without),
         model,
+        soh,
     )
 
 
@@ -74,4 +77,5 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         wanted.max_effects,
         config.seed,
         model=config.cell.model,
+        soh=config.cell.soh,
     )

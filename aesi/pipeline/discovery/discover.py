@@ -40,6 +40,7 @@ class Case:
     cell : a BPX file, or a saved model or its folder, whose cell and effects are what is declared.
     only, without : ids of the effects that are tried, or are not; all where neither names one.
     model : "espm" or "dfn" for every hypothesis; None: that of a saved porous electrode, else what the data ask for.
+    soh : share of the cell's capacity that it had then; None takes all of it.
     """
 
     cell: Path | HybridModel
@@ -53,6 +54,11 @@ class Case:
     only: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     model: ModelName | None = None
+    soh: float | None = None
+
+    def declared(self) -> HybridModel:
+        """What the cell is declared to be.  Raises CellError or InputError for what cannot be read."""
+        return declared_model(self.cell).with_soh(self.soh)
 
     def tried(self) -> dict[str, Effect]:
         """The effects that compete.  Raises InputError for an effect file or an id that is none."""
@@ -61,7 +67,7 @@ class Case:
 
 def run_case(case: Case, out: Path | None = None, progress: Progress | None = None) -> Discovery:
     """Trace one case; fits are kept in `out`, so that the same case goes on where it was interrupted."""
-    given = declared_model(case.cell)
+    given = case.declared()
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
     return discover(

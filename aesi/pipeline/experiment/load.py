@@ -100,7 +100,7 @@ def _called(config: ExperimentConfig) -> str:
 
 def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
-    given = declared_model(path)
+    given = declared_model(path).with_soh(config.cell.soh)
     cell, effects = given.cell, (*given.effects, *_effects(config))
     model = config.cell.model or given.model
     sources = sources_of(config, path)

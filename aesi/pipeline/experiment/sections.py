@@ -111,6 +111,7 @@ class CellConfig(Section):
     belongs to the data set.
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
+    soh : share of the file's capacity that the cell had when it was measured; None takes all of it.
     model : espm, one particle an electrode, or dfn, the porous electrode; None takes that of a saved model, else espm.
     effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
     the user's own; they are run, so name only files that you trust.
@@ -120,6 +121,7 @@ class CellConfig(Section):
 
     bpx: str = "catalogue"
     soc0: Annotated[float, Field(ge=0, le=1)] | None = None
+    soh: Positive | None = None
     model: ModelName | None = None
     effects: dict[str, dict[str, float]] = {}
     effect_files: tuple[str, ...] = ()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -47,6 +47,10 @@ class HybridModel:
         parts = [f"cell {self.cell.name!r}", *(repr(effect) for effect in self.effects)]
         parts += [repr(part) for part in (self.correction, self.intervals, self.bands) if part is not None]
         return f"HybridModel({', '.join(parts)})"
+
+    def with_soh(self, soh: float | None) -> Self:
+        """A copy with the cell at a state of health, see `Cell.with_soh`; as it is for None."""
+        return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
 
     def predict(
         self,

@@ -2,8 +2,13 @@
 
 from pathlib import Path
 
-from aesi.pipeline.discovery.cases import case_of_experiment
+import pytest
+from small_experiment import BPX, SOC0, experiment, write_record
+
+from aesi.errors import CellError
+from aesi.pipeline.discovery.cases import case_of_experiment, case_of_files
 from aesi.pipeline.experiment.config import read_experiment
+from aesi.pipeline.experiment.load import load
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
 
@@ -15,3 +20,18 @@ def test_the_measured_case_is_judged_where_its_fit_ends(shared_data, monkeypatch
     assert case.measurements[0].time_s[-1] > 70_000
     assert case.measurements[-1].time_s[-1] == 4000
     assert case.tests[0].time_s[-1] == 8000
+
+
+def test_a_discovery_starts_from_a_cell_at_its_state_of_health(tmp_path):
+    record = write_record(tmp_path)
+    whole, aged = (case_of_files(BPX, [record], soh=soh).declared().cell for soh in (None, 0.9))
+    assert aged.capacity_ah == pytest.approx(0.9 * whole.capacity_ah)
+    with pytest.raises(CellError, match="a state of health of 90"):
+        case_of_files(BPX, [record], soh=90.0)
+
+
+def test_an_experiment_has_a_cell_at_its_state_of_health(tmp_path):
+    cell = {"bpx": str(BPX), "soc0": SOC0, "start": "declared"}
+    record = write_record(tmp_path)
+    whole, aged = (load(experiment(record, cell=c)).cell for c in (cell, cell | {"soh": 0.9}))
+    assert aged.capacity_ah == pytest.approx(0.9 * whole.capacity_ah)
