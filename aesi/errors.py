@@ -49,7 +49,7 @@ class FitError(AesiError, RuntimeError):
     """An estimation cannot be carried out on these data."""
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, known: Iterable[str]) -> str:
     """How a sentence about an unknown name goes on: the known one that is spelt most like it, where there is one."""
     from difflib import get_close_matches
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from aesi.errors import ParameterError, nearest
+from aesi.errors import ParameterError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -84,6 +84,6 @@ def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) ->
     for name in values:
         if name not in parameters:
             raise ParameterError(
-                f"unknown parameter {name!r}{nearest(name, parameters)} Known: {', '.join(parameters) or 'none'}."
+                f"unknown parameter {name!r}{did_you_mean(name, parameters)} Known: {', '.join(parameters) or 'none'}."
             )
     return {name: p.check(name, float(values.get(name, p.default))) for name, p in parameters.items()}

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aesi.data.fetch import Remote, fetch
-from aesi.errors import DataError, nearest
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.cache_folder import cache_folder
 
 FOLDER_VARIABLE = "AESI_DATA"
@@ -160,7 +160,7 @@ def find_set(name: str) -> DataSet:
         if one.name == name:
             return one
     names = [one.name for one in SETS]
-    raise DataError(f"There is no data set {name!r}{nearest(name, names)} Known: {', '.join(names)}.")
+    raise DataError(f"There is no data set {name!r}{did_you_mean(name, names)} Known: {', '.join(names)}.")
 
 
 def get(name: str, out: Path | None = None) -> Path:

@@ -19,7 +19,7 @@ from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, simulate_truth
 from aesi.data.profiles.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
-from aesi.errors import DataError, nearest
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
@@ -142,7 +142,7 @@ def _check(spec: CaseSpec, cells: Mapping[str, Path]) -> None:
         raise DataError(f"{spec.name}: there is no cell {spec.cell!r}; given are {', '.join(cells)}.")
     for name in spec.recipes:
         if name not in RECIPES and name not in STRANGERS:
-            known = nearest(name, [*RECIPES, *STRANGERS])
+            known = did_you_mean(name, [*RECIPES, *STRANGERS])
             raise DataError(f"{spec.name}: there is no recipe {name!r}{known}")
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.change import Change, Values
-from aesi.errors import DataError, nearest
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
@@ -23,7 +23,7 @@ def find_change(name: str) -> Change:
     """A change by id. Raises DataError for an unknown one, with the nearest."""
     if name not in CHANGES:
         raise DataError(
-            f"The laboratory knows no change {name!r}{nearest(name, CHANGES)} Known: {', '.join(CHANGES)}."
+            f"The laboratory knows no change {name!r}{did_you_mean(name, CHANGES)} Known: {', '.join(CHANGES)}."
         )
     return CHANGES[name]
 

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from aesi.data.readers.schedule import read_speed
-from aesi.errors import DataError, nearest
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 
 FOLDER = Path(__file__).parents[1] / "schedules"
@@ -44,7 +44,7 @@ def schedule(name: str) -> Schedule:
     """A bundled schedule. Raises DataError for an unknown name, with the nearest one."""
     if name not in TITLES:
         raise DataError(
-            f"There is no drive schedule {name!r}{nearest(name, TITLES)} Known: {', '.join(TITLES)}."
+            f"There is no drive schedule {name!r}{did_you_mean(name, TITLES)} Known: {', '.join(TITLES)}."
         )
     time_s, speed_m_s = read_speed(FOLDER / f"{name}.csv")
     return Schedule(name, TITLES[name], time_s, speed_m_s)

@@ -12,7 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from aesi.errors import InputError, nearest
+from aesi.errors import InputError, did_you_mean
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects.catalogue import CATALOGUE
 
@@ -72,7 +72,7 @@ def named_effect(name: str, known: Mapping[str, Effect]) -> Effect:
     if name in known:
         return known[name]
     raise InputError(
-        f"there is no effect {name!r} in the catalogue{nearest(name, known)} `aesi effects` lists them."
+        f"there is no effect {name!r} in the catalogue{did_you_mean(name, known)} `aesi effects` lists them."
     )
 
 
