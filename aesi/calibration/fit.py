@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import Model
-from aesi.calibration.parameters import free_parameters, with_films
+from aesi.calibration.parameters import free_parameters, with_interfaces
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
 from aesi.calibration.records.zero import zero_of
 from aesi.calibration.result import (
@@ -21,7 +21,7 @@ from aesi.calibration.result import (
     intervals,
     undetermined,
 )
-from aesi.calibration.rewind import capacities, rewound
+from aesi.calibration.rewind import capacities, rewound, serving
 from aesi.calibration.shapes import SPAN_K, Shapes
 from aesi.calibration.start import one_branch, sized, with_activation
 from aesi.constants import ZERO_CELSIUS_K
@@ -74,7 +74,8 @@ def calibrate(
     covariance = np.linalg.inv(scaled.T @ scaled)
     declared = _declared_errors(cell, model)
     rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
-    found, warmth = with_heat(rewound(model, x), model.records)
+    like = serving(model, x)
+    found, warmth = with_heat(rewound(model, x, like), model.records)
     return Calibration(
         cell=found,
         declared=cell,
@@ -84,8 +85,9 @@ def calibrate(
         errors=tuple(
             RecordError(r.name, _degc(r), b, a) for r, b, a in zip(model.records, declared, rms, strict=True)
         ),
-        capacities=capacities(model, x),
-        notes=(*notes, *_told(model, x), *warmth),
+        capacities=capacities(model, x, like),
+        like=like,
+        notes=(*notes, *_told(model, x), *_of_age(model, like), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
@@ -119,7 +121,7 @@ def problem(
     span = _span_k(start, ready)
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
-    start = with_films(start)
+    start = with_interfaces(start)
     model = Model(
         start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), zero, physics
     )
@@ -172,6 +174,15 @@ def _told(model: Model, x: Array) -> tuple[str, ...]:
                 f"{record.name}: fits with {100 * silicon:.0f} % of the silicon in the negative electrode."
             )
     return tuple(out)
+
+
+def _of_age(model: Model, like: int) -> tuple[str, ...]:
+    """A sentence on the record of whose age the file is, where there are several."""
+    if len(model.records) == 1:
+        return ()
+    return (
+        f"{model.records[like].name}: the file has the capacity that the cell had then, which serves all records best.",
+    )
 
 
 def _degc(record: Prepared) -> float | None:

@@ -90,7 +90,7 @@ FILMS = (
     "1 mohm m2 (5 nm of 2e5 ohm m) in PyBaMM's parameter sets, after Ramadass et al. 2004 as corrected by Safari et "
     "al. 2009"
 )
-FILM_ENERGY, FILM_ENERGY_SD = 60e3, 12e3
+FILM_ENERGY, FILM_ENERGY_SD = 50e3, 12e3
 FILM_ENERGIES = (
     "0.61 to 0.66 eV (59 to 64 kJ/mol) of the film on graphite, J. Power Sources 153 (2006) 391, "
     "doi:10.1016/j.jpowsour.2005.05.034, abstract"
@@ -198,8 +198,10 @@ def course(side: str, what: str, place: int) -> str:
     return f"{side}.{what}_at_{round(100 * PLACES[place])}_percent"
 
 
-def with_films(cell: Cell) -> Cell:
-    """The cell with typical films where its file has none: a calibration moves them from there."""
+def with_interfaces(cell: Cell) -> Cell:
+    """The cell with typical contacts and films where its file has none: a calibration moves them from there."""
+    if not cell.contact_resistance_ohm:
+        cell = replace(cell, contact_resistance_ohm=CONTACT_V / cell.nominal_capacity_ah)
     film = Constant(FILM_OHM_M2)
     for with_side, electrode in ((Cell.with_negative, cell.negative), (Cell.with_positive, cell.positive)):
         if electrode.film_ohm_m2 == NO_FILM:
