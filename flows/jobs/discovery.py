@@ -47,7 +47,10 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
 
     started = time.monotonic()
     if (out / ARCHIVE).exists():
-        console.say(f"Hypotheses already fitted for this case in {out} are taken up again.")
+        console.say(
+            f"{out} holds an earlier search: fits of the same cell and records are taken up again, and its finding is "
+            "replaced."
+        )
     tracker = _tracker(case, experiment, console)
     follow = Follow(tracker, console)
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
