@@ -85,7 +85,7 @@ class Grown:
         return {**self.on_bounds, **moved}
 
 
-class Growth:
+class EffectGrowth:
     """A parent and an effect that is being fitted on it.
 
     delta_v : one of the tried sizes, at which the effect's parameters are fitted.
@@ -225,7 +225,7 @@ def promise(parent: Parent, slopes_v: Array, delta_v: float) -> float:
     return score_at(parent.blocks, sums, x, np.vstack([fit.point.bounds, open_ends]), delta_v, 0.0).total
 
 
-def _scored(growth: Growth, u: Array, e: Array, jacobian: Array) -> Grown:
+def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
     inside = (u > growth.low + 1e-9) & (u < growth.high - 1e-9)  # a linear form cannot see a bound
     x = np.concatenate([fit.point.x[growth.rest], u[inside]])

@@ -15,7 +15,7 @@ from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
-from aesi.tracer.likelihood.growth import Grown, Growth, Parent
+from aesi.tracer.likelihood.growth import Grown, EffectGrowth, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
@@ -25,7 +25,7 @@ from aesi.tracer.search.plausible import most_plausible
 from aesi.tracer.search.reach import REACH, least_left_v
 
 FINALISTS = 6
-"""Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
+"""Effects that are fitted with the whole model: so many of the best. EffectGrowth is to first order in all that was there
 before, so that what it says of a right effect can be too little. On a blind development case (leakage and a resistance
 on the LG M50) the right second effect stood fifth to first order, with 10 nats, and first with 61 when fitted: three
 fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead of 22 s of processor."""
@@ -65,7 +65,7 @@ def searched(
     slopes: dict[str, Array] = {}
     first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
     if np.isfinite(allowed_v):
-        marks = list(side_by_side(Growth.marks, first))
+        marks = list(side_by_side(EffectGrowth.marks, first))
         least_v = least_left_v(base, marks, problem.white_v)
         if least_v > REACH * allowed_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
@@ -164,7 +164,7 @@ def _step(
     slopes: Mapping[str, Array],
     archive: Archive,
     report: Report,
-    begun: Sequence[Growth] = (),
+    begun: Sequence[EffectGrowth] = (),
 ) -> tuple[Step, list[str]]:
     """parents : the hypothesis that was chosen so far, then others to grow from.  begun : what grows on these."""
     best, places = parents[0], [Parent(problem, blocks, fit) for fit in parents]
@@ -190,7 +190,7 @@ def _step(
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
 
-def _grown(growths: Sequence[Growth], archive: Archive) -> tuple[list[Grown], list[str]]:
+def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grown], list[str]]:
     """Where they end, and why some of them could not be simulated."""
     grown, refused = [], []
     for growth, one in zip(growths, ended(growths, archive), strict=True):

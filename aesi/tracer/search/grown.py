@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from aesi.numerics.typing import Array
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.likelihood.growth import Grown, Growth, Parent, promise
+from aesi.tracer.likelihood.growth import Grown, EffectGrowth, Parent, promise
 from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive, fit_name
 
@@ -45,20 +45,22 @@ def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
     return not (problem.trust == "measured" and effect.of_design)
 
 
-def growths_on(parents: Iterable[Parent], slopes: Mapping[str, Array], archive: Archive) -> list[Growth]:
+def growths_on(
+    parents: Iterable[Parent], slopes: Mapping[str, Array], archive: Archive
+) -> list[EffectGrowth]:
     """All that is worth growing on these parents."""
     return [_growth(parent, name, archive) for parent in parents for name in promising(parent, slopes)]
 
 
-def _growth(parent: Parent, name: str, archive: Archive) -> Growth:
+def _growth(parent: Parent, name: str, archive: Archive) -> EffectGrowth:
     key, size = _key(parent, name), len(parent.problem.effects[name].parameters)
-    return Growth(parent, name, _growth_size(parent), archive.get(key, size), archive.near(key, size))
+    return EffectGrowth(parent, name, _growth_size(parent), archive.get(key, size), archive.near(key, size))
 
 
-def ended(growths: Sequence[Growth], archive: Archive) -> Iterable[Grown | None]:
+def ended(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown | None]:
     """Where they end, in the order given."""
 
-    def one(growth: Growth) -> Grown | None:
+    def one(growth: EffectGrowth) -> Grown | None:
         found = growth.ended()
         if found is not None:
             archive.put(_key(growth.parent, growth.effect), found.u)
@@ -67,7 +69,7 @@ def ended(growths: Sequence[Growth], archive: Archive) -> Iterable[Grown | None]
     return side_by_side(one, growths)
 
 
-def side_by_side(do: Callable[[Growth], T], growths: Sequence[Growth]) -> Iterator[T]:
+def side_by_side(do: Callable[[EffectGrowth], T], growths: Sequence[EffectGrowth]) -> Iterator[T]:
     """In threads, since simulations do not hold the interpreter's lock; in the order given, so that the outcome does
     not depend on how many threads there are."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
