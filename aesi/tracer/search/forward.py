@@ -15,7 +15,7 @@ from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
-from aesi.tracer.likelihood.growth import Grown, EffectGrowth, Parent
+from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
@@ -25,7 +25,7 @@ from aesi.tracer.search.plausible import most_plausible
 from aesi.tracer.search.reach import REACH, least_left_v
 
 FINALISTS = 6
-"""Effects that are fitted with the whole model: so many of the best. EffectGrowth is to first order in all that was there
+"""Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
 before, so that what it says of a right effect can be too little. On a blind development case (leakage and a resistance
 on the LG M50) the right second effect stood fifth to first order, with 10 nats, and first with 61 when fitted: three
 fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead of 22 s of processor."""

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from aesi.numerics.typing import Array
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.likelihood.growth import Grown, EffectGrowth, Parent, promise
+from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, promise
 from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive, fit_name
 
