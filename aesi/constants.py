@@ -1,10 +1,12 @@
-"""Constants of nature (CODATA 2018, exact), of clocks, and of the units of reports."""
+"""Constants of nature (CODATA 2018, exact), of clocks, of what a cell survives, and of the units of reports."""
 
 FARADAY_C_MOL = 96485.33212331001
 GAS_CONSTANT_J_MOL_K = 8.31446261815324
 SECONDS_PER_HOUR = 3600.0
 ZERO_CELSIUS_K = 273.15
 """Exact, as the units themselves."""
+COLDEST_DEGC, WARMEST_DEGC = -60.0, 150.0
+"""Of a cell: colder than any is cycled, warmer than any survives; kelvins lie above."""
 MV_PER_V = 1000.0
 MILLI = 1000.0
 """Thousandths in one: mohm of an ohm."""

@@ -4,6 +4,10 @@ Every error the package raises on purpose is an `AesiError`, so that the command
 sentence and an exit code. An expected failure inside a search is a value, `aesi.records.Failed`.
 """
 
+from __future__ import annotations
+
+from collections.abc import Iterable
+
 
 class AesiError(Exception):
     """Root of all errors raised on purpose; `exit_code` is what the command line returns."""
@@ -43,3 +47,11 @@ class SimulationError(AesiError, RuntimeError):
 
 class FitError(AesiError, RuntimeError):
     """An estimation cannot be carried out on these data."""
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """How a sentence about an unknown name goes on: the known one that is spelt most like it, where there is one."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name, list(known), n=1)
+    return f"; did you mean {near[0]!r}?" if near else "."

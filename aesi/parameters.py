@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from aesi.errors import ParameterError
+from aesi.errors import ParameterError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -81,13 +81,9 @@ def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) ->
 
     Raises ParameterError for an unknown name (with the nearest match) or a value out of bounds.
     """
-    from difflib import get_close_matches
-
     for name in values:
         if name not in parameters:
-            near = get_close_matches(name, list(parameters), n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else ""
             raise ParameterError(
-                f"unknown parameter {name!r}{hint} Known: {', '.join(parameters) or 'none'}."
+                f"unknown parameter {name!r}{did_you_mean(name, parameters)} Known: {', '.join(parameters) or 'none'}."
             )
     return {name: p.check(name, float(values.get(name, p.default))) for name, p in parameters.items()}

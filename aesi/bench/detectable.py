@@ -1,16 +1,21 @@
 """Can the effects of a labelled case be seen at all? What no finder with this likelihood could name is told apart.
 
 A case asks for a change of the voltage of some size, but initial state of charge and own parameters may take most of
-it up. What the hypothesis with all effects of the label says of unseen data more than the best one that lacks one of
-them is what there is to be seen.
+it up, and on a measured cell the errors that models of such cells have. What the hypothesis with all effects of the
+label says of unseen data more than the best one that lacks one of them is what there is to be seen.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from aesi.data.blind import BlindCase
 from aesi.physics import Cell
 from aesi.physics.simulation import ModelName
+from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
+from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import with_fine_numerics
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.fit import FittedHypothesis
@@ -31,14 +36,29 @@ def seen_nats(case: BlindCase) -> float | None:
     problem = with_fine_numerics(
         inverse_problem(Cell.from_bpx(case.declared), case.measurements, case.soc0, model=model)
     )
+    return _said_more(problem, case.effects)
+
+
+def seen_on_measured(
+    declared: Cell, data: Measurement, soc0: float | None, answers: Sequence[str]
+) -> float | None:
+    """Nats that the best of several right answers says more of unseen data than the declared model, where a model of a
+    measured cell errs as such models do; None where there is no right name, or none of them can be simulated."""
+    problem = replace(inverse_problem(declared, [data], soc0), trust="measured")
+    said = [_said_more(problem, (name,)) for name in answers]
+    return max((nats for nats in said if nats is not None), default=None)
+
+
+def _said_more(problem: InverseProblem, effects: tuple[str, ...]) -> float | None:
+    """Than the best hypothesis that lacks one of the effects, nats."""
     blocks = blocks_of(problem)
     archive = Archive(None, "")
 
     def fit(hypothesis: tuple[str, ...]) -> FittedHypothesis | None:
         return fitted_hypothesis(problem, blocks, hypothesis, None, archive)
 
-    whole = fit(case.effects)
+    whole = fit(effects)
     if whole is None:
         return None
-    rests = [fit(tuple(e for e in case.effects if e != name)) for name in case.effects]
+    rests = [fit(tuple(e for e in effects if e != name)) for name in effects]
     return whole.score.total - max((r.score.total for r in rests if r is not None), default=-float("inf"))

@@ -66,7 +66,8 @@ class Calibration:
 
     parameters : name -> value with its interval.  undetermined : combinations that the data leave open.
     at_bounds : parameters that ended on a bound.  errors : of each record.  capacities : share of the cell's capacity
-    that each record's has.  x, covariance : working vector and its covariance, for the posterior.
+    that each record's has.  like : index of the record of whose age the cell is.  x, covariance : working vector and
+    its covariance, for the posterior.
     """
 
     cell: Cell
@@ -76,6 +77,7 @@ class Calibration:
     at_bounds: tuple[str, ...]
     errors: tuple[RecordError, ...]
     capacities: Mapping[str, float]
+    like: int
     notes: tuple[str, ...]
     seconds: float
     model: Model

@@ -1,4 +1,9 @@
-"""The cell that is written: full and empty where the records show them, and as little aged as in the freshest."""
+"""The cell that is written: full and empty where the records show them, of the age that serves its records best.
+
+A cell ages between its tests, and a file has one capacity. A file is mostly simulated without a state of health, on
+currents as they were measured: so its age is that of one of its records, of the one with whose age all of them cost
+least as they were measured. What each record has more or less is its share in `capacities`.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +11,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.calibration.model import Model
-from aesi.calibration.shapes import SPAN_K
+from aesi.calibration.model import Model, saturated
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
 
 
-def rewound(model: Model, x: Array) -> Cell:
-    """The cell with full where its charged records started, and empty where it rests at its lower voltage."""
-    return _as_aged(model, x, *_freshest(model, x))
+def serving(model: Model, x: Array) -> int:
+    """The record of whose age the file is: as aged as in it, all records as measured together cost least."""
+    return min(range(len(model.records)), key=lambda index: _cost(model, _all_as_aged(model, x, index)))
 
 
-def capacities(model: Model, x: Array) -> dict[str, float]:
-    """Record -> share of the written cell's capacity that the cell had then."""
-    written_ah = rewound(model, x).capacity_ah
+def rewound(model: Model, x: Array, like: int) -> Cell:
+    """The cell with full where its charged records started, and empty where it rests at its lower voltage.
+
+    like : the record of whose age it is.
+    """
+    return _as_aged(model, x, model.material(like, x), model.silicon(like, x))
+
+
+def capacities(model: Model, x: Array, like: int) -> dict[str, float]:
+    """Record -> share of the written cell's capacity that the cell had then.  like : see `rewound`."""
+    written_ah = rewound(model, x, like).capacity_ah
     return {
         r.name: _as_aged(model, x, model.material(i, x), model.silicon(i, x)).capacity_ah / written_ah
         for i, r in enumerate(model.records)
@@ -28,7 +40,7 @@ def capacities(model: Model, x: Array) -> dict[str, float]:
 
 
 def _as_aged(model: Model, x: Array, material: float, silicon: float) -> Cell:
-    """`rewound`, with these shares of active material and silicon left."""
+    """The written cell with these shares of active material and silicon left."""
     cell = model.aged(model.cell_at(x), 1.0, silicon)
     charged = [
         r.start.soc + r.soc_sd * float(x[model.layout.soc(i)])
@@ -45,15 +57,17 @@ def _as_aged(model: Model, x: Array, material: float, silicon: float) -> Cell:
     return replace(model.aged(cell, material, 1.0), nominal_capacity_ah=model.cell.nominal_capacity_ah)
 
 
-def _freshest(model: Model, x: Array) -> tuple[float, float]:
-    """Shares of active material and silicon of the record near the reference temperature that has most capacity.
+def _all_as_aged(model: Model, x: Array, like: int) -> Array:
+    """The working vector with the age of one record in all, and the cycler's zero left in."""
+    out = x.copy()
+    out[model.layout.zero] = model.zero.nought
+    for index in range(len(model.records)):
+        out[model.layout.own(index)[1:]] = x[model.layout.own(like)[1:]]
+    return out
 
-    A file is that of a cell before the tests aged it; what a record has less is its share in `capacities`.
-    """
-    cell = model.cell
-    near = [
-        (model.material(i, x), model.silicon(i, x))
-        for i, r in enumerate(model.records)
-        if abs((r.mean_kelvin or cell.initial_temperature_k) - cell.reference_temperature_k) <= SPAN_K
-    ]
-    return max(near, key=lambda shares: _as_aged(model, x, *shares).capacity_ah, default=(1.0, 1.0))
+
+def _cost(model: Model, x: Array) -> float:
+    """Of the records alone, without the priors."""
+    return float(
+        sum(np.sum((w * saturated(e)) ** 2) for w, e in zip(model.weights, model.errors(x), strict=True))
+    )

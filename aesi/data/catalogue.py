@@ -9,11 +9,10 @@ from __future__ import annotations
 import os
 import shutil
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 
 from aesi.data.fetch import Remote, fetch
-from aesi.errors import DataError
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.cache_folder import cache_folder
 
 FOLDER_VARIABLE = "AESI_DATA"
@@ -160,9 +159,8 @@ def find_set(name: str) -> DataSet:
     for one in SETS:
         if one.name == name:
             return one
-    near = get_close_matches(name, [one.name for one in SETS], n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else "."
-    raise DataError(f"There is no data set {name!r}{hint} Known: {', '.join(one.name for one in SETS)}.")
+    names = [one.name for one in SETS]
+    raise DataError(f"There is no data set {name!r}{did_you_mean(name, names)} Known: {', '.join(names)}.")
 
 
 def get(name: str, out: Path | None = None) -> Path:

@@ -30,8 +30,6 @@ def convert_file(
 
     Raises DataError where it cannot be used as a measurement, or `out` cannot be written.
     """
-    if out.exists() and path.resolve() == out.resolve():
-        raise DataError(f"{out} is the file to convert; give another name.")
     record = read(path, reading or Reading(), max_rows=None)
     columns: dict[str, Array] = {
         "time_s": record.time_s,

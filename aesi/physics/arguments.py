@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any, get_args
 
+import numpy as np
+
+from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
 from aesi.errors import InputError
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
@@ -55,6 +58,21 @@ def check_soc(soc0: Any) -> None:
         raise InputError(
             f"soc0 = {soc0!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
             "so 90 % is 0.9."
+        )
+
+
+def check_temperature(temperature_degc: Any, name: str = "temperature_degc") -> None:
+    """Raises InputError for a temperature in degC, or an array of them, that is no cell's, such as one in kelvin.
+
+    name : how the sentence calls it.
+    """
+    given = np.asarray(temperature_degc, dtype=float)
+    absurd = given[~((given >= COLDEST_DEGC) & (given <= WARMEST_DEGC))]  # this way round, NaN is absurd too
+    if absurd.size:
+        kelvin = " (in kelvin? 298.15 K is 25 degC)" if absurd[0] > WARMEST_DEGC else ""
+        raise InputError(
+            f"{name} = {absurd[0]:g} degC is outside {COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC, where no cell works"
+            f"{kelvin}; give degrees Celsius."
         )
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array, ComplexArray
-from aesi.physics.arguments import check_choice
+from aesi.physics.arguments import check_choice, check_temperature
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
 from aesi.physics.effect import ActiveEffect, Record, Trace
@@ -57,15 +57,16 @@ def impedance(
     frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows.  effects, model : as in
     `simulate`.
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
-    Raises DataError for frequencies or a state that have none.
+    Raises DataError for frequencies or a state that have none, InputError for what is no cell's temperature.
     """
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
-    if frequency.ndim != 1 or not (np.isfinite(frequency).all() and (frequency > 0.0).all()):
-        raise DataError("frequency_hz has to be one row of positive numbers.")
+    if frequency.ndim != 1 or not (
+        np.isfinite(frequency).all() and (frequency > 0.0).all() and len(frequency)
+    ):
+        raise DataError("frequency_hz has to be one row of positive numbers, at least one.")
     active = tuple(effects)
+    check_temperature(temperature_degc)
     kelvin = _shifted(active, temperature_degc + ZERO_CELSIUS_K)
-    if not np.isfinite(kelvin) or kelvin <= 0.0:
-        raise DataError("temperature_degc has to be a number above -273.15 degC.")
     check_choice("model", model, ModelName)
     changed = model_with(cell, active)
     rest = np.array(changed.cell.stoichiometries(soc))

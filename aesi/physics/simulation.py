@@ -19,7 +19,7 @@ from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics import depletion
-from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
+from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Record, Trace
@@ -65,8 +65,8 @@ def simulate(
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
     Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated; InputError for
-    another model, hold or on_depletion, for what is no Cell, no effect or no state of charge, and for an effect that
-    the model already holds.
+    another model, hold or on_depletion, for what is no Cell, no effect, no state of charge or no temperature of a cell,
+    and for an effect that the model already holds.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)
@@ -218,10 +218,9 @@ def _kelvin(temperature_degc: Array | float | None, time: Array) -> Array | None
     if temperature_degc is None:
         return None
     kelvin = np.asarray(temperature_degc, dtype=float) + ZERO_CELSIUS_K
-    if kelvin.shape not in ((), time.shape) or not np.isfinite(kelvin).all() or not (kelvin > 0).all():
-        raise DataError(
-            f"temperature_degc has to be one value or {len(time)} finite ones, above -273.15 degC."
-        )
+    if kelvin.shape not in ((), time.shape) or not np.isfinite(kelvin).all():
+        raise DataError(f"temperature_degc has to be one value or {len(time)} finite ones.")
+    check_temperature(temperature_degc)
     return np.ascontiguousarray(np.broadcast_to(kelvin, time.shape))
 
 

@@ -12,6 +12,7 @@ from aesi.calibration.start import sized
 from aesi.data.read import Reading, read
 from aesi.physics import ModelName
 from aesi.pipeline.belonging import check_belongs
+from aesi.pipeline.calibrate import check_records
 from aesi.pipeline.discovery.cases import MOST_ROWS
 from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
@@ -85,6 +86,7 @@ def calibrate(
     given = declared_model(cell)
     declared, physics = given.cell, model or given.model
     measurements = [_read(one, None, hold) for one in _listed(data)]
+    check_records(measurements, temperatures_degc)
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     return fit_cell(declared, measurements, soc0=soc0, temperatures_degc=temperatures_degc, physics=physics)
 

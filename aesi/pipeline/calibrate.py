@@ -15,8 +15,10 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
+from aesi.physics.arguments import check_temperature
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.pipeline.belonging import check_belongs
+from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
@@ -54,6 +56,7 @@ def calibrate_files(
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
     asked = request or Request()
+    check_records(measurements, asked.temperatures_degc)
     given = declared_model(cell)
     declared, model = given.cell, asked.model or given.model
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
@@ -82,6 +85,13 @@ def calibrate_files(
 
         write_nyquist(out.with_suffix(".nyquist.html"), found.cell.name, spectra)
     return content
+
+
+def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
+    """Raises InputError for a record that is given twice, or a temperature of one that no cell has."""
+    check_distinct(measurements)
+    for name, value in (temperatures_degc or {}).items():
+        check_temperature(value, f"the temperature of {name}")
 
 
 def _made_from(found: Calibration) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from flows.commands import options
+from flows.commands import options, outputs
 
 
 @options.reads_files
@@ -37,6 +37,7 @@ def batch(
     ] = None,
 ) -> None:
     """One discovery a cell, a summary of all; check-ups of one specimen as a trend. Goes on where it was stopped."""
+    outputs.check_folder(out)
     options.say_reading([source])
     from aesi.errors import InputError
     from aesi.pipeline.batch.job import Settings

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from aesi.errors import InputError
-from flows.commands import options
+from flows.commands import options, outputs
 
 
 @options.reads_files
@@ -27,6 +27,7 @@ def simulate(
     self_heating: options.SelfHeating = False,
 ) -> None:
     """The physics model alone, under a current profile."""
+    outputs.check_file(out, [cell, current])
     from aesi.pipeline.simulation import simulate_file
 
     run = simulate_file(
@@ -63,6 +64,7 @@ def predict(
     self_heating: options.SelfHeating = False,
 ) -> None:
     """A saved hybrid model with its intervals."""
+    outputs.check_file(out, [current])
     from aesi.pipeline.simulation import predict_file
 
     rows = predict_file(
@@ -115,6 +117,7 @@ def calibrate(
     model: options.ModelOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements of any temperatures together."""
+    outputs.check_file(out, [cell, *data])
     options.say_reading(data)
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
@@ -146,6 +149,7 @@ def impedance(
     soh: options.Soh = None,
 ) -> None:
     """The physics model in the frequency domain, at rest."""
+    outputs.check_file(out, [cell, Path(frequencies)])
     from aesi.pipeline.impedance import impedance_file
 
     z = impedance_file(
@@ -214,6 +218,8 @@ def discover(
     prefect: options.PrefectOption = True,
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
+    if out is not None:
+        outputs.check_folder(out)
     if experiment is not None:
         options.say_reading([experiment])
         from flows.jobs.start import discover_experiment
@@ -252,6 +258,7 @@ def export(
     out: Annotated[Path, typer.Option(help="File to write: .json for bpx, .py for pybamm.")],
 ) -> None:
     """A cell, and what was found about it, for other tools; says what they cannot hold."""
+    outputs.check_file(out, [cell])
     from aesi.pipeline.export import export as write
 
     done = write(cell, out, to)

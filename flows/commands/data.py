@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from flows.commands import complete, options
+from flows.commands import complete, options, outputs
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
 
@@ -32,6 +32,8 @@ def get(
     out: Annotated[Path | None, typer.Option(help="Folder to put it in; the cache without it.")] = None,
 ) -> None:
     """Fetch a data set, check it against its checksums and convert it."""
+    if out is not None:
+        outputs.check_folder(out)
     from aesi.data import catalogue
 
     typer.echo(str(catalogue.get(name, out)))
@@ -52,6 +54,7 @@ def convert(
     ] = "aesi",
 ) -> None:
     """Write a measurement as CSV in SI units, and say what was done to it."""
+    outputs.check_file(out, [file])
     from aesi.data.convert import convert_file, record_lines
 
     record = convert_file(file, out, reading, to)

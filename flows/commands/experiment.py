@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from flows.commands import options
+from flows.commands import options, outputs
 
 Experiment = Annotated[Path, typer.Argument(help="An experiment file, for instance experiments/smoke.yaml.")]
 Overrides = Annotated[
@@ -84,6 +84,7 @@ def compare(
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
 ) -> None:
     """Tracked runs side by side on one offline page: what differed, what came of it, where the error is."""
+    outputs.check_file(out)
     from flows.results.compare import compare as write
 
     shown = write(runs, out, uri)
@@ -96,6 +97,7 @@ def candidate(
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
 ) -> None:
     """A candidate of a search made again from the tracking store alone, with its model."""
+    outputs.check_folder(out)
     from flows.base.console import Console
     from flows.results.candidate import Differs, rebuild, said, save
 

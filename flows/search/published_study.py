@@ -22,20 +22,12 @@ from optuna.trial import TrialState, create_trial
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.records import Failed
 from aesi.sparse import Genome
+from aesi.sparse.search.genome import GENE_WORDS
 from aesi.sparse.search.genome_space import GenomeSpace
 from flows.base import environment
 from flows.search.nsga2 import Constraints
 from flows.search.term_sampler import distributions, widened
 
-NAMES = {
-    "lambda1": "ridge (lambda1)",
-    "lambda2": "threshold (lambda2)",
-    "tau": "least inclusion (tau)",
-    "p_c": "highest order (p_c)",
-    "d": "total degree (d)",
-    "feedback": "feedback of the error",
-}
-"""Gene -> what the dashboard calls it."""
 LOSSES = ("loss out of bag", "loss on validation", "terms")
 CANDIDATE = "candidate"
 
@@ -97,7 +89,7 @@ class PublishedStudy:
         self, number: int, genome: Genome, outcome: ScoredCandidate | Failed
     ) -> optuna.trial.FrozenTrial:
         genes: dict[str, tuple[Any, BaseDistribution]] = {
-            NAMES[gene]: (getattr(genome, gene), distribution)
+            GENE_WORDS[gene]: (getattr(genome, gene), distribution)
             for gene, distribution in widened(distributions(self._space), genome).items()
         }
         noted: dict[str, Any] = {CANDIDATE: number, "terms offered": int(genome.mask(self._space.size).sum())}

@@ -23,6 +23,7 @@ MAY = {
     "aesi/pipeline/experiment/judging/evaluate.py": "judges the models, already chosen",
     "aesi/pipeline/api.py": "takes them from the caller",
     "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
+    "aesi/pipeline/distinct.py": "refuses what is fitted too",
     "aesi/pipeline/batch": "hands the files of each cell on",
     "aesi/pipeline/discovery/cases.py": "reads the files",
     "aesi/pipeline/discovery/finding.py": "tells what a reader did to them",

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench.detectable import seen_on_measured
 from aesi.bench.limit import NoAnswer, Stopwatch, answer_of
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import capacity_row, course_row, witness_row
@@ -66,7 +67,7 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
     if isinstance(found, NoAnswer):
         return row | found.row | {"effects": [], "named": False} | spent.row
     answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
-    return row | answer | spent.row
+    return row | answer | spent.row | {"seen_nats": seen_on_measured(declared, data, soc0, case.answers)}
 
 
 def _cell(name: str, folder: Path) -> Path:

@@ -17,6 +17,7 @@ FIGURES: Mapping[str, tuple[str, str]] = {
     "withheld_error_halved_pct": ("error on unseen data at most halved by it, %", "100"),
     "warming_named_pct": ("records that warm up: heat or temperature named, %", ""),
     "fault_named_pct": ("faults put in and named, %", "90 or more"),
+    "fault_seen_named_pct": ("of faults that stand out of what such models err by, named, %", "90 or more"),
     "size_error_median": ("error of their size, share, median", "0.10 or less"),
     "size_covered_pct": ("true size within its 90 % interval, %", "85 to 95"),
     "physics_named_pct": ("contacts and capacities put in and named, %", ""),

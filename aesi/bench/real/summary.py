@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench import CaseRow
+from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NO_ANSWER
 from aesi.bench.scoring import rate
 
@@ -18,9 +19,9 @@ conventions."""
 NEAR_PP = 2.0
 NEAR_SHARE = 0.15
 HALVED = 0.5
-"""Of the recalibrated error."""
+"""Of the declared error."""
 WORSE = 1.05
-"""Of the declared error; as where the tracer warns."""
+"""Of the better of the declared and the recalibrated error; as where the tracer warns."""
 SOC0 = "wrong_soc0"
 
 
@@ -51,6 +52,7 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
             "warming_named"
         ),
         **rate(faults, "named").named("fault_named"),
+        **rate(_seen(faults), "named").named("fault_seen_named"),
         "fault_named_by_kind": _by_kind(faults),
         **rate(of("physics"), "named").named("physics_named"),
         "size_error_median": _median(sized, "size_error"),
@@ -69,11 +71,8 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
 
 
 def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
-    """A mean counts where the temperature is named; the course is that of the written model, whatever is named."""
-    near = [
-        {"near": r["named"] and abs(r["mean_off_k"]) <= NEAR_K} if "mean_off_k" in r else {"near": False}
-        for r in rows
-    ]
+    """The size counts that stands beside the name; the course is that of the written model, whatever is named."""
+    near = [{"near": "size_found" in r and abs(r["size_found"] - r["size_true"]) <= NEAR_K} for r in rows]
     halved = [{"halved": _at_most(r, HALVED)} for r in rows if r["named"] and _errors(r)]
     return {
         **rate(rows, "named").named("withheld_named"),
@@ -81,6 +80,11 @@ def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
         "withheld_course_rms_k_median": _median([r for r in rows if r["named"]], "course_rms_k"),
         **rate(halved, "halved").named("withheld_error_halved"),
     }
+
+
+def _seen(rows: Sequence[CaseRow]) -> list[CaseRow]:
+    """Of which the right name says enough of unseen data to be admitted."""
+    return [r for r in rows if r.get("seen_nats") is not None and r["seen_nats"] > SEEN_NATS]
 
 
 def _initial_state(rows: Sequence[CaseRow]) -> CaseRow:

@@ -48,6 +48,11 @@ class Zero:
         """A, at a working coordinate."""
         return self.mean_a + self.sd_a * z
 
+    @property
+    def nought(self) -> float:
+        """The working coordinate at which currents stay as they were measured."""
+        return -self.mean_a / self.sd_a
+
     def taken_out(self, record: Measurement, nominal_ah: float) -> Measurement:
         """A slow record without the mean; others as they are."""
         if not is_slow(record, nominal_ah):

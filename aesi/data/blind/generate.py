@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +19,7 @@ from aesi.data.laboratory.instrument import Instrument
 from aesi.data.laboratory.simulator import Applied, LaboratoryModel, Setup, TrueRun, simulate_truth
 from aesi.data.profiles.profile import Profile
 from aesi.data.virtual import nominal_capacity_ah
-from aesi.errors import DataError
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
@@ -143,9 +142,8 @@ def _check(spec: CaseSpec, cells: Mapping[str, Path]) -> None:
         raise DataError(f"{spec.name}: there is no cell {spec.cell!r}; given are {', '.join(cells)}.")
     for name in spec.recipes:
         if name not in RECIPES and name not in STRANGERS:
-            near = get_close_matches(name, [*RECIPES, *STRANGERS], n=1)
-            hint = f"; did you mean {near[0]!r}?" if near else "."
-            raise DataError(f"{spec.name}: there is no recipe {name!r}{hint}")
+            known = did_you_mean(name, [*RECIPES, *STRANGERS])
+            raise DataError(f"{spec.name}: there is no recipe {name!r}{known}")
 
 
 def _prepare(spec: CaseSpec, cells: Mapping[str, Path], rng: np.random.Generator) -> _Bench:

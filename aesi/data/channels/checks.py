@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 
@@ -18,8 +19,6 @@ HIGHEST_VOLTAGE_V = 6.0
 """No lithium cell reaches it, and two in series exceed it."""
 HIGHEST_PLAIN_VOLT = 1000.0
 """A typical voltage above it is one in millivolts."""
-TEMPERATURE_RANGE_DEGC = (-60.0, 150.0)
-"""Colder than any cell is cycled, warmer than any survives; kelvins lie above."""
 HIGHEST_CURRENT_A = 20_000.0
 """Above what any single cell takes; a smaller current in mA is told by `check_scale`."""
 ENOUGH_ROWS = 10
@@ -106,14 +105,14 @@ def check_ranges(columns: Columns, context: Context) -> None:
         )
     temperature = columns.get("temperature_degc")
     if temperature is not None:
-        low, high = TEMPERATURE_RANGE_DEGC
-        absurd = (temperature < low) | (temperature > high)
+        absurd = (temperature < COLDEST_DEGC) | (temperature > WARMEST_DEGC)
         if np.any(absurd):
             row = int(np.argmax(absurd))
-            kelvin = " (in kelvin? --unit temperature_degc=K)" if temperature[row] > high else ""
+            kelvin = " (in kelvin? --unit temperature_degc=K)" if temperature[row] > WARMEST_DEGC else ""
             raise DataError(
                 f"{context.at('temperature_degc', row)}: {temperature[row]:.6g} degC is outside "
-                f"{low:g} to {high:g} degC{kelvin}; correct the column or leave it out: --column temperature_degc=."
+                f"{COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; correct the column or leave it "
+                "out: --column temperature_degc=."
             )
 
 

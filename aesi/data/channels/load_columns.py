@@ -121,6 +121,12 @@ def _of_number(
     return keep_rows(data, context, keep)
 
 
+def _asked(reading: Reading) -> list[str]:
+    """The options that cut a record in time, as they are typed."""
+    ends = {"--from-s": reading.start_s, "--to-s": reading.stop_s}
+    return [f"{option} {value:g}" for option, value in ends.items() if value is not None]
+
+
 def _window(data: Columns, context: Context, reading: Reading, notes: list[str]) -> tuple[Columns, Context]:
     if reading.start_s is None and reading.stop_s is None:
         return data, context
@@ -130,8 +136,8 @@ def _window(data: Columns, context: Context, reading: Reading, notes: list[str])
     keep = np.flatnonzero((time >= low) & (time <= high))
     if len(keep) < 2:
         raise DataError(
-            f"{context.file}: {len(keep)} rows lie between {low:g} s and {high:g} s; its times run from "
-            f"{np.nanmin(time):g} s to {np.nanmax(time):g} s."
+            f"{context.file}: {' '.join(_asked(reading))} leaves {len(keep)} of its rows, and a record needs two; its "
+            f"times run from {np.nanmin(time):g} s to {np.nanmax(time):g} s."
         )
     if len(keep) < len(time):
         ends = [f"before {low:g} s"] * (reading.start_s is not None)

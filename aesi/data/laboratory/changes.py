@@ -7,14 +7,13 @@ Nothing here is shared with the room that looks for effects; that is what makes 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.laboratory.change import Change, Values
-from aesi.errors import DataError
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
@@ -23,9 +22,9 @@ CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 def find_change(name: str) -> Change:
     """A change by id. Raises DataError for an unknown one, with the nearest."""
     if name not in CHANGES:
-        near = get_close_matches(name, CHANGES, n=1, cutoff=0.5)
-        hint = f"; did you mean {near[0]!r}?" if near else "."
-        raise DataError(f"The laboratory knows no change {name!r}{hint} Known: {', '.join(CHANGES)}.")
+        raise DataError(
+            f"The laboratory knows no change {name!r}{did_you_mean(name, CHANGES)} Known: {', '.join(CHANGES)}."
+        )
     return CHANGES[name]
 
 

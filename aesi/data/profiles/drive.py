@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
 
 from aesi.data.readers.schedule import read_speed
-from aesi.errors import DataError
+from aesi.errors import DataError, did_you_mean
 from aesi.numerics.typing import Array
 
 FOLDER = Path(__file__).parents[1] / "schedules"
@@ -44,8 +43,8 @@ class Schedule:
 def schedule(name: str) -> Schedule:
     """A bundled schedule. Raises DataError for an unknown name, with the nearest one."""
     if name not in TITLES:
-        near = get_close_matches(name, TITLES, n=1)
-        hint = f"; did you mean {near[0]!r}?" if near else "."
-        raise DataError(f"There is no drive schedule {name!r}{hint} Known: {', '.join(TITLES)}.")
+        raise DataError(
+            f"There is no drive schedule {name!r}{did_you_mean(name, TITLES)} Known: {', '.join(TITLES)}."
+        )
     time_s, speed_m_s = read_speed(FOLDER / f"{name}.csv")
     return Schedule(name, TITLES[name], time_s, speed_m_s)

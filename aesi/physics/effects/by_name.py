@@ -6,14 +6,13 @@ import copyreg
 import importlib.util
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from functools import lru_cache
 from hashlib import sha256
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from aesi.errors import InputError
+from aesi.errors import InputError, did_you_mean
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects.catalogue import CATALOGUE
 
@@ -72,9 +71,9 @@ def named_effect(name: str, known: Mapping[str, Effect]) -> Effect:
     """One of `known`.  Raises InputError with the nearest match for an unknown id."""
     if name in known:
         return known[name]
-    near = get_close_matches(name, list(known), n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else "."
-    raise InputError(f"there is no effect {name!r} in the catalogue{hint} `aesi effects` lists them.")
+    raise InputError(
+        f"there is no effect {name!r} in the catalogue{did_you_mean(name, known)} `aesi effects` lists them."
+    )
 
 
 def load_effect(path: str | PathLike[str]) -> Effect:

@@ -67,7 +67,7 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
     cell = cell_path(config)
     fit, test = discovery_records(config, wanted, cell)
     if not fit:
-        raise ConfigError("discover.fit names no record; give at least one to look at.")
+        raise ConfigError(f"{config.name}: discover.fit names no record; give at least one to look at.")
     return Case(
         cell,
         fit,

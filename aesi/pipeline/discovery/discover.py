@@ -15,6 +15,7 @@ from aesi.constants import MV_PER_V
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
+from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -55,6 +56,10 @@ class Case:
     without: tuple[str, ...] = ()
     model: ModelName | None = None
     soh: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raises DataError for a record that is given twice."""
+        check_distinct(self.measurements, self.tests)
 
     def declared(self) -> HybridModel:
         """What the cell is declared to be.  Raises CellError or InputError for what cannot be read."""

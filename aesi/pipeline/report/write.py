@@ -79,7 +79,10 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         ],
         rest=words.rest_finding(view.discovery),
         moved=_moved_rows(view.discovery),
-        candidates=sorted(view.discovery["candidates"], key=lambda row: -row["score"]),
+        candidates=[
+            row | {"title": hypotheses.hypothesis_title(row, view.titles)}
+            for row in sorted(view.discovery["candidates"], key=lambda row: -row["score"])
+        ],
     )
 
 

@@ -17,6 +17,16 @@ from aesi.errors import InputError
 from aesi.numerics.typing import BoolArray
 from aesi.sparse.terms.library import Library
 
+GENE_WORDS = {
+    "lambda1": "ridge (lambda1)",
+    "lambda2": "threshold (lambda2)",
+    "tau": "least inclusion (tau)",
+    "p_c": "highest order (p_c)",
+    "d": "total degree (d)",
+    "feedback": "feedback of the error",
+}
+"""Gene -> what a page calls it."""
+
 
 @dataclass(frozen=True)
 class Genome:

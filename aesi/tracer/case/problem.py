@@ -183,6 +183,11 @@ class InverseProblem:
         return np.concatenate([r.white_v[: r.n_fit] for r in self.records])
 
     @cached_property
+    def noise_v(self) -> float:
+        """Root mean square of the white noise of the fitted rows, V."""
+        return float(np.sqrt(np.mean(self.white_v**2)))
+
+    @cached_property
     def slices(self) -> tuple[slice, ...]:
         """Rows of each record."""
         ends = np.cumsum([r.n_fit for r in self.records])

@@ -31,7 +31,7 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
         coarse = problem.run(data, record.soc0, problem.fixed, record.thin_hold).voltage_v
         moved.append(problem.run(data, record.soc0, effects, record.thin_hold).voltage_v - coarse)
     shift = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
-    return replace(problem, fixed=effects) if shift > NOTABLE_SHARE * _noise_v(problem) else problem
+    return replace(problem, fixed=effects) if shift > NOTABLE_SHARE * problem.noise_v else problem
 
 
 @dataclass(frozen=True)
@@ -73,8 +73,4 @@ def reduction_of(problem: InverseProblem) -> Reduction | None:
             moved.append(full - reduced)
     except AesiError:
         return None
-    return Reduction(float(np.sqrt(np.mean(np.concatenate(moved) ** 2))), _noise_v(problem))
-
-
-def _noise_v(problem: InverseProblem) -> float:
-    return float(np.sqrt(np.mean(problem.white_v**2)))
+    return Reduction(float(np.sqrt(np.mean(np.concatenate(moved) ** 2))), problem.noise_v)

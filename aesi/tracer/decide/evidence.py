@@ -17,7 +17,6 @@ from aesi.tracer.decide.verdict import (
     Thresholds,
     Verdict,
     judged,
-    noise_v,
     partly,
     tolerance_v,
     unexplained_v,
@@ -30,7 +29,7 @@ from aesi.tracer.search.fitted import base_of
 from aesi.tracer.search.forward import refitted, searched
 from aesi.tracer.search.path import Path, Report
 from aesi.tracer.search.plausible import most_plausible
-from aesi.tracer.search.wrong_parameters import with_wrong_parameters
+from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters
 
 MEASURED_EFFECTS = 1
 """Named beside `unknown`: what is left after one is mostly no larger than what models of measured cells leave, and of
@@ -61,7 +60,7 @@ def gathered(
     def path_of(trust: Trust) -> Path:
         if trust not in paths:
             most = min(max_effects, MEASURED_EFFECTS) if trust == "measured" else max_effects
-            allowed_v = np.inf if trust == "measured" else _allowed_v(problem, thresholds)
+            allowed_v = np.inf if trust == "measured" else tolerance_v(problem, thresholds)
             found = searched(
                 replace(problem, trust=trust), most, _enough(problem, thresholds), archive, report, allowed_v
             )
@@ -76,7 +75,7 @@ def gathered(
     path = path_of("tight")
     verdict = judged(path, thresholds)
     if verdict.word != "unknown":
-        wrong = with_wrong_parameters(path, archive)
+        wrong = with_wrong_parameters(path, max_effects, archive)
         if wrong is not path:
             path, verdict = wrong, judged(wrong, thresholds)
     if verdict.word == "found":
@@ -87,6 +86,7 @@ def gathered(
         found = exact, judged(exact, thresholds)
         if believed((path, verdict), found):
             path, verdict = found
+    verdict = consistent(path, verdict)
     recalibrations = _recalibrations(problem, paths["tight"], archive)
     recalibrated = _recalibrated(problem, recalibrations)
     if verdict.word != "unknown":
@@ -95,6 +95,8 @@ def gathered(
     options = [one for one in recalibrations if _borne_out(one)]
     options.append(Option.of(measured.problem, blocks, measured.base))
     named = None
+    if path.beyond_reach_v is not None:
+        path = measured  # the only one that tried anything
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, thresholds)
         named = Option.of(measured.problem, blocks, measured.chosen) if verdict.effects else None
@@ -105,17 +107,12 @@ def gathered(
 
 def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
     """Does a hypothesis leave no more on unseen data than a right one may?"""
-    allowed_v = _allowed_v(problem, thresholds)
+    allowed_v = tolerance_v(problem, thresholds)
 
     def enough(blocks: Blocks, fit: FittedHypothesis) -> bool:
         return unexplained_v(problem, blocks, fit, allowed_v) <= allowed_v
 
     return enough
-
-
-def _allowed_v(problem: InverseProblem, thresholds: Thresholds) -> float:
-    """What a right hypothesis may leave beyond the noise on unseen data, V."""
-    return tolerance_v(float(np.sqrt(np.mean(problem.white_v**2))), thresholds)
 
 
 def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
@@ -136,6 +133,23 @@ def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:
     return most_plausible(fits, len(exact.competing())) is base
 
 
+def consistent(path: Path, verdict: Verdict) -> Verdict:
+    """`unknown` in place of a verdict that rests on declared parameters further off than cell files are, unnamed.
+
+    A smooth record can be fitted to the noise by what no cell has: the 1C discharge of the NMC cell by itself, a
+    development record, by another potential with conductivity, initial state and voltage offset four deviations off.
+    """
+    beyond = beyond_spread(path.problem, path.chosen) if path.problem.trust == "tight" else []
+    if verdict.word == "unknown" or not beyond:
+        return verdict
+    names = " + ".join(path.chosen.hypothesis) or "no effect"
+    reason = (
+        f"{names} explains the data only with {', '.join(beyond)} further from what the cell file declares than cell "
+        "files are off by"
+    )
+    return replace(verdict, word="unknown", effects=(), groups=(), reason=reason, margin=0.0)
+
+
 def _sharpened(
     problem: InverseProblem, path: Path, verdict: Verdict, archive: Archive, thresholds: Thresholds
 ) -> tuple[Path, Verdict]:
@@ -146,7 +160,7 @@ def _sharpened(
         return path, verdict
     if most_plausible([path.chosen, found.chosen], len(problem.competing())) is path.chosen:
         return path, verdict
-    allowed = tolerance_v(noise_v(found), thresholds)
+    allowed = tolerance_v(found.problem, thresholds)
     left = unexplained_v(found.problem, found.blocks, found.chosen, allowed)
     return (path, verdict) if left > allowed else (found, replace(verdict, structured_v=left))
 
@@ -193,8 +207,7 @@ def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive) -> l
 
 def _recalibrated(problem: InverseProblem, recalibrations: Sequence[Option]) -> ModelState:
     """The recalibration that carries best, the declared model where there is none."""
-    best = carries_best(recalibrations)
-    return ModelState(problem) if best is None else best.state
+    return carries_best(recalibrations).state if recalibrations else ModelState(problem)
 
 
 def _adopted(

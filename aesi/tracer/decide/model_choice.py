@@ -17,7 +17,7 @@ from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
 from aesi.tracer.decide.evidence import Evidence, believed
-from aesi.tracer.decide.verdict import Thresholds, noise_v, structured_v, tolerance_v
+from aesi.tracer.decide.verdict import Thresholds, structured_v, tolerance_v
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.path import Path, lowers_error, unseen_rmse_v
 
@@ -87,6 +87,6 @@ def with_single_particle(full: Evidence, single: Evidence) -> bool:
 
 def _explains(path: Path, reduction: Reduction) -> bool:
     """Could what the two models differ by be all that a search leaves beyond what a right hypothesis may?"""
-    allowed_v = tolerance_v(noise_v(path), Thresholds())
+    allowed_v = tolerance_v(path.problem, Thresholds())
     left_v = structured_v(path, path.chosen) if path.beyond_reach_v is None else path.beyond_reach_v
     return left_v - reduction.shift_v <= allowed_v

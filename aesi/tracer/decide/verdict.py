@@ -68,14 +68,9 @@ def beyond(rmse_v: float, noise_v: float) -> float:
     return float(np.sqrt(max(rmse_v**2 - noise_v**2, 0.0)))
 
 
-def noise_v(path: Path) -> float:
-    """Root mean square of the white noise of the fitted rows, V."""
-    return float(np.sqrt(np.mean(path.problem.white_v**2)))
-
-
 def structured_v(path: Path, one: Explanation) -> float:
     """What a hypothesis leaves beyond noise on blocks that it has not seen, V."""
-    return beyond(unseen_rmse_v(path.blocks, one), noise_v(path))
+    return beyond(unseen_rmse_v(path.blocks, one), path.problem.noise_v)
 
 
 def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, allowed_v: float) -> float:
@@ -88,18 +83,18 @@ def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, all
     told_v2 = problem.white_v**2 + allowed_v**2
     counts = told_v2 / (told_v2 + prediction_sd_v(problem, blocks, one) ** 2)
     square = float(np.mean(counts * held_out_residual(blocks, one) ** 2))
-    return beyond(float(np.sqrt(square)), float(np.sqrt(np.mean(problem.white_v**2))))
+    return beyond(float(np.sqrt(square)), problem.noise_v)
 
 
-def tolerance_v(noise: float, thresholds: Thresholds) -> float:
+def tolerance_v(problem: InverseProblem, thresholds: Thresholds) -> float:
     """What a right hypothesis may leave on unseen data beyond the noise, V."""
-    return float(np.hypot(thresholds.noise_share * noise, thresholds.solver_v))
+    return float(np.hypot(thresholds.noise_share * problem.noise_v, thresholds.solver_v))
 
 
 def judged(path: Path, thresholds: Thresholds) -> Verdict:
     """The verdict on a search with the declared parameters believed as of a careful parametrisation; its confidence is
     still to be read off the margin."""
-    allowed = tolerance_v(noise_v(path), thresholds)
+    allowed = tolerance_v(path.problem, thresholds)
     left = unexplained_v(path.problem, path.blocks, path.chosen, allowed)
     before = structured_v(path, path.base)
     if left > allowed:

@@ -39,10 +39,10 @@ def worst_ratio(one: Option, options: Sequence[Option]) -> float:
     return float(np.max(np.array(one.left_out.by_record) / least))
 
 
-def carries_best(options: Sequence[Option]) -> Option | None:
-    """The model that is never far worse than another one on a record left out: of the least worst ratio, the first
-    where several are as good. A mean over the records would let one gain much and another lose it."""
-    return min(options, key=lambda one: worst_ratio(one, options), default=None)
+def carries_best(options: Sequence[Option]) -> Option:
+    """Of at least one model that which is never far worse than another one on a record left out: of the least worst
+    ratio, the first where several are as good. A mean over the records would let one gain much and another lose it."""
+    return min(options, key=lambda one: worst_ratio(one, options))
 
 
 def written(
@@ -59,7 +59,7 @@ def written(
     preferred = [declared] if named is None or fault is not None else [named, declared]
     options = [*preferred, *own]
     as_good = [one for one in preferred if worst_ratio(one, options) <= AS_GOOD]
-    best = as_good[0] if as_good else carries_best(options) or declared
+    best = as_good[0] if as_good else carries_best(options)
     if named is None or best is named:
         return best.state, None
     names = " + ".join(named.state.hypothesis)

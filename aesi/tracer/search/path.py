@@ -82,4 +82,4 @@ def lowers_error(before_v: float, after_v: float) -> bool:
 
 def beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:
     """V**2 beyond the noise on unseen data."""
-    return max(unseen_rmse_v(blocks, fit) ** 2 - float(np.mean(problem.white_v**2)), 0.0)
+    return max(unseen_rmse_v(blocks, fit) ** 2 - problem.noise_v**2, 0.0)

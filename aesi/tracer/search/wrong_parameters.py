@@ -20,13 +20,13 @@ WRONG_SDS = 2.0
 convention: of values that scatter as the spread says, one in twenty lies further off."""
 
 
-def with_wrong_parameters(path: Path, archive: Archive) -> Path:
+def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
     """The path with those declared parameters as effects that the data put beyond what cell files are off by.
 
-    One at a time, that which says most: another one may only have made up for it.
+    One at a time, that which says most: another one may only have made up for it. `most` names in all.
     """
     chosen = path.chosen
-    while beyond := _beyond_spread(path.problem, chosen):
+    while len(chosen.hypothesis) < most and (beyond := beyond_spread(path.problem, chosen)):
         fits = [
             fitted_hypothesis(path.problem, path.blocks, (*chosen.hypothesis, owner), chosen, archive)
             for owner in beyond
@@ -42,7 +42,7 @@ def with_wrong_parameters(path: Path, archive: Archive) -> Path:
     return replace(path, steps=(*path.steps, step), chosen=chosen)
 
 
-def _beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
+def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
     """Ids of the effects whose own parameters are off by more than files are, with 95 % probability."""
     sds = np.sqrt(np.diagonal(fit.score.covariance))
     owners = [

@@ -60,6 +60,65 @@ def test_a_file_nested_without_end_is_one_sentence(call, tmp_path, current, name
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    ("command", "read", "out"),
+    [
+        ("simulate", "--current", "current"),
+        ("simulate", "--cell", "cell"),
+        ("calibrate", "--cell", "cell"),
+        ("calibrate", "--data", "current"),
+        ("export", "--cell", "cell"),
+    ],
+)
+def test_a_file_that_is_read_is_never_written_over(call, cell, current, tmp_path, command, read, out):
+    mine = {"cell": tmp_path / "mine.json", "current": tmp_path / "mine.csv"}
+    mine["cell"].write_bytes(Path(cell).read_bytes())
+    mine["current"].write_bytes(Path(current).read_bytes())
+    before = mine[out].read_bytes()
+    given = {"--cell": mine["cell"]}
+    given |= {"export": {"--to": "bpx"}, "simulate": {"--current": mine["current"]}}.get(
+        command, {"--data": mine["current"]}
+    )
+    assert given[read] == mine[out]
+    code, _, err = call(command, *(word for pair in given.items() for word in pair), "--out", mine[out])
+    assert code == 2
+    assert "is a file that is read, and would be lost; give another name" in err
+    assert mine[out].read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("command", "made", "words"),
+    [
+        ("simulate", "folder", "is a folder; name the file to write"),
+        ("calibrate", "folder", "is a folder; name the file to write"),
+        ("discover", "file", "is a file; name a folder"),
+        ("discover", "file/below", "is a file, not a folder"),
+    ],
+)
+def test_what_cannot_be_written_is_told_before_anything_is_computed(
+    call, cell, current, tmp_path, command, made, words
+):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").write_text("kept")
+    read = "--current" if command == "simulate" else "--data"
+    code, _, err = call(command, "--cell", cell, read, current, "--out", tmp_path / made)
+    assert code == 2
+    assert words in err
+    assert err.startswith("aesi: ")  # not even the line that it is reading
+    assert (tmp_path / "file").read_text() == "kept"
+
+
+def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
+    code, _, err = call(
+        "impedance",
+        *("--cell", cell, "--soc", 0.5, "--frequencies", "0.1:10:5"),
+        *("--temperature-degc", 298.15, "--out", tmp_path / "z.csv"),
+    )
+    assert code == 2
+    assert "in kelvin? 298.15 K is 25 degC" in err
+    assert not (tmp_path / "z.csv").exists()
+
+
 def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):
     def broken(*_):
         raise RuntimeError("odd\nand more")

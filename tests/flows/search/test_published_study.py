@@ -8,9 +8,10 @@ import pytest
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, evaluate
+from aesi.sparse.search.genome import GENE_WORDS
 from aesi.sparse.search.genome_space import GenomeSpace
 from flows.search.nsga2 import Constraints
-from flows.search.published_study import LOSSES, NAMES, PublishedStudy, journal, study_storage
+from flows.search.published_study import LOSSES, PublishedStudy, journal, study_storage
 
 
 @pytest.fixture
@@ -35,7 +36,7 @@ def test_the_study_died_with_the_process(publish, candidate, said):
     again = optuna.load_study(study_name="one", storage=study_storage())
     done, failed = again.get_trials()
     assert tuple(done.values) == candidate.losses
-    assert set(done.params) == set(NAMES.values())
+    assert set(done.params) == set(GENE_WORDS.values())
     assert done.params["ridge (lambda1)"] == candidate.genome.lambda1
     assert done.user_attrs["coverage on validation, %"] == 91.0
     assert list(done.constraints) == [

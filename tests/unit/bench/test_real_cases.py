@@ -128,6 +128,7 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
         "answer": ["current_sensor_offset"],
         "source": "put in",
         "put_in": "current_offset 0.1",
+        "seen_nats": 9.0,
         "record": "x/drive",
         "processor_s": 1.0,
         "residual": {
@@ -142,6 +143,13 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
         ("current_sensor_offset",),
         {"current_sensor_offset.offset_a": 0.1},
         content("current_sensor_offset", parameters=estimate),
+    )
+    unseen = row | {"case": "current_offset-0.01-x", "seen_nats": 0.4, "named": False}
+    both = summary([row, unseen])
+    assert (both["fault_named_pct"], both["fault_seen_named_pct"], both["fault_seen_named_cases"]) == (
+        50.0,
+        100.0,
+        1,
     )
     last = summary([row])
     assert last["fault_named_pct"] == 100.0
@@ -177,6 +185,9 @@ def test_a_control_that_shows_the_name_of_its_matched_case_is_counted():
     assert last["control_matched_false_cases"] == 1
     assert last["control_false_names"] == {"given": ["ambient_temperature"], "other": ["ocp_shape"]}
     assert last["withheld_within_2k_pct"] == 0.0
+    sized = fault | {"named": True, "size_found": -13.0, "size_true": -14.1}
+    assert summary([sized])["withheld_within_2k_pct"] == 100.0
+    assert summary([sized | {"size_found": -10.0}])["withheld_within_2k_pct"] == 0.0
 
 
 def test_the_resistances_of_a_circuit_are_read_off_its_spectrum():

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from aesi.physics import Cell, simulate
+from aesi.physics.cell.relations import Constant
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
-KINETIC_ENERGY, FILM_OHM = 52e3, 4e-3
+KINETIC_ENERGY, CONTACT_OHM, FILM_OHM_M2 = 52e3, 4e-3, 2e-3
 
 
 @pytest.fixture(scope="session")
@@ -24,7 +25,9 @@ def start() -> Cell:
 def truth(start) -> Cell:
     cell = start.with_negative(rate_ea_j_mol=KINETIC_ENERGY, diffusivity_ea_j_mol=40e3)
     cell = cell.with_positive(rate_ea_j_mol=KINETIC_ENERGY)
-    return replace(cell, contact_resistance_ohm=FILM_OHM)
+    film = {"film_ohm_m2": Constant(FILM_OHM_M2), "film_ea_j_mol": KINETIC_ENERGY}
+    cell = cell.with_negative(**film).with_positive(**film)
+    return replace(cell, contact_resistance_ohm=CONTACT_OHM)
 
 
 def pulses(cell: Cell, degc: float, name: str) -> Measurement:

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError, SimulationError
-from aesi.physics import Cell, simulate
+from aesi.errors import DataError, InputError, SimulationError
+from aesi.physics import Cell, impedance, simulate
 from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effects import CATALOGUE
 
@@ -166,6 +166,14 @@ def test_a_voltmeters_offset_is_taken_off_the_rest_voltage(lg_m50):
 def test_arrays_that_cannot_be_simulated_are_refused(nmc, time, current, words):
     with pytest.raises(DataError, match=words):
         simulate(nmc, np.array(time, dtype=float), np.array(current, dtype=float), soc0=0.5)
+
+
+@pytest.mark.parametrize("temperature_degc", [298.15, [25.0, 298.15], -100.0])
+def test_a_temperature_that_no_cell_has_is_refused(nmc, temperature_degc):
+    with pytest.raises(InputError, match="is outside -60 to 150 degC"):
+        simulate(nmc, [0.0, 1.0], [0.0, 0.0], 0.5, temperature_degc=temperature_degc)
+    with pytest.raises(InputError, match="is outside -60 to 150 degC"):
+        impedance(nmc, [1.0], 0.5, temperature_degc=np.ravel(temperature_degc)[-1])
 
 
 def test_neither_state_of_charge_nor_rest_voltage_is_refused(nmc):

@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 from small_experiment import BPX, SOC0, experiment, write_record
 
-from aesi.errors import CellError
+from aesi.data import read_measurement
+from aesi.errors import CellError, DataError, InputError
+from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_experiment, case_of_files
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.load import load
@@ -28,6 +30,25 @@ def test_a_discovery_starts_from_a_cell_at_its_state_of_health(tmp_path):
     assert aged.capacity_ah == pytest.approx(0.9 * whole.capacity_ah)
     with pytest.raises(CellError, match="a state of health of 90"):
         case_of_files(BPX, [record], soh=90.0)
+
+
+def test_a_record_that_is_fitted_cannot_judge(tmp_path):
+    record = write_record(tmp_path)
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(record.read_bytes())
+    with pytest.raises(DataError, match="both among the data and the tests; what is fitted cannot judge"):
+        case_of_files(BPX, [record], [copy])
+    with pytest.raises(DataError, match="is there twice among the data; give it once"):
+        case_of_files(BPX, [record, record])
+
+
+def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_path):
+    record = read_measurement(write_record(tmp_path))
+    with pytest.raises(DataError, match="twice among the data"):
+        calibrate_files(BPX, [record, record], tmp_path / "new.json")
+    kelvin = Request(temperatures_degc={record.name: 298.15})
+    with pytest.raises(InputError, match=f"the temperature of {record.name} = 298.15 degC is outside"):
+        calibrate_files(BPX, [record], tmp_path / "new.json", kelvin)
 
 
 def test_an_experiment_has_a_cell_at_its_state_of_health(tmp_path):

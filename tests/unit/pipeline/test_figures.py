@@ -152,11 +152,42 @@ def test_the_caption_of_the_bootstrap_states_mean_and_expectation():
     assert "mean 65.0 %" in fig.layout.meta["caption"]
 
 
+def test_the_caption_of_the_terms_says_what_their_names_are_made_of():
+    rows = [{"term": "T1(I)*T1(c_eL)", "importance": 2.0}, {"term": "sin(I_60s)", "importance": 1.0}]
+    caption = ensemble.importance_figure(rows).layout.meta["caption"]
+    assert "Chebyshev" in caption
+    assert "I, the current; c_eL, electrolyte concentration at the positive collector" in caption
+    assert "I_60s, the current smoothed over 60 s" in caption
+    assert "c_sp" not in caption
+
+
 def test_hypotheses_are_ranked_and_the_chosen_marked(views):
     discovery = views.discovery_view(200).discovery
     fig = hypotheses.ranking_figure(discovery["candidates"], {}, ["self_heating"])
     assert fig.layout.yaxis.categoryarray[-1] == "★ self heating"
     assert fig.layout.yaxis.categoryarray[0] == "placebo"
+
+
+def test_a_hypothesis_that_shares_its_score_names_the_others():
+    rows = [
+        {
+            "effect": "series_resistance",
+            "kind": "physics",
+            "score": 3000.0,
+            "hypothesis": ["series_resistance"],
+        },
+        {
+            "effect": "porosity",
+            "kind": "parameter",
+            "score": 3001.0,
+            "hypothesis": ["series_resistance", "porosity"],
+        },
+    ]
+    fig = hypotheses.ranking_figure(rows, {}, ["series_resistance"])
+    assert list(fig.layout.yaxis.categoryarray) == [
+        "★ series resistance",
+        "porosity, beside series resistance",
+    ]
 
 
 def test_a_kind_nobody_foresaw_is_still_shown():

@@ -10,6 +10,7 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
+from aesi.tracer.decide.evidence import consistent
 from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v, unexplained_v
 from aesi.tracer.decide.written import Option, carries_best, worst_ratio, written
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
@@ -19,6 +20,7 @@ from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
 from aesi.tracer.search.fitted import values_without
 from aesi.tracer.search.forward import searched
+from aesi.tracer.search.wrong_parameters import with_wrong_parameters
 
 NEVER = Archive(None, "")
 
@@ -52,6 +54,30 @@ def test_what_is_left_beyond_the_tolerance_is_unknown_and_names_nothing(path):
     assert left_v == pytest.approx(structured_v(path, path.base), rel=0.05)  # few parameters, well known
     generous = judged(bare, Thresholds(solver_v=0.1))
     assert generous.word == "none"
+
+
+def test_what_needs_declared_parameters_that_no_cell_has_is_unknown(path):
+    verdict = judged(path, Thresholds())
+    assert consistent(path, verdict) == verdict
+    place = [f.key for f in path.chosen.free].index(("solid_diffusivity", "positive_factor"))
+    x = path.chosen.point.x.copy()
+    x[place] = 3.9
+    covariance = path.chosen.score.covariance.copy()
+    covariance[place, place] = 0.5**2
+    point, score = replace(path.chosen.point, x=x), replace(path.chosen.score, covariance=covariance)
+    far = replace(path, chosen=replace(path.chosen, point=point, score=score))
+    told = consistent(far, verdict)
+    assert (told.word, told.effects, told.groups, told.margin) == ("unknown", (), (), 0.0)
+    assert "ocv_hysteresis explains the data only with solid_diffusivity further" in told.reason
+    covariance[place, place] = 2.0**2  # may as well be as declared
+    assert consistent(far, verdict) == verdict
+
+
+def test_no_more_names_than_were_asked_for_are_given_to_wrong_parameters(path):
+    x = np.where([f.owner == "solid_diffusivity" for f in path.chosen.free], 3.9, path.chosen.point.x)
+    far = replace(path, chosen=replace(path.chosen, point=replace(path.chosen.point, x=x)))
+    assert with_wrong_parameters(far, 1, NEVER) is far
+    assert with_wrong_parameters(far, 2, NEVER).chosen.hypothesis == ("ocv_hysteresis", "solid_diffusivity")
 
 
 def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):

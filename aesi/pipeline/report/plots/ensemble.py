@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,18 @@ if TYPE_CHECKING:
 
 MOST_TERMS = 30
 """Bars beyond this many are too thin to read; the rest is in coefficients.json."""
+VARIABLES = {
+    "e": "the voltage error fed back",
+    "I": "the current",
+    "I_next": "the current of the next row",
+    "c_sp": "concentration at the surface of the positive particles",
+    "c_sn": "concentration at the surface of the negative particles",
+    "c_e0": "electrolyte concentration at the negative collector",
+    "c_eL": "electrolyte concentration at the positive collector",
+    "soc": "state of charge",
+}
+"""Inputs of the sparse model -> what a caption calls them."""
+VARIABLE, FILTERED = re.compile(r"\(([\w.]+)\)"), re.compile(r"I_[\d.]+s")
 POWERS_FROM = 30.0
 """From this ratio of the largest to the smallest loss on, an axis shows enough powers of ten to be read by."""
 
@@ -74,7 +87,7 @@ def importance_figure(terms: Sequence[Row]) -> Figure | None:
     rows = sorted(rows, key=lambda row: -abs(row["importance"]))
     caption = (
         "Importance of each term by singular value decomposition of the columns term times coefficient; "
-        f"the intercept is left out.{_cut_note(len(rows))}"
+        f"the intercept is left out.{_cut_note(len(rows))}{_symbols(rows)}"
     )
     return _bars(
         rows, [abs(row["importance"]) for row in rows], "Ranking of the terms", caption, "importance, -"
@@ -185,6 +198,18 @@ def _log_axis(values: Sequence[float]) -> dict[str, Any]:
 
 def _tall(bars: int) -> int:
     return max(220, 110 + 18 * bars)
+
+
+def _symbols(terms: Sequence[Row]) -> str:
+    """What the names of these terms are made of, in sentences; empty where nothing has to be said."""
+    text = " ".join(row["term"] for row in terms)
+    used = dict.fromkeys(VARIABLE.findall(text))
+    words = [f"{name}, {VARIABLES[name]}" for name in VARIABLES if name in used]
+    words += [
+        f"{name}, the current smoothed over {name[2:-1]} s" for name in used if FILTERED.fullmatch(name)
+    ]
+    polynomials = " T1, T2, ...: Chebyshev polynomials." if "T1(" in text else ""
+    return polynomials + (f" Variables, scaled to their trained range: {'; '.join(words)}." if words else "")
 
 
 def _cut_note(n: int) -> str:

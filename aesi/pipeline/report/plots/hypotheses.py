@@ -16,11 +16,12 @@ MOST_HYPOTHESES = 30
 
 
 def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen: Sequence[str]) -> Figure:
-    """Score of every hypothesis, best on top, coloured and hatched by kind; a star marks those added."""
+    """Score of every hypothesis, best on top, coloured and hatched by kind; a star marks what was added."""
     rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES][::-1]
     caption = (
         "Score of each hypothesis: evidence over the declared model, in nats. A difference of 2.3 nats is odds of ten "
-        "to one; higher is better, and below zero the declared model explains the data better."
+        "to one; higher is better, and below zero the declared model explains the data better. What stands beside "
+        "another effect shares the score of both."
     )
     if any(row["kind"] == "placebo" for row in rows):
         caption += " The placebo has parameters but no physics."
@@ -91,6 +92,15 @@ def dependence_bars(rows: Sequence[Row], found: bool) -> Figure:
     return fig
 
 
+def hypothesis_title(row: Row, titles: Mapping[str, str]) -> str:
+    """An effect as it did best: by itself, or beside the others of its hypothesis, whose score it shares."""
+    name, *others = (
+        titles.get(effect, effect.replace("_", " "))
+        for effect in dict.fromkeys((row["effect"], *row.get("hypothesis", ())))
+    )
+    return f"{name}, beside {' and '.join(others)}" if others else name
+
+
 def _label(row: Row, titles: Mapping[str, str], chosen: Sequence[str]) -> str:
-    name = titles.get(row["effect"], row["effect"].replace("_", " "))
-    return f"★ {name}" if row["effect"] in chosen else name
+    title = hypothesis_title(row, titles)
+    return f"★ {title}" if row["effect"] in chosen else title

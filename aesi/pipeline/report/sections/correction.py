@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from aesi.pipeline.report.plots import ensemble
 from aesi.pipeline.report.sections.section import ReportSection
 from aesi.pipeline.report.views import RunView
+from aesi.sparse.search.genome import GENE_WORDS
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -20,7 +21,7 @@ def _figures(view: RunView) -> dict[str, Figure]:
 
 
 def _settings(view: RunView) -> Mapping[str, Any]:
-    return view.settings
+    return {GENE_WORDS.get(name, name): value for name, value in view.settings.items()}
 
 
 SECTION = ReportSection(
