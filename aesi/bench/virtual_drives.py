@@ -9,7 +9,7 @@ judging the physics.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -21,10 +21,11 @@ from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.experiment.drives import cut_repeats
+from aesi.pipeline.experiment.drives import HALVES, cut_repeats
 from aesi.pipeline.experiment.sections import RepeatsConfig
+from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
-from aesi.records import ErrorSeries, Measurement, Split
+from aesi.records import ErrorSeries, Measurement, Run, Split
 from aesi.sparse import with_inputs
 
 SplitLayout = Literal["repeats", "schedules", "beyond", "one"]
@@ -54,10 +55,18 @@ DrawnValues = dict[str, float]
 
 def virtual_splits(cell: Cell, layout: SplitLayout, count: int, seed: int = 0) -> Iterator[Split]:
     """`count` virtual cells under one drive, each with another set of undeclared differences."""
-    profiles = PROFILES[layout](cell.capacity_ah)
     rng = np.random.default_rng(seed)
+    declared = {
+        role: [_declared(cell, profile) for profile in profiles]
+        for role, profiles in PROFILES[layout](cell.capacity_ah).items()
+    }
     for _ in range(count):
-        yield _split(cell, profiles, rng)
+        yield _split(cell, declared, rng)
+
+
+def cuts_of(layout: SplitLayout) -> int:
+    """Into how many parts an experiment cuts a drive of the layout to leave them out in turn."""
+    return HALVES if layout in ("repeats", "beyond") else 1
 
 
 def random_effects(cell: Cell, rng: np.random.Generator) -> tuple[ActiveEffect, ...]:
@@ -140,11 +149,30 @@ PROFILES: dict[SplitLayout, Callable[[float], dict[str, tuple[Profile, ...]]]] =
 }
 
 
-def _split(cell: Cell, profiles: dict[str, tuple[Profile, ...]], rng: np.random.Generator) -> Split:
+@dataclass(frozen=True, eq=False)
+class _Declared:
+    """A drive of the declared cell: its run, and what each parameter is worth along it (n, k), V a deviation."""
+
+    profile: Profile
+    run: Run
+    slopes_v: Array
+
+
+def _declared(cell: Cell, profile: Profile) -> _Declared:
+    record = Measurement(profile.time_s, profile.current_a, np.zeros(len(profile)), name=profile.name)
+    run = simulate(cell, profile.time_s, profile.current_a, profile.soc0)
+    slopes = slopes_v(cell, (), record, profile.soc0, "linear", "espm", run.voltage_v)
+    return _Declared(profile, run, slopes)
+
+
+def _split(cell: Cell, declared: dict[str, list[_Declared]], rng: np.random.Generator) -> Split:
     for _ in range(MOST_TRIES):
         made = _Made(random_effects(cell, rng), OPEN_CIRCUIT_V * rng.standard_normal(OPEN_CIRCUIT_TERMS))
         try:
-            series = {role: tuple(_series(cell, made, p, rng) for p in ps) for role, ps in profiles.items()}
+            series = {
+                role: tuple(_series(cell, made, one, rng) for one in drives)
+                for role, drives in declared.items()
+            }
         except SimulationError:  # the cell with these effects cannot give that charge
             continue
         if "record" not in series:
@@ -158,10 +186,11 @@ def _split(cell: Cell, profiles: dict[str, tuple[Profile, ...]], rng: np.random.
     )
 
 
-def _series(cell: Cell, made: _Made, profile: Profile, rng: np.random.Generator) -> ErrorSeries:
+def _series(cell: Cell, made: _Made, declared: _Declared, rng: np.random.Generator) -> ErrorSeries:
+    profile = declared.profile
     truth = simulate(cell, profile.time_s, profile.current_a, profile.soc0, made.effects)
-    declared = simulate(cell, profile.time_s, profile.current_a, profile.soc0)
     noise = NOISE_V * rng.standard_normal(len(profile))
     voltage: Array = truth.voltage_v + chebval(2 * truth.series["soc"] - 1, made.open_circuit_v) + noise
     measured = Measurement(profile.time_s, profile.current_a, voltage, name=profile.name)
-    return with_inputs(error_series(measured, declared, DT_S), INPUTS)
+    series = with_inputs(error_series(measured, declared.run, DT_S), INPUTS)
+    return replace(series, slopes_v=declared.slopes_v)

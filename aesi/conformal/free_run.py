@@ -1,9 +1,8 @@
 """Prediction bands of a free run by horizon, the time since the last measured voltage: CV+ over pieces of drives.
 
 Errors of a free run are autocorrelated over minutes, so the exchangeable unit is a piece of a drive and not a sample.
-The errors of piece i are normalised, |error| / s_i, by a scale that depends on current, leverage and
-distance from the fitted states of charge (`local_scale`) and is fitted to the other pieces. The half-width k h at a
-sample solves
+The errors of piece i are normalised, |error| / s_i, by a scale that follows what the fitted rows leave open of the
+physics and of the correction (`local_scale`) and is fitted to the other pieces. The half-width k h at a sample solves
 
     sum_i n_i [share of the normalised errors r of piece i with s_i r <= h]   =   (1 - alpha) sum_i n_i        (1)
     k = t(1 - alpha / 2; m - 1) / z(1 - alpha / 2),     m the number of independent pieces                 (2)
@@ -21,14 +20,8 @@ Only rows inside the range that their model was trained on are counted: a model 
 drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
 band is wider by as much as the prediction would move if the model were extrapolated (`SparseModel.reach`).
 
-Parts of a drive lie closer to what their models were fitted to than a drive that comes next. Where whole drives can be
-left out too, and are enough to tell how much one differs from the next (MIN_PIECES), the band over a whole drive is the
-wider one, at each sample, of those calibrated on parts and on drives, which are the same rows and as many stretches.
-Over the development splits of `aesi bench splits` (16 candidates) the bands of AESI I cover 91.4 % and 77.9 % of the
-worst drive of the LG M50T at a Winkler score of 22.1 mV, and 96.8 and 77.7 % at 57.0 mV of the NMC drive; with each
-piece for a stretch, and two drives for enough, 87.9 and 70.9 % at 22.3 mV, and 95.3 and 71.9 % at 55.5 mV. With parts
-alone the LG M50T's were covered to 66.7 and 48.3 %. Both put into one calibration cover 64.5 and 47.3 % there: pieces
-far from all others then set the scale of the near ones.
+Parts of a drive lie closer to what their models were fitted to than a drive that comes next, and whole drives may lie
+further away; both are left out, and calibrate together, since the scale tells how far each was.
 
 Coverage is about 1 - alpha on average over pieces exchangeable with those of the calibration. With few pieces the
 coverage of a single drive scatters by many points about that; `HorizonBand.by_piece`, the coverage of each left-out
@@ -39,32 +32,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from aesi.conformal.horizon_band import HorizonBand, calibrated_band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
-from aesi.conformal.seen import gap as gap_of
+from aesi.conformal.parameter_spread import spread
 from aesi.conformal.seen import growth
 from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
 
-SCHEMA = "aesi.free_run_bands/6"
+SCHEMA = "aesi.free_run_bands/7"
 
 
 @dataclass(frozen=True, eq=False)
 class FreeRunBands:
-    """Bands at miss rate `alpha` for each calibrated horizon, shortest first; seen : what the model was fitted to,
-    None where nothing is known of it.  drives : the whole drive's band by drives left out whole, where there is one."""
+    """Bands at miss rate `alpha` for each calibrated horizon, shortest first.
+
+    seen : what the model was fitted to.  root : what that leaves open of the physics (parameter_spread.py).
+    Either is None where nothing is known of it.
+    """
 
     alpha: float
     horizons: tuple[HorizonBand, ...]
     seen: Visited | None = None
-    drives: HorizonBand | None = None
+    root: Array | None = None
 
     def __repr__(self) -> str:
         return f"FreeRunBands({100 * (1 - self.alpha):.0f} %, {len(self.horizons)} horizons)"
@@ -74,12 +70,12 @@ class FreeRunBands:
         cls,
         errors_by_horizon: Mapping[float, Sequence[Array]],
         dt_s: float,
-        current_a: Sequence[Array],
+        spread_v: Sequence[Array] | None = None,
         alpha: float = 0.1,
         inside: Sequence[BoolArray] | None = None,
         excess: Sequence[Array | None] | None = None,
-        gap: Sequence[Array | None] | None = None,
         seen: Visited | None = None,
+        root: Array | None = None,
         stretches: int | None = None,
     ) -> FreeRunBands:
         """Calibrate on out-of-sample prediction errors: of records, or pieces, that the model was not fitted to.
@@ -87,47 +83,48 @@ class FreeRunBands:
         errors_by_horizon : horizon in s (WHOLE_DRIVE: from the start of the record) -> one (n_i,) array a
         continuous record, V, measured minus predicted at that sample from a measurement `horizon` earlier;
         NaN where there is no such prediction.  dt_s : s.
-        current_a : one (n_i,) array a record, A.
+        spread_v : one (n_i,) array a record, V, what the fit without it leaves open of the physics there.
         inside : one (n_i,) array a record, True inside the trained range of the model that predicted; None for
         everywhere.
         excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it keeps no leverage.
-        gap : one (n_i,) array a record, of that model (seen.py).  seen : of the model that the bands are for.
+        seen, root : of the model that the bands are for.
         stretches : how many stretches of the records err independently over a whole drive; by default their pieces.
 
         Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
         """
         if not errors_by_horizon:
             raise InputError("no horizon to calibrate; give errors for at least one.")
-        beyond, apart = excess or [None] * len(current_a), gap or [None] * len(current_a)
-        columns = [covariates(i, dt_s, x, g) for i, x, g in zip(current_a, beyond, apart, strict=True)]
-        usable = inside or [np.ones(len(c), dtype=bool) for c in columns]
+        lengths = [len(each) for each in next(iter(errors_by_horizon.values()))]
+        spreads = spread_v or [np.zeros(n) for n in lengths]
+        columns = [covariates(p, x) for p, x in zip(spreads, excess or [None] * len(spreads), strict=True)]
+        usable = inside or [np.ones(n, dtype=bool) for n in lengths]
         bands = [
             calibrated_band(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s, stretches)
             for horizon in sorted(errors_by_horizon)
         ]
-        return cls(alpha, tuple(bands), seen)
+        return cls(alpha, tuple(bands), seen, root)
 
     def at(
         self,
         horizon_s: float,
-        dt_s: float,
-        current_a: Array,
-        soc: Array,
+        spread_v: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
         temperature_degc: Array | None = None,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
-        the half-width is interpolated in the logarithm of time.  reach_v : (n,) what to add to it, how far the
-        prediction would move if the model went on beyond its trained range."""
-        columns = covariates(current_a, dt_s, excess, self._gap(soc))
-        return self._around(np.full(len(soc), horizon_s), columns, reach_v, temperature_degc)
+        the half-width is interpolated in the logarithm of time.
+
+        spread_v : (n,) of `spread`.  reach_v : (n,) what to add to the half-width, how far the prediction would move if
+        the model went on beyond its trained range.
+        """
+        elapsed = np.full(len(spread_v), horizon_s)
+        return self._around(elapsed, spread_v, excess, reach_v, temperature_degc)
 
     def along(
         self,
         dt_s: float,
-        current_a: Array,
-        soc: Array,
+        spread_v: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
         temperature_degc: Array | None = None,
@@ -135,26 +132,30 @@ class FreeRunBands:
         """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
 
         Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
-        whole drive.  reach_v : as for `at`.
+        whole drive.  spread_v, reach_v : as for `at`.
         """
-        elapsed = dt_s * np.arange(len(soc), dtype=np.float64)
-        columns = covariates(current_a, dt_s, excess, self._gap(soc))
-        return self._around(elapsed, columns, reach_v, temperature_degc)
+        elapsed = dt_s * np.arange(len(spread_v), dtype=np.float64)
+        return self._around(elapsed, spread_v, excess, reach_v, temperature_degc)
+
+    def spread(self, series: ErrorSeries) -> Array:
+        """(n,) V, what the fitted rows leave open of the physics along a record; nought where that is not known.
+
+        Raises InputError for a record without the slopes that it takes."""
+        if self.root is None:
+            return np.zeros(len(series))
+        if series.slopes_v is None or series.slopes_v.shape[1] != len(self.root):
+            raise InputError(
+                f"{series.name}: the band asks for {len(self.root)} slopes of the physics; run the experiment again."
+            )
+        return spread(series.slopes_v, self.root)
 
     def intervals(
         self, series: ErrorSeries, free: FreeRun, reach_v: Array | float = 0.0, horizon_s: float | None = None
     ) -> Intervals:
         """The band along a free run of a record, or of predictions `horizon_s` ahead, with their own `reach_v`;
         `warm` is False outside the trained range, where the band is not calibrated."""
-        where = (
-            series.dt_s,
-            series.current_a,
-            series.soc,
-            free.excess,
-            reach_v,
-            series.temperature_degc,
-        )
-        low, high = self.along(*where) if horizon_s is None else self.at(horizon_s, *where)
+        where = self.spread(series), free.excess, reach_v, series.temperature_degc
+        low, high = self.along(series.dt_s, *where) if horizon_s is None else self.at(horizon_s, *where)
         return Intervals(low, high, ~free.outside)
 
     def to_dict(self) -> SavedState:
@@ -164,7 +165,7 @@ class FreeRunBands:
             "alpha": self.alpha,
             "horizons": [band.to_state() for band in self.horizons],
             "seen": None if self.seen is None else self.seen.to_state(),
-            "drives": None if self.drives is None else self.drives.to_state(),
+            "root": self.root,
         }
 
     @classmethod
@@ -176,27 +177,23 @@ class FreeRunBands:
             )
         alpha = float(state["alpha"])
         seen = None if state["seen"] is None else Visited.from_state(state["seen"])
-        drives = None if state["drives"] is None else HorizonBand.from_state(state["drives"], alpha)
+        root = None if state["root"] is None else np.asarray(state["root"], dtype=float)
         return cls(
-            alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]), seen, drives
+            alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]), seen, root
         )
 
-    def no_narrower_than(self, drives: FreeRunBands) -> FreeRunBands:
-        """The same, over a whole drive no narrower than the given ones there."""
-        return replace(self, drives=drives.horizons[-1])
-
-    def _gap(self, soc: Array) -> Array | None:
-        return None if self.seen is None else gap_of(self.seen, soc)
-
     def _around(
-        self, elapsed_s: Array, columns: Array, reach_v: Array | float, temperature_degc: Array | None
+        self,
+        elapsed_s: Array,
+        spread_v: Array,
+        excess: Array | None,
+        reach_v: Array | float,
+        temperature_degc: Array | None,
     ) -> tuple[Array, Array]:
+        grown = 1.0 if self.seen is None else growth(self.seen, temperature_degc)
+        columns = covariates(spread_v, excess, grown)
         halves = np.array([band.half_width(columns) for band in self.horizons])
-        if self.drives is not None and self.horizons[-1].horizon_s == self.drives.horizon_s:
-            halves[-1] = np.maximum(halves[-1], self.drives.half_width(columns))
         half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
-        if self.seen is not None:
-            half = half * growth(self.seen, temperature_degc)
         return -half, half
 
 

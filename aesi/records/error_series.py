@@ -22,6 +22,7 @@ class ErrorSeries:
     soc : (n,).  model_v : (n,) V, the physics model's voltage (so V_measured = model_v + error_v).
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
     temperature_degc : (n,) of the cell, where it was measured.
+    slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -35,6 +36,7 @@ class ErrorSeries:
     input_names: tuple[str, ...] = INPUT_NAMES
     physics: Mapping[str, Array] = field(default_factory=dict)
     temperature_degc: Array | None = None
+    slopes_v: Array | None = None
 
     def __len__(self) -> int:
         return len(self.error_v)
@@ -64,6 +66,7 @@ class ErrorSeries:
             model_v=self.model_v[rows],
             physics={name: voltage[rows] for name, voltage in self.physics.items()},
             temperature_degc=None if self.temperature_degc is None else self.temperature_degc[rows],
+            slopes_v=None if self.slopes_v is None else self.slopes_v[rows],
         )
 
     def left_by(self, name: str) -> Array:

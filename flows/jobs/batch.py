@@ -18,6 +18,7 @@ from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.interrupt import kept_on_interrupt
 from flows.evaluation.spread import in_processes, on_dask
+from flows.jobs.run_session import tracked_job
 
 if TYPE_CHECKING:
     from flows.tracking.tracker import Tracker
@@ -65,25 +66,15 @@ def batch(
 def _tracked(
     jobs: Sequence[Job], settings: Settings, source: Path, console: Console
 ) -> Iterator[Tracker | None]:
-    """A run of the batch, closed whichever way it ends; None where the store is away."""
-    from flows.tracking.store import Store, StoreAway
-    from flows.tracking.tracker import Subject, Tracker
+    """A run of the batch; None where the store is away."""
+    from flows.tracking.tracker import Subject
 
     key = sha256("".join(job.name for job in jobs).encode()).hexdigest()[:16]
     quiet = TrackingConfig(system_metrics=False, log_model=False)
-    try:
-        tracker = Tracker(Store(), Subject("batch", settings.seed, key, quiet), console.say)
-    except StoreAway as error:
-        console.say(f"not tracked: {error}")
-        yield None
-        return
-    tracker.parameters({"source": source.name, "cells": len(jobs), "holdout": settings.holdout})
-    try:
+    with tracked_job(Subject("batch", settings.seed, key, quiet), source.name, console) as tracker:
+        if tracker is not None:
+            tracker.parameters({"source": source.name, "cells": len(jobs), "holdout": settings.holdout})
         yield tracker
-    except BaseException as error:
-        tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
-        raise
-    tracker.end("FINISHED")
 
 
 def _track(tracker: Tracker | None, row: dict[str, Any]) -> None:

@@ -14,13 +14,14 @@ from aesi.constants import MV_PER_V
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.interrupt import kept_on_interrupt
+from flows.jobs.run_session import tracked_job
 
 if TYPE_CHECKING:
     from aesi.pipeline.discovery.discover import Case
     from aesi.tracer import Discovery
     from aesi.tracer.discovery import TriedHypothesis
     from flows.jobs.stages import Stages
-    from flows.tracking.tracker import Tracker
+    from flows.tracking.tracker import Subject, Tracker
 
 EXPERIMENT = "discover"
 
@@ -51,20 +52,14 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
             f"{out} holds an earlier search: fits of the same cell and records are taken up again, and its finding is "
             "replaced."
         )
-    tracker = _tracker(case, experiment, console)
-    follow = Follow(tracker, console)
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
-    try:
-        with kept_on_interrupt(kept):
-            found = run("hypotheses", lambda: run_case(case, out, follow))
-            content: dict[str, Any] = run(
-                "report", lambda: write_discovery(out, case, found, _run_id(tracker))
-            )
-    except BaseException as error:
-        if tracker is not None:
-            tracker.end("KILLED" if isinstance(error, KeyboardInterrupt) else "FAILED", wait_s=5)
-        raise
-    _track_result(tracker, case, found, content, out)
+    title = ", ".join(m.name for m in case.measurements)
+    with tracked_job(_subject(case, experiment), title, console) as tracker, kept_on_interrupt(kept):
+        _track_case(tracker, case)
+        follow = Follow(tracker, console)
+        found = run("hypotheses", lambda: run_case(case, out, follow))
+        content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
+        _track_result(tracker, found, content, out)
     run.publish("discovery", _page(content, out, tracker), "What the model lacks")
     _say(console, content, found.notes, out, started)
     return content
@@ -120,38 +115,28 @@ class Follow:
         )
 
 
-def _tracker(case: Case, experiment: str, console: Console) -> Tracker | None:
+def _subject(case: Case, experiment: str) -> Subject:
     from aesi.records import digest
-    from flows.tracking.store import Store, StoreAway
-    from flows.tracking.tracker import Subject, Tracker
+    from flows.tracking.tracker import Subject
 
     key = digest(*(m.time_s for m in case.measurements), *(m.voltage_v for m in case.measurements))
-    try:
-        return Tracker(Store(), Subject(experiment, case.seed, key), console.say)
-    except StoreAway as error:
-        console.say(f"not tracked: {error}")
-        return None
+    return Subject(experiment, case.seed, key)
 
 
 def _run_id(tracker: Tracker | None) -> str:
     return tracker.run_id if tracker is not None else ""
 
 
-def _track_result(
-    tracker: Tracker | None, case: Case, found: Discovery, content: dict[str, Any], out: Path
-) -> None:
+def _track_case(tracker: Tracker | None, case: Case) -> None:
+    """What was asked, from the start on: a search that fails or is stopped can be told from others too."""
     if tracker is None:
         return
-    from aesi.pipeline.report.moved import moved_summary
-    from aesi.pipeline.report.sizes import finding_line
-    from aesi.pipeline.report.words import reason_finding
-    from flows.tracking.view import DISCOVERY_COLUMNS, HOW_TO_READ_DISCOVERIES, NOTE, experiment_tags
+    from flows.tracking.view import DISCOVERY_COLUMNS, HOW_TO_READ_DISCOVERIES, experiment_tags
 
     tracker.about(experiment_tags(HOW_TO_READ_DISCOVERIES, DISCOVERY_COLUMNS))
     tracker.parameters(
         {
-            "cell": found.cell.name,
-            "model": found.choice.model,
+            "cell": case.declared().cell.name,
             "data": ", ".join(m.name for m in case.measurements),
             "data_digest": ", ".join(m.digest for m in case.measurements),
             "test": ", ".join(m.name for m in case.tests),
@@ -160,7 +145,21 @@ def _track_result(
             "holdout": case.holdout,
             "max_effects": case.max_effects,
             "seed": case.seed,
-        },
+        }
+    )
+
+
+def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, Any], out: Path) -> None:
+    """What came of it."""
+    if tracker is None:
+        return
+    from aesi.pipeline.report.moved import moved_summary
+    from aesi.pipeline.report.sizes import finding_line
+    from aesi.pipeline.report.words import reason_finding
+    from flows.tracking.view import NOTE
+
+    tracker.parameters(
+        {"model": found.choice.model},
         {
             "verdict": content["verdict"],
             "effects": ", ".join(content["effects"]),
@@ -184,7 +183,6 @@ def _track_result(
     tracker.metrics(errors | figures | {"seconds": content["seconds"]})
     for name in ("discovery.json", "report.html"):
         tracker.files(out / name)
-    tracker.end("FINISHED")
 
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:

@@ -19,7 +19,7 @@ from flows.tracking.run_records import RunLock, RunRecord, records
 
 if TYPE_CHECKING:
     from flows.tracking.store import Store
-    from flows.tracking.tracker import Tracker
+    from flows.tracking.tracker import Subject, Tracker
 
 UNFINISHED = ("running", "killed", "failed")
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -39,21 +39,51 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
     with _advice_where_full(request):
         tracker, record = _begin(request, config, store, console)
         kept = f"Everything so far is kept; go on with: {request.resuming}"
-        with kept_on_interrupt(kept), RunLock(tracker.run_id):
-            try:
-                yield tracker
-            except KeyboardInterrupt:
-                _close(record, tracker, "killed", wait_s=5)
-                raise
-            except BaseException:
-                _close(record, tracker, "failed", wait_s=10)
-                raise
-            left = tracker.end("FINISHED")
-            replace(record, status="finished").write()
-        if left:
-            console.say(
-                f"tracking: {left} items could not be delivered to {store.uri}; the next run delivers them."
-            )
+        with kept_on_interrupt(kept), _ended_as_it_ends(record, tracker, console):
+            yield tracker
+
+
+@contextmanager
+def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Tracker | None]:
+    """A tracked run of a job that is no experiment, closed as what it becomes; None where the store is away.
+
+    title : what the run is called.  Runs of the same name that were killed before are closed first.
+    """
+    from flows.tracking.store import Store, StoreAway
+    from flows.tracking.tracker import Tracker
+
+    try:
+        store = Store()
+        _close_killed(subject.name, store, console)
+        tracker = Tracker(store, subject, console.say, title=title)
+    except StoreAway as error:
+        console.say(f"not tracked: {error}")
+        yield None
+        return
+    record = RunRecord(tracker.run_id, subject.name, subject.digest, store.uri, time.time())
+    record.write()
+    with _ended_as_it_ends(record, tracker, console):
+        yield tracker
+
+
+@contextmanager
+def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> Iterator[None]:
+    """Within, this process works on the run; it is closed as finished, failed or killed."""
+    with RunLock(tracker.run_id):
+        try:
+            yield
+        except KeyboardInterrupt:
+            _close(record, tracker, "killed", wait_s=5)
+            raise
+        except BaseException:
+            _close(record, tracker, "failed", wait_s=10)
+            raise
+        left = tracker.end("FINISHED")
+        replace(record, status="finished").write()
+    if left:
+        console.say(
+            f"tracking: {left} items could not be delivered to {record.uri}; the next run delivers them."
+        )
 
 
 def _begin(

@@ -57,6 +57,7 @@ class Tracker:
     """Tracks one flow run, new or resumed.
 
     run_id : MLflow's id of the parent run, which also names the folder below runs/.
+    title : what a new run is called; None names the experiment and the seed.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class Tracker:
         config: Trackable,
         say: Callable[[str], None],
         run_id: str | None = None,
+        title: str | None = None,
     ) -> None:
         self.store = store
         self._config = config
@@ -72,7 +74,7 @@ class Tracker:
         self._tracked: set[str] = set()
         if run_id is None:
             tags = {KIND: "run", "aesi.config_digest": config.digest, **source_tags()}
-            name = f"{config.name}, seed {config.seed}"
+            name = title or f"{config.name}, seed {config.seed}"
             self.run_id = store.create_run(self._experiment_id, name, tags)
         else:
             self.run_id = run_id

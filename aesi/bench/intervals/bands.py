@@ -1,10 +1,12 @@
 """Are free-run bands as wide as they have to be? Virtual cells by the dozen, one design beside another.
 
-Every cell is fitted with the same genome, and calibrated as an experiment calibrates: by models that did not
-see the piece, and by the validation record where there is one. One line a layout (and for all), horizon and
-design, with means over the cells. A single drive has few independent errors, so its coverage scatters:
-`coverage_sd_pct` says by how much, `coverage_se_pct` what that leaves open of the mean over cells, which share the
-schedules of their layout. `score_ratio` is against the best constant width in hindsight, which knows the test.
+Every cell is fitted with the same genome, and calibrated as an experiment calibrates: by models that did not see the
+piece (halves of repeats and whole ones, or drives), and by the validation record where there is one. One line a layout
+(and for all), horizon and design, with means over the cells. A single drive has few independent errors, so its coverage
+scatters: `coverage_sd_pct` says by how much, `coverage_se_pct` what that leaves open of the mean over cells, which
+share the schedules of their layout. `score_ratio` is against the best constant width in hindsight, which knows the
+test. The truth is a function of the state here, alike in all repeats: a whole one that is left out errs more than a
+test repeat, which lies between two.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.virtual_drives import SplitLayout, virtual_splits
+from aesi.bench.virtual_drives import SplitLayout, cuts_of, virtual_splits
 from aesi.conformal import WHOLE_DRIVE
 from aesi.conformal.scores import interval_score, worst_bin_coverage
 from aesi.constants import MV_PER_V
@@ -33,17 +35,17 @@ ALPHA = 0.1
 HORIZONS_S = (1.0, 10.0, 60.0)
 """Those of the tables of a run."""
 OPTIONS = Options(p_c=3, d=2, mixed=False, resamples=50, block=100)
-"""Those of the experiment on the measured drive."""
 RIDGE, THRESHOLD = 10.0, 1e-3
 LAYOUTS: tuple[SplitLayout, ...] = ("repeats", "schedules", "beyond")
 
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """Of one cell: what to calibrate on, and what came of the test records."""
+    """Of one cell: what to calibrate on, how many stretches of it err independently, what came of the test records."""
 
     calibration: OutOfSampleErrors
     test: OutOfSampleErrors
+    stretches: int
 
 
 HalfWidths = dict[float, list[Array]]
@@ -64,6 +66,15 @@ def without_leverage(errors: _Errors) -> HalfWidths:
     return bands(replace(errors, calibration=replace(errors.calibration, excess=nothing)))
 
 
+def without_spread(errors: _Errors) -> HalfWidths:
+    """The bands of the package, blind to what the fitted rows leave open of the physics."""
+    calibration, test = (
+        replace(each, spread=[np.zeros(len(s)) for s in each.spread])
+        for each in (errors.calibration, errors.test)
+    )
+    return bands(replace(errors, calibration=calibration, test=test))
+
+
 def held_at_the_edge(errors: _Errors) -> HalfWidths:
     """The bands of the package, no wider where the model leaves its trained range."""
     nowhere = {h: [np.zeros(len(r)) for r in each] for h, each in errors.test.reach.items()}
@@ -77,12 +88,9 @@ def best_width(errors: _Errors) -> HalfWidths:
 
 def bands(errors: _Errors) -> HalfWidths:
     """The bands of the package."""
-    found, test = errors.calibration.bands(ALPHA), errors.test
+    found, test = errors.calibration.bands(ALPHA, errors.stretches), errors.test
     return {
-        h: [
-            found.at(h, test.dt_s, i, s, x, r)[1]
-            for i, s, x, r in zip(test.current_a, test.soc, test.excess, test.reach[h], strict=True)
-        ]
+        h: [found.at(h, p, x, r)[1] for p, x, r in zip(test.spread, test.excess, test.reach[h], strict=True)]
         for h in errors.calibration.by_horizon
     }
 
@@ -90,6 +98,7 @@ def bands(errors: _Errors) -> HalfWidths:
 DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
     "one width": one_width,
     "scaled, without leverage": without_leverage,
+    "scaled, without spread": without_spread,
     "scaled, without reach": held_at_the_edge,
     "scaled": bands,
     "best width in hindsight": best_width,
@@ -110,7 +119,7 @@ def run(
         everywhere: dict[tuple[str, float], list[Array]] = {}
         for layout in layouts:
             splits = virtual_splits(Cell.from_bpx(cell), layout, cells, seed)
-            errors = [e for e in map(_errors, splits) if e is not None]
+            errors = [e for e in (_errors(split, cuts_of(layout)) for split in splits) if e is not None]
             for name, design in DESIGNS.items():
                 started = process_time()
                 widths = [design(each) for each in errors]
@@ -126,19 +135,24 @@ def run(
                 yield _line("all", name, horizon, seed, np.concatenate(parts))
 
 
-def _errors(split: Split) -> _Errors | None:
-    """None where the genome fails on this cell."""
-    problem = Problem.build(split, OPTIONS)
+def _errors(split: Split, cuts: int) -> _Errors | None:
+    """None where the genome fails on this cell.  cuts : into how many parts a drive is cut to be left out."""
+    problem = Problem.build(split, replace(OPTIONS, cuts=cuts))
     chosen = evaluate(problem, Genome.whole(problem.library, RIDGE, THRESHOLD, 0.5, 1, 1))
     if isinstance(chosen, Failed):
         return None
     model = with_leverage(chosen.bagging, problem, chosen.genome.lambda1)
     pairs: list[Unseen] = [(model, record, WHOLE) for record in problem.split.valid]
     pairs += fold_models(problem, chosen)
+    stretches = len(pairs)
+    if cuts > 1:
+        pairs += fold_models(problem, chosen, cut=problem.spans)
     tested: list[Unseen] = [(model, record, WHOLE) for record in problem.split.test]
     train = problem.split.train
     return _Errors(
-        OutOfSampleErrors.of(pairs, train, HORIZONS_S), OutOfSampleErrors.of(tested, train, HORIZONS_S)
+        OutOfSampleErrors.of(pairs, train, HORIZONS_S),
+        OutOfSampleErrors.of(tested, train, HORIZONS_S),
+        stretches,
     )
 
 

@@ -72,6 +72,10 @@ def training_drives(
     return drives
 
 
+HALVES = 2
+"""A repeat is left out in two parts: a row of a test repeat between two is no further from trained ones (`cuts`)."""
+
+
 def cuts(data: DataConfig) -> int:
     """Into how many parts a training drive is cut to be left out in turn.
 
@@ -79,7 +83,7 @@ def cuts(data: DataConfig) -> int:
     repeats of training, so that no row of it is further than half a repeat from trained ones; that is as far as half a
     training repeat is from its other half. To leave out whole repeats would ask for more than the test does.
     """
-    return 2 if data.repeats is not None else 1
+    return HALVES if data.repeats is not None else 1
 
 
 def parts(n: int, count: int) -> list[slice]:

@@ -128,6 +128,8 @@ def _load(config: ExperimentConfig) -> Loaded:
     if model == "dfn":
         notes.append(DFN_NOTE)
     series, empty = series_under(physics, records, config)
+    for name, record in records.items():
+        series[name] = physics.with_slopes(series[name], record.measurement, record.soc0, hold)
     for name in empty:
         if name not in sources.roles["test"]:
             _refuse(physics, records[name], hold)

@@ -17,14 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.physics import ActiveEffect, Cell, ModelName
-from aesi.pipeline.experiment.recalibrate import (
+from aesi.pipeline.experiment.recalibrate import FitRecord, recalibrate
+from aesi.pipeline.product.deviations import (
     ALL,
     INITIAL_STATE,
     RESISTOR,
-    FitRecord,
     PhysicsStart,
     deviating,
-    recalibrate,
+    slopes_v,
 )
 from aesi.pipeline.product.error_series import error_series
 from aesi.records import ErrorSeries, Hold, Measurement
@@ -64,6 +64,13 @@ class PhysicsModels:
         series = error_series(record, run, dt_s)
         others = {name: each.voltage_v for name, each in runs.items()}
         return replace(series, physics=others), bool(run.series["depleted"].any())
+
+    def with_slopes(self, series: ErrorSeries, record: Measurement, soc0: float, hold: Hold) -> ErrorSeries:
+        """The series of the record with what each parameter of the chosen physics is worth along it."""
+        chosen = self.chosen
+        start = chosen.soc0(soc0)
+        slopes = slopes_v(chosen.cell, chosen.effects, record, start, hold, chosen.model, series.model_v)
+        return replace(series, slopes_v=slopes)
 
 
 def physics_models(

@@ -5,7 +5,8 @@
 over the initial state of charge (one shift for all records), the contact resistance, factors of the solid
 diffusivities, of the reaction rates and of the electrolyte's conductivity and diffusivity, the balance of the
 electrodes, and the shape of their potentials over the state of charge. d_j is what a parametrisation leaves open that
-is to serve other drives as well (`KNOBS`), s what the model misses anyway, T the time over which it misses the same.
+is to serve other drives as well (`deviations.KNOBS`), s what the model misses anyway, T the time over which it misses
+the same.
 
 All of it was measured by the squared error that it takes off drives not trained on, over the ten development splits
 of the NMC drive in `aesi bench splits` (mean, worst). A drive says little of the charge until it ends, so the initial
@@ -19,19 +20,17 @@ potentials of 0.5 to 0.7.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from aesi.errors import AesiError
 from aesi.numerics.bounded import descend
 from aesi.numerics.typing import Array, BoolArray
-from aesi.physics import ActiveEffect, Cell, ModelName, simulate
-from aesi.physics.balance import same_rest
-from aesi.physics.effects import CATALOGUE
-from aesi.physics.simulation import model_with
-from aesi.records import Hold, Measurement, Run
+from aesi.physics import ActiveEffect, Cell, ModelName
+from aesi.pipeline.product.deviations import ALL, KNOBS, RESISTOR, STEP, PhysicsStart, deviating
+from aesi.records import Hold, Measurement
 
 MODEL_ERROR_V = 0.01
 """s. Models of measured cells leave 4 to 13 mV, geometric mean 9, on eight development records of `aesi bench real`."""
@@ -47,53 +46,6 @@ ROUNDS_AGAIN = 3
 NMC drive or the M50T's changes by 0.1 %."""
 GAIN = 0.05
 """Of the cost: a descent ends with a step that gains less. With ten times less no split changes by 0.1 %."""
-STEP = 0.05
-"""Of a difference quotient, in deviations."""
-
-SOC0, CONTACT = "soc0", "contact"
-
-
-@dataclass(frozen=True)
-class FileParameter:
-    """owner : an effect of the catalogue, or SOC0 or CONTACT.  deviation : of its value, of its logarithm where `log`;
-    of the contact resistance in V at a current of 1C."""
-
-    owner: str
-    name: str
-    deviation: float
-    log: bool = False
-
-
-def _waves() -> Iterator[FileParameter]:
-    """The potentials' coefficients, without the constant one: a voltmeter is not off by millivolts."""
-    for name, parameter in CATALOGUE[POTENTIALS].parameters.items():
-        if parameter.linear and parameter.spread is not None and name != "a0_v":
-            assert parameter.spread.loose is not None
-            yield FileParameter(POTENTIALS, name, POTENTIAL_SHARE * parameter.spread.loose)
-
-
-RATES = ("solid_diffusivity", "charge_transfer_kinetics")
-POTENTIALS = "ocp_shape"
-POTENTIAL_SHARE = 0.6
-"""Of the spread that the catalogue gives for half cells of other makes."""
-BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
-KNOBS = (
-    FileParameter(SOC0, "shift", 0.001),
-    FileParameter(CONTACT, "resistance_ohm", 0.03),
-    *(
-        FileParameter(owner, f"{side}_factor", 0.15, log=True)
-        for owner in RATES
-        for side in ("negative", "positive")
-    ),
-    FileParameter("electrolyte_transport", "conductivity_factor", 0.1, log=True),
-    FileParameter("electrolyte_transport", "diffusivity_factor", 0.6, log=True),
-    *(FileParameter(owner, "loss", 0.0003) for owner in BALANCE),
-    *_waves(),
-)
-ALL = tuple(range(len(KNOBS)))
-INITIAL_STATE = (0,)
-RESISTOR = (1,)
-"""Its place, and that of the initial state, in KNOBS."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,39 +55,6 @@ class FitRecord:
     measurement: Measurement
     soc0: float
     rows: BoolArray
-
-
-@dataclass(frozen=True)
-class PhysicsStart:
-    """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
-
-    deviations : of the knobs that were free, where the fit ended.
-    """
-
-    declared: Cell
-    cell: Cell
-    effects: tuple[ActiveEffect, ...] = ()
-    shift: float = 0.0
-    deviations: tuple[float, ...] = ()
-    model: ModelName = "espm"
-
-    def soc0(self, soc0: float) -> float:
-        """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""
-        return same_rest(self.declared, self.cell, soc0 + self.shift)
-
-    def simulate(self, record: Measurement, soc0: float, hold: Hold) -> Run:
-        """The record under this physics; where it runs empty, stoichiometries are held and `depleted` says so."""
-        return simulate(
-            self.cell,
-            record.time_s,
-            record.current_a,
-            self.soc0(soc0),
-            self.effects,
-            record.temperature_degc,
-            hold,
-            on_depletion="clip",
-            model=self.model,
-        )
 
 
 def recalibrate(
@@ -167,26 +86,6 @@ def recalibrate(
     rounds = ROUNDS if begin is None else ROUNDS_AGAIN
     found = descend(fit, first, low, high, rounds, GAIN)
     return fit.physics(found.x if np.isfinite(found.cost) else np.zeros(len(free)))
-
-
-def deviating(
-    declared: Cell, effects: tuple[ActiveEffect, ...], free: Sequence[int] | Array, z: Array, model: ModelName
-) -> PhysicsStart:
-    """The declared physics with its free knobs moved by z (n_free,) deviations."""
-    x = np.zeros(len(KNOBS))
-    x[np.array(free)] = z
-    values: dict[str, dict[str, float]] = {}
-    for knob, deviations in zip(KNOBS, x, strict=True):
-        if deviations != 0.0:
-            moved = float(deviations) * knob.deviation
-            values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
-    shift = values.pop(SOC0, {}).get("shift", 0.0)
-    volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
-    added = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
-    cell = model_with(declared, added).cell
-    ohm = declared.contact_resistance_ohm + volts_at_1c / declared.nominal_capacity_ah
-    cell = replace(cell, contact_resistance_ohm=ohm)
-    return PhysicsStart(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,6 +18,7 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import active_effect
+from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
@@ -84,7 +85,7 @@ class HybridModel:
         even = self._even(record)
         series = self._series(even, soc0)
         if voltage_v is None:
-            prediction = self._free_run(series, error0_v)
+            prediction = self._free_run(self._with_slopes(series, even, soc0), error0_v)
         else:
             prediction = self._one_step(series)
         return prediction if even is record else self._back(prediction, record, soc0)
@@ -153,6 +154,13 @@ class HybridModel:
             model=self.model,
         )
         return error_series(record, run, self.dt_s)
+
+    def _with_slopes(self, series: ErrorSeries, record: Measurement, soc0: float) -> ErrorSeries:
+        """With what the band asks of the physics: a simulation for each parameter that data leave open."""
+        if self.bands is None or self.bands.root is None:
+            return series
+        slopes = slopes_v(self.cell, self.effects, record, soc0, self.hold, self.model, series.model_v)
+        return replace(series, slopes_v=slopes)
 
     def _free_run(self, series: ErrorSeries, error0_v: float) -> Prediction:
         n = len(series)

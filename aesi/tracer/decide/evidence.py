@@ -95,6 +95,8 @@ def gathered(
     options = [one for one in recalibrations if _borne_out(one)]
     options.append(Option.of(measured.problem, blocks, measured.base))
     named = None
+    if path.beyond_reach_v is not None:
+        path = measured  # the only one that tried anything
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, thresholds)
         named = Option.of(measured.problem, blocks, measured.chosen) if verdict.effects else None

@@ -85,9 +85,24 @@ class Grown:
         return {**self.on_bounds, **moved}
 
 
-class _Growth:
-    def __init__(self, parent: Parent, effect: str, delta_v: float) -> None:
+class EffectGrowth:
+    """A parent and an effect that is being fitted on it.
+
+    delta_v : one of the tried sizes, at which the effect's parameters are fitted.
+    known : coordinates of the effect's parameters where an earlier descent ended.  near : where one with the other
+    model of the cell did, to start from; None: from the best of several starts.
+    """
+
+    def __init__(
+        self,
+        parent: Parent,
+        effect: str,
+        delta_v: float,
+        known: Array | None = None,
+        near: Array | None = None,
+    ) -> None:
         self.parent, self.effect, self.delta_v = parent, effect, delta_v
+        self.known = known
         self.problem, fit = parent.problem, parent.fit
         self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
         self.added = tuple(
@@ -95,6 +110,8 @@ class _Growth:
         )
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
+        begin = [one for one in (known, near) if one is not None]
+        self.starts = begin[:1] or [np.clip(u, self.low, self.high) for u in starts(self.added)]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
         basis = np.vstack([parent.white[delta_v][0][:, self.rest], np.eye(len(self.rest))])
@@ -156,43 +173,42 @@ class _Growth:
             return None
         return np.vstack([self.projected(-jacobian, np.zeros((len(self.rest), len(u)))), np.eye(len(u))])
 
-    def start(self) -> Array | None:
-        """Of the usual starts the one from which a step promises most; None where none can be simulated."""
+    def marks(self) -> Array:
+        """(n, c) V: the slopes at each start, and what lies between the parent and it; none where it cannot be
+        simulated."""
+        columns = [np.zeros((len(self.parent.fit.point.residual_v), 0))]
+        for u in self.starts:
+            e = self.error_v(u)
+            jacobian = None if e is None else self.jacobian(u, e)
+            if e is not None and jacobian is not None:
+                columns += [jacobian, (self.parent.fit.point.residual_v - e)[:, None]]
+        return np.hstack(columns)
+
+    def ended(self) -> Grown | None:
+        """Where a descent ends, within the bounds; None where the effect cannot be simulated."""
+        u = self.known
+        if u is None:
+            start = self._most_promising()
+            u = (
+                None
+                if start is None
+                else descend(self, start, self.low, self.high, ROUNDS, GAIN_NATS).known_x
+            )
+        e = None if u is None else self.error_v(u)
+        jacobian = None if u is None or e is None else self.jacobian(u, e)
+        return None if u is None or e is None or jacobian is None else _scored(self, u, e, jacobian)
+
+    def _most_promising(self) -> Array | None:
+        """Of the starts the one from which a step promises most; None where none can be simulated."""
+        if len(self.starts) == 1:
+            return self.starts[0]
         promised = []
-        for u in np.clip(starts(self.added), self.low, self.high):
+        for u in self.starts:
             residual = self.residual(u)
             slopes = None if residual is None else self.slopes(u, residual)
             if residual is not None and slopes is not None:
                 promised.append((foreseen_cost(u, residual, slopes, self.low, self.high), u))
         return min(promised, key=lambda one: one[0])[1] if promised else None
-
-    def fitted(self, u: Array) -> Array:
-        """Where a descent from `u` ends, within the bounds."""
-        return descend(self, u, self.low, self.high, ROUNDS, GAIN_NATS).known_x
-
-
-def grow(
-    parent: Parent, effect: str, delta_v: float, known: Array | None = None, near: Array | None = None
-) -> Grown | None:
-    """The parent and one effect more; None where it cannot be simulated.
-
-    delta_v : one of the tried sizes, at which the effect's parameters are fitted.
-    known : coordinates of the effect's parameters where an earlier descent ended.  near : where one with the other
-    model of the cell did, to start from; None: from the best of several starts.
-    """
-    growth = _Growth(parent, effect, delta_v)
-    if known is None:
-        start = growth.start() if near is None else near
-        u = None if start is None else growth.fitted(start)
-    else:
-        u = known
-    if u is None:
-        return None
-    e = growth.error_v(u)
-    jacobian = None if e is None else growth.jacobian(u, e)
-    if e is None or jacobian is None:
-        return None
-    return _scored(growth, u, e, jacobian)
 
 
 def promise(parent: Parent, slopes_v: Array, delta_v: float) -> float:
@@ -209,7 +225,7 @@ def promise(parent: Parent, slopes_v: Array, delta_v: float) -> float:
     return score_at(parent.blocks, sums, x, np.vstack([fit.point.bounds, open_ends]), delta_v, 0.0).total
 
 
-def _scored(growth: _Growth, u: Array, e: Array, jacobian: Array) -> Grown:
+def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     parent, fit = growth.parent, growth.parent.fit
     inside = (u > growth.low + 1e-9) & (u < growth.high - 1e-9)  # a linear form cannot see a bound
     x = np.concatenate([fit.point.x[growth.rest], u[inside]])

@@ -15,11 +15,11 @@ from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
-from aesi.tracer.likelihood.growth import Grown, Parent
+from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
-from aesi.tracer.search.grown import promising, side_by_side
+from aesi.tracer.search.grown import ended, growths_on, side_by_side
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible
 from aesi.tracer.search.reach import REACH, least_left_v
@@ -40,10 +40,6 @@ HOPELESS_SHARE = 0.7
 and none is exchanged. A convention that saves time: on a measured cell, which no two effects explain, each further
 round takes minutes. One effect may leave all of it: on a blind case (a contact, hysteresis and heat, seed 13) the first
 of three said 256 nats and did not lower the error, and the three were found."""
-
-
-_Growths = tuple[list[Grown], list[str]]
-"""What was grown, and why some of it could not be simulated."""
 
 
 def searched(
@@ -67,15 +63,15 @@ def searched(
     notes: list[str] = []
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
-    first = _grown([Parent(problem, blocks, base)], slopes, archive) if max_effects else ([], [])
-    least_v = least_left_v(base, first[0], problem.white_v) if np.isfinite(allowed_v) else 0.0
-    if least_v > REACH * allowed_v:
-        for one in first[0]:
-            report(problem, one, one.score.total - base.score.total)
-        step = Step((base,), tuple(_ranked(first[0])), (), None)
-        return Path(problem, blocks, base, (step,), base, tuple(dict.fromkeys(first[1])), least_v)
+    first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
+    if np.isfinite(allowed_v):
+        marks = list(side_by_side(EffectGrowth.marks, first))
+        least_v = least_left_v(base, marks, problem.white_v)
+        if least_v > REACH * allowed_v:
+            return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
     for _ in range(max_effects):
-        step, refused = _step(problem, blocks, parents, slopes, archive, report, first if not steps else None)
+        step, refused = _step(problem, blocks, parents, slopes, archive, report, first)
+        first = []
         slopes = slopes or {g.hypothesis[-1]: g.slopes_v for g in step.grown}
         notes += refused
         steps.append(step)
@@ -168,16 +164,15 @@ def _step(
     slopes: Mapping[str, Array],
     archive: Archive,
     report: Report,
-    known: _Growths | None = None,
+    begun: Sequence[EffectGrowth] = (),
 ) -> tuple[Step, list[str]]:
-    """parents : the hypothesis that was chosen so far, then others to grow from.  known : what they grow, where that is
-    known."""
+    """parents : the hypothesis that was chosen so far, then others to grow from.  begun : what grows on these."""
     best, places = parents[0], [Parent(problem, blocks, fit) for fit in parents]
-    grown, refused = known or _grown(places, slopes, archive)
+    grown, refused = _grown(begun or growths_on(places, slopes, archive), archive)
     slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
     declared = as_declared(problem, blocks, best)
     if declared is not None:
-        again, more = _grown([Parent(problem, blocks, declared)], slopes, archive)
+        again, more = _grown(growths_on([Parent(problem, blocks, declared)], slopes, archive), archive)
         grown, refused = [*grown, *again], [*refused, *more]
     for one in grown:
         report(problem, one, one.score.total - best.score.total)
@@ -195,14 +190,13 @@ def _step(
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
 
-def _grown(parents: Sequence[Parent], slopes: Mapping[str, Array], archive: Archive) -> _Growths:
-    """All that is worth growing on these parents, and why some of it could not be simulated."""
-    wanted = [(parent, name) for parent in parents for name in promising(parent, slopes)]
+def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grown], list[str]]:
+    """Where they end, and why some of them could not be simulated."""
     grown, refused = [], []
-    for (parent, name), one in zip(wanted, side_by_side(wanted, archive), strict=True):
+    for growth, one in zip(growths, ended(growths, archive), strict=True):
         if one is None:
-            names = (*parent.fit.hypothesis, name)
-            refused.append(f"{' + '.join(names)}: not tried; {parent.problem.why_not(names)}")
+            names = (*growth.parent.fit.hypothesis, growth.effect)
+            refused.append(f"{' + '.join(names)}: not tried; {growth.problem.why_not(names)}")
         else:
             grown.append(one)
     return grown, refused

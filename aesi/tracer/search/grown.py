@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 from aesi.numerics.typing import Array
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.likelihood.growth import Grown, Parent, grow, promise
+from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, promise
 from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive, fit_name
+
+T = TypeVar("T")
 
 PROMISING = 9
 """Effects that are grown on a hypothesis with effects: those that say most to first order. A convention that saves
@@ -42,27 +45,47 @@ def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
     return not (problem.trust == "measured" and effect.of_design)
 
 
-def side_by_side(wanted: Sequence[tuple[Parent, str]], archive: Archive) -> Iterable[Grown | None]:
-    """Growths in threads, since simulations do not hold the interpreter's lock; in the order asked for, so that the
-    outcome does not depend on how many threads there are."""
+def growths_on(
+    parents: Iterable[Parent], slopes: Mapping[str, Array], archive: Archive
+) -> list[EffectGrowth]:
+    """All that is worth growing on these parents."""
+    return [_growth(parent, name, archive) for parent in parents for name in promising(parent, slopes)]
 
-    def one(parent: Parent, name: str) -> Grown | None:
-        kind = "grown as declared" if parent.fit.as_declared else "grown"
-        key = fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
-        size = len(parent.problem.effects[name].parameters)
-        found = grow(parent, name, _growth_size(parent), archive.get(key, size), archive.near(key, size))
+
+def _growth(parent: Parent, name: str, archive: Archive) -> EffectGrowth:
+    key, size = _key(parent, name), len(parent.problem.effects[name].parameters)
+    return EffectGrowth(parent, name, _growth_size(parent), archive.get(key, size), archive.near(key, size))
+
+
+def ended(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown | None]:
+    """Where they end, in the order given."""
+
+    def one(growth: EffectGrowth) -> Grown | None:
+        found = growth.ended()
         if found is not None:
-            archive.put(key, found.u)
+            archive.put(_key(growth.parent, growth.effect), found.u)
         return found
 
+    return side_by_side(one, growths)
+
+
+def side_by_side(do: Callable[[EffectGrowth], T], growths: Sequence[EffectGrowth]) -> Iterator[T]:
+    """In threads, since simulations do not hold the interpreter's lock; in the order given, so that the outcome does
+    not depend on how many threads there are."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = [pool.submit(one, parent, name) for parent, name in wanted]
+        futures = [pool.submit(do, growth) for growth in growths]
         try:
             for future in futures:
                 yield future.result()
         finally:
             for future in futures:
                 future.cancel()
+
+
+def _key(parent: Parent, name: str) -> str:
+    """Of a growth in the archive."""
+    kind = "grown as declared" if parent.fit.as_declared else "grown"
+    return fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
 
 
 def _growth_size(parent: Parent) -> float:

@@ -43,6 +43,6 @@ def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     runs = {run.info.run_name: run for run in store.runs(store.find_experiment("batch"), "")}
     assert runs["aged"].data.metrics["resistance_mohm"] == 5.0
     assert runs["other"].info.status == "FAILED"
-    parent = runs["batch, seed 0"]
+    parent = runs["plan.csv"]
     assert parent.data.metrics["failed"] == 1.0
     assert parent.info.status == "FINISHED"

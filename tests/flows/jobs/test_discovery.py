@@ -33,6 +33,13 @@ def case(monkeypatch):
     return Case(CELL, (data,), soc0=0.9)
 
 
+class Said:
+    """A console that keeps what is said."""
+
+    def __init__(self, lines):
+        self.say = lines.append
+
+
 def test_everything_is_written_and_tracked(tracked, case):
     from flows.jobs.start import discover
     from flows.tracking.store import Store
@@ -54,7 +61,36 @@ def test_everything_is_written_and_tracked(tracked, case):
     store = Store()
     runs = list(store.runs(store.find_experiment("discover"), ""))
     names = {run.info.run_name for run in runs}
-    assert {"series_resistance", "voltage_sensor_offset"} <= names
+    assert {"drive", "series_resistance", "voltage_sensor_offset"} <= names
+
+
+def test_a_search_that_was_killed_is_told_from_others_and_closed_by_the_next(tracked, case, monkeypatch):
+    from flows.jobs import discovery
+    from flows.jobs.start import discover
+    from flows.tracking.run_records import records
+    from flows.tracking.store import Store
+
+    def killed(*_):
+        (record,) = records("discover")
+        left.append(record)  # what a process leaves that is ended at once
+        raise KeyboardInterrupt
+
+    left = []
+    with monkeypatch.context() as patched:
+        patched.setattr(pipeline, "run_case", killed)
+        with pytest.raises(KeyboardInterrupt):
+            discover(case, tracked / "out", use_prefect=False)
+    store = Store()
+    (run_id,) = {record.run_id for record in left}
+    run = store.client.get_run(run_id)
+    assert (run.info.run_name, run.info.status, run.data.params["data"]) == ("drive", "KILLED", "drive")
+    store.client.update_run(run_id, status="RUNNING")
+    left[0].write()
+    said = []
+    with discovery.tracked_job(discovery._subject(case, "discover"), "next", Said(said)) as tracker:
+        assert store.client.get_run(run_id).info.status == "KILLED"
+    assert said == [f"run {run_id} had been killed; it is closed as such."]
+    assert store.client.get_run(tracker.run_id).info.status == "FINISHED"
 
 
 def test_a_cell_file_that_is_none_is_refused_before_anything_starts(workspace, case, tmp_path):

@@ -1,10 +1,11 @@
 """What bands are calibrated on: rows that the model which predicted them had been trained around."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from aesi.conformal import WHOLE_DRIVE
-from aesi.conformal.seen import gap
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors
 from aesi.records import ErrorSeries, FreeRun
 
@@ -82,12 +83,16 @@ def test_a_model_that_holds_nothing_at_an_edge_reaches_nowhere(drive) -> None:
     assert not any(each[0].any() for each in errors.reach.values())
 
 
-def test_a_left_out_piece_is_as_far_from_the_charges_of_the_others_as_they_lie(drive) -> None:
+def test_a_left_out_piece_is_as_open_as_the_other_rows_leave_it(drive) -> None:
     half = slice(N // 2, N)
-    errors = OutOfSampleErrors.of([(Held(), drive, half), (Held(), drive, slice(1, 1))], (drive,), (10.0,))
-    left, nothing = errors.gap
-    assert left[: N // 2].max() < 1e-6
-    assert (np.diff(left[half][10:]) >= 0).all()
-    assert left[-1] > 0.9
-    assert nothing.max() < 1e-6
-    assert gap(errors.seen, drive.soc).max() < 1e-6
+    # One parameter moves the first half's voltage, another that of the second.
+    first = np.arange(N) < N // 2
+    slopes = 5e-3 * np.column_stack([first, ~first])
+    train = replace(drive, slopes_v=slopes)
+    errors = OutOfSampleErrors.of([(Held(), drive, half), (Held(), drive, slice(1, 1))], (train,), (10.0,))
+    left, nothing = errors.spread
+    np.testing.assert_allclose(left[half], 5e-3)
+    # 200 rows of 1 s, 100 s of which count as one of 10 mV: 1 / (1 + 0.5) is left of the variance.
+    np.testing.assert_allclose(left[: N // 2], 5e-3 / np.sqrt(1.5))
+    np.testing.assert_allclose(nothing, 5e-3 / np.sqrt(1.5))
+    assert errors.root.shape == (2, 2)

@@ -11,7 +11,7 @@ from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
 from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.discovery import inverse_problem
-from aesi.tracer.likelihood.growth import Parent, grow
+from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.forward import admissible, needed, searched
@@ -48,7 +48,8 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
     assert own_coordinates(there) == [0.0] * len(own_coordinates(base))
     whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, archive)
     gains = [
-        grow(Parent(problem, blocks, one), "series_resistance", SIZE_V).score.total for one in (base, there)
+        EffectGrowth(Parent(problem, blocks, one), "series_resistance", SIZE_V).ended().score.total
+        for one in (base, there)
     ]
     off = [abs(gain - whole.score.total) for gain in gains]
     assert off[1] < min(off[0], 3.0)
@@ -127,5 +128,5 @@ def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_righ
     assert paths[0].chosen.hypothesis == ("series_resistance",)
     assert paths[0].beyond_reach_v is None
     assert paths[1].chosen is paths[1].base
-    assert paths[1].steps[0].fitted == ()
+    assert paths[1].steps == ()
     assert paths[1].beyond_reach_v == pytest.approx(5e-3 / np.sqrt(2.0), rel=0.2)

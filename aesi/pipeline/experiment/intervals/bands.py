@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.conformal import WHOLE_DRIVE, FreeRunBands
-from aesi.conformal.seen import gap
+from aesi.conformal.parameter_spread import covariance_root, spread
 from aesi.numerics.typing import Array, BoolArray
 from aesi.numerics.visited import Visited
+from aesi.pipeline.experiment.recalibrate import MEMORY_S, MODEL_ERROR_V
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -30,8 +31,9 @@ class OutOfSampleErrors:
 
     by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
     current_a, soc : A and 1.  inside : True where the model had been trained on such inputs.
-    excess : `FreeRun.excess` of each model.  gap : how far from the states of charge that each was fitted to.
-    seen : what a model fitted to all training records has seen.  reach : as by_horizon, `reach` of each prediction, V.
+    excess : `FreeRun.excess` of each model.  spread : V, what the rows that each was fitted to leave open there.
+    seen, root : what a model fitted to all training records has seen, and what they leave open (parameter_spread.py).
+    reach : as by_horizon, `reach` of each prediction, V.
     """
 
     dt_s: float
@@ -40,8 +42,9 @@ class OutOfSampleErrors:
     soc: list[Array]
     inside: list[BoolArray]
     excess: list[Array | None]
-    gap: list[Array | None]
+    spread: list[Array]
     seen: Visited
+    root: Array | None
     reach: dict[float, list[Array]]
 
     @classmethod
@@ -64,8 +67,9 @@ class OutOfSampleErrors:
             soc=[series.soc for _, series, _ in pairs],
             inside=[_inside(model, series, rows, train) for model, series, rows in pairs],
             excess=[run.excess for run in runs],
-            gap=[gap(_seen(train, series, rows), series.soc) for _, series, rows in pairs],
+            spread=[_spread(train, series, rows) for _, series, rows in pairs],
             seen=_seen(train),
+            root=_root(train),
             reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
         )
 
@@ -76,12 +80,12 @@ class OutOfSampleErrors:
         return FreeRunBands.fit(
             self.by_horizon,
             self.dt_s,
-            self.current_a,
+            self.spread,
             alpha=alpha,
             inside=self.inside,
             excess=self.excess,
-            gap=self.gap,
             seen=self.seen,
+            root=self.root,
             stretches=stretches,
         )
 
@@ -129,21 +133,34 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     return np.asarray(((series.inputs >= low) & (series.inputs <= high)).all(axis=1))
 
 
-def _seen(train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE) -> Visited:
-    """Of the training records without the given rows of one of them, where that is one."""
-    kept = [
-        _others(len(record), rows) if left_out is not None and record.name == left_out.name else slice(None)
-        for record in train
-    ]
+def _seen(train: Sequence[ErrorSeries]) -> Visited:
     return Visited.of(
-        np.concatenate([record.soc[rows] for record, rows in zip(train, kept, strict=True)]),
+        np.concatenate([record.soc for record in train]),
         np.concatenate(
-            [
-                np.full(len(r), np.nan)[k] if r.temperature_degc is None else r.temperature_degc[k]
-                for r, k in zip(train, kept, strict=True)
-            ]
+            [np.full(len(r), np.nan) if r.temperature_degc is None else r.temperature_degc for r in train]
         ),
     )
+
+
+def _root(
+    train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE
+) -> Array | None:
+    """By the training records without the given rows of one of them, where that is one; None without slopes."""
+    slopes = [
+        record.slopes_v[_others(len(record), rows)]
+        if left_out is not None and record.name == left_out.name
+        else record.slopes_v
+        for record in train
+        if record.slopes_v is not None
+    ]
+    return covariance_root(slopes, train[0].dt_s / (MEMORY_S * MODEL_ERROR_V**2)) if slopes else None
+
+
+def _spread(train: Sequence[ErrorSeries], series: ErrorSeries, rows: slice) -> Array:
+    """(n,) V along a record, by the slopes of the physics that is served, of a fit to the other rows; 0 without."""
+    root = _root(train, series, rows)
+    slopes = next((each.slopes_v for each in train if each.name == series.name), series.slopes_v)
+    return np.zeros(len(series)) if root is None or slopes is None else spread(slopes, root)
 
 
 def _steps(series: ErrorSeries, horizon_s: float) -> int:

@@ -12,7 +12,6 @@ from typing import overload
 import numpy as np
 
 from aesi.conformal import COMPARED, Calibrated, FreeRunBands, Method, RefittedForest, RefittedIntervals
-from aesi.conformal.horizon_band import MIN_PIECES
 from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import method
 from aesi.pipeline.experiment.config import ExperimentConfig
@@ -36,7 +35,7 @@ def conformalise(
     All: the validation records. The ensembles also each training piece, by a model fitted without it. Physics models
     also the training records.
     left_out : training drives under physics fitted without some rows of them; by default the drives as they are.
-    Parts of them calibrate, and whole ones keep the band of a whole drive from being narrower than they need.
+    Bands are calibrated on parts of them and on whole ones.
     """
     return tuple(_conformalised(one, problem, chosen, config, left_out or LeftOutDrives()) for one in models)
 
@@ -74,7 +73,7 @@ def _conformalised(
         except FitError as error:
             notes.append(f"{one.model.name} has no intervals by {name} to compare with: {error}")
     try:
-        bands = _bands(pairs, drives, problem, config)
+        bands = _bands([*pairs, *drives], len(pairs), problem, config)
         if any(band.extrapolated for band in bands.horizons):
             notes.append(
                 f"The bands of {one.model.name} in free run are calibrated on too few pieces inside the trained "
@@ -86,16 +85,11 @@ def _conformalised(
 
 
 def _bands(
-    pairs: Sequence[Unseen], drives: Sequence[Unseen], problem: Problem, config: ExperimentConfig
+    unseen: Sequence[Unseen], stretches: int, problem: Problem, config: ExperimentConfig
 ) -> FreeRunBands:
-    train, alpha = problem.split.train, config.conformal.alpha
-    bands = OutOfSampleErrors.of(pairs, train, config.conformal.horizons_s).bands(alpha, len(pairs))
-    if len(drives) < MIN_PIECES:
-        return bands
-    try:
-        return bands.no_narrower_than(OutOfSampleErrors.of(drives, train, ()).bands(alpha, len(pairs)))
-    except FitError:  # drives too short to be told apart
-        return bands
+    """stretches : how many err independently; whole drives are the same rows as their parts."""
+    errors = OutOfSampleErrors.of(unseen, problem.split.train, config.conformal.horizons_s)
+    return errors.bands(config.conformal.alpha, stretches)
 
 
 @overload

@@ -1,0 +1,140 @@
+"""Parameters that a cell's file declares and a drive can tell of, and a physics model some deviations away in them.
+
+A deviation is what a parametrisation leaves open that is to serve other drives as well; how each was measured is told
+in `aesi.pipeline.experiment.recalibrate`, which fits them. `slopes_v` says what each is worth in volts along a record:
+what the fitted rows leave open of the parameters, times that, is what they leave open of the voltage there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.physics import ActiveEffect, Cell, ModelName, simulate
+from aesi.physics.balance import same_rest
+from aesi.physics.effects import CATALOGUE
+from aesi.physics.simulation import model_with
+from aesi.records import Hold, Measurement, Run
+
+STEP = 0.05
+"""Of a difference quotient, in deviations."""
+
+SOC0, CONTACT = "soc0", "contact"
+
+
+@dataclass(frozen=True)
+class FileParameter:
+    """owner : an effect of the catalogue, or SOC0 or CONTACT.  deviation : of its value, of its logarithm where `log`;
+    of the contact resistance in V at a current of 1C."""
+
+    owner: str
+    name: str
+    deviation: float
+    log: bool = False
+
+
+def _waves() -> Iterator[FileParameter]:
+    """The potentials' coefficients, without the constant one: a voltmeter is not off by millivolts."""
+    for name, parameter in CATALOGUE[POTENTIALS].parameters.items():
+        if parameter.linear and parameter.spread is not None and name != "a0_v":
+            assert parameter.spread.loose is not None
+            yield FileParameter(POTENTIALS, name, POTENTIAL_SHARE * parameter.spread.loose)
+
+
+RATES = ("solid_diffusivity", "charge_transfer_kinetics")
+POTENTIALS = "ocp_shape"
+POTENTIAL_SHARE = 0.6
+"""Of the spread that the catalogue gives for half cells of other makes."""
+BALANCE = ("active_material_loss_negative", "active_material_loss_positive", "lithium_inventory_loss")
+KNOBS = (
+    FileParameter(SOC0, "shift", 0.001),
+    FileParameter(CONTACT, "resistance_ohm", 0.03),
+    *(
+        FileParameter(owner, f"{side}_factor", 0.15, log=True)
+        for owner in RATES
+        for side in ("negative", "positive")
+    ),
+    FileParameter("electrolyte_transport", "conductivity_factor", 0.1, log=True),
+    FileParameter("electrolyte_transport", "diffusivity_factor", 0.6, log=True),
+    *(FileParameter(owner, "loss", 0.0003) for owner in BALANCE),
+    *_waves(),
+)
+ALL = tuple(range(len(KNOBS)))
+INITIAL_STATE = (0,)
+RESISTOR = (1,)
+"""Its place, and that of the initial state, in KNOBS."""
+
+
+@dataclass(frozen=True)
+class PhysicsStart:
+    """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
+
+    deviations : of the knobs that were free, where the fit ended.
+    """
+
+    declared: Cell
+    cell: Cell
+    effects: tuple[ActiveEffect, ...] = ()
+    shift: float = 0.0
+    deviations: tuple[float, ...] = ()
+    model: ModelName = "espm"
+
+    def soc0(self, soc0: float) -> float:
+        """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""
+        return same_rest(self.declared, self.cell, soc0 + self.shift)
+
+    def simulate(self, record: Measurement, soc0: float, hold: Hold) -> Run:
+        """The record under this physics; where it runs empty, stoichiometries are held and `depleted` says so."""
+        return simulate(
+            self.cell,
+            record.time_s,
+            record.current_a,
+            self.soc0(soc0),
+            self.effects,
+            record.temperature_degc,
+            hold,
+            on_depletion="clip",
+            model=self.model,
+        )
+
+
+def deviating(
+    declared: Cell, effects: tuple[ActiveEffect, ...], free: Sequence[int] | Array, z: Array, model: ModelName
+) -> PhysicsStart:
+    """The declared physics with its free knobs moved by z (n_free,) deviations."""
+    x = np.zeros(len(KNOBS))
+    x[np.array(free)] = z
+    values: dict[str, dict[str, float]] = {}
+    for knob, deviations in zip(KNOBS, x, strict=True):
+        if deviations != 0.0:
+            moved = float(deviations) * knob.deviation
+            values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
+    shift = values.pop(SOC0, {}).get("shift", 0.0)
+    volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
+    added = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
+    cell = model_with(declared, added).cell
+    ohm = declared.contact_resistance_ohm + volts_at_1c / declared.nominal_capacity_ah
+    cell = replace(cell, contact_resistance_ohm=ohm)
+    return PhysicsStart(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
+
+
+def slopes_v(
+    cell: Cell,
+    effects: tuple[ActiveEffect, ...],
+    record: Measurement,
+    soc0: float,
+    hold: Hold,
+    model: ModelName,
+    voltage_v: Array,
+) -> Array:
+    """(n, n_knobs) V a deviation, how the voltage_v (n,) of the record under the cell moves with each knob.
+
+    soc0 : in the windows of the cell.  Where a neighbour runs empty its stoichiometries are held.
+    """
+    moved = (deviating(cell, effects, ALL, STEP * one, model) for one in np.eye(len(KNOBS)))
+    return np.column_stack(
+        [(each.simulate(record, soc0, hold).voltage_v - voltage_v) / STEP for each in moved]
+    )
