@@ -31,20 +31,20 @@ def as_lists(text: str) -> str:
     out: list[str] = []
     in_item = False
     for line in text.splitlines():
-        if STARTS.match(line):
-            if not in_item:
-                out.append("")
-            out += map(_item, BETWEEN.split(line))
-            in_item = True
-        elif ENDS.match(line):
+        if ENDS.match(line):
             out += ["", line]
             in_item = False
-        elif in_item and line:
-            rest, *items = BETWEEN.split(line)
-            out += [f"    {rest.strip()}", *map(_item, items)]
-        else:
-            out.append(line)
+        elif not line or (line.startswith("    ") and not in_item):
+            out.append(line)  # between paragraphs, and in code
             in_item = False
+        else:
+            before, *items = ["", *BETWEEN.split(line)] if STARTS.match(line) else BETWEEN.split(line)
+            if before:
+                out.append(f"    {before.strip()}" if in_item else before)
+            if items and not in_item:
+                out.append("")
+                in_item = True
+            out += map(_item, items)
     return "\n".join(out)
 
 

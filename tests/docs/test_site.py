@@ -123,6 +123,7 @@ def test_the_newest_of_labelled_runs_comes_first_and_all_of_them_stand_side_by_s
 def test_arguments_of_a_docstring_become_a_list():
     pytest.importorskip("griffe", reason="the documentation's own packages are not installed")
     text = "What it is.\n\nx : (n,) V.  y, z : two\nlines.  u : s.\nReturns n.\nRaises E.\n\n    a : code"
+    assert hook("docstrings").as_lists("What it is.  x : V.") == "What it is.\n\n- `x`: V."
     assert hook("docstrings").as_lists(text).splitlines() == [
         *("What it is.", "", "", "- `x`: (n,) V.", "- `y`, `z`: two", "    lines.", "- `u`: s."),
         *("", "Returns n.", "", "Raises E.", "", "    a : code"),
