@@ -23,8 +23,8 @@ ELECTRODE_POINTS = 4
 MOST_STEPS = 4
 """Steps of the model between two rows: rows are thinned so that little happens between them."""
 ERROR_V = 5e-3
-"""What a calibrated single-particle model is expected to miss: the calibrated files leave 5 to 16 mV of the pulses, the
-drive and the 1C discharge at 25 degC that they were fitted to (docs/cells.md). In `aesi bench calibrate --set
+"""What a calibrated single-particle model is expected to miss: the calibrated files leave 4 to 13 mV of the pulses, the
+drive and the 1C discharge at 25 degC that they were fitted to. In `aesi bench calibrate --set
 evaluations=8` the fitted drive is left with 1.10 mV and the unseen one with 12.3, with half of it 1.09 and 13.9, with
 twice 1.15 and 8.9: this is one virtual cell, on which data that weigh less against the priors carry over better."""
 REPEATS = 10

@@ -58,7 +58,10 @@ def initial_state(
     shared: bool = False,
     model: ModelName = "espm",
 ) -> InitialState:
-    """State of charge at the first row of `record`, see above.
+    """State of charge at the first row of `record`: as given, or what its voltage says.
+
+    In this order: given; full, where the cell rests at its upper cut-off voltage after a charge; the open-circuit
+    voltage of a rest; the same after the drop of the model under the current that flows.
 
     record : its temperature is used where it was measured.  soc0 : given by the user, for this record, or (`shared`)
     for several, so that one whose voltage contradicts it starts where its voltage says.

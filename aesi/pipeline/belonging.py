@@ -116,7 +116,7 @@ def _cause(ratio: float, record: Measurement) -> str:
     if ratio < 1.0 / 1000.0:
         return "the time is in hours; declare it: --unit time_s=h"
     if ratio < 1.0 / 15.0:
-        return "the time is in minutes or hours; declare it: --unit time_s=min, or h"
+        return "the time is in minutes or hours (declare it: --unit time_s=min or h), or the cell file is another's"
     one_way = np.min(record.current_a) >= 0.0 or np.max(record.current_a) <= 0.0
     if ratio > 1.0 and one_way:
         return (

@@ -51,7 +51,7 @@ class PybammRun:
 
 @dataclass(frozen=True, eq=False)
 class CrossCheck:
-    """Two models of one cell. ours_v, pybamm_v : (n,) V.  rmse_mv, max_mv : of their difference."""
+    """Two models of one cell.  ours_v, pybamm_v : (n,) V.  rmse_mv, max_mv : of their difference."""
 
     time_s: Array
     ours_v: Array

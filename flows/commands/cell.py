@@ -192,8 +192,8 @@ def discover(
     holdout: Annotated[
         float, typer.Option(min=0.05, max=0.9, help="Last share of the data kept back, without --test.")
     ] = 0.3,
-    max_effects: Annotated[int, typer.Option(min=0, max=10)] = 3,
-    seed: Annotated[int, typer.Option(min=0)] = 0,
+    max_effects: Annotated[int, typer.Option(min=0, max=10, help="Most effects that are added.")] = 3,
+    seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
     only: Annotated[

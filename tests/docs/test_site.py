@@ -120,6 +120,24 @@ def test_the_newest_of_labelled_runs_comes_first_and_all_of_them_stand_side_by_s
     assert "| effects named exactly | 50 % [19, 81] of 10 | – |" in every
 
 
+def test_arguments_of_a_docstring_become_a_list():
+    pytest.importorskip("griffe", reason="the documentation's own packages are not installed")
+    text = "What it is.\n\nx : (n,) V.  y, z : two\nlines.  u : s.\nReturns n.\nRaises E.\n\n    a : code"
+    assert hook("docstrings").as_lists("What it is.  x : V.") == "What it is.\n\n- `x`: V."
+    assert hook("docstrings").as_lists(text).splitlines() == [
+        *("What it is.", "", "", "- `x`: (n,) V.", "- `y`, `z`: two", "    lines.", "- `u`: s."),
+        *("", "Returns n.", "", "Raises E.", "", "    a : code"),
+    ]
+
+
+def test_what_aesi_offers_is_in_the_reference():
+    import aesi
+
+    page = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8")
+    shown = {line.rpartition(".")[2] for line in page.splitlines() if line.startswith("::: ")}
+    assert set(aesi.__all__) <= shown
+
+
 def test_formulas_become_mathml_and_code_is_left_alone():
     change = hook("formulas").on_page_markdown
     assert "<math" in change("an $x_1$ here")

@@ -186,17 +186,18 @@ class EffectGrowth:
 
     def ended(self) -> Grown | None:
         """Where a descent ends, within the bounds; None where the effect cannot be simulated."""
-        u = self.known
+        u = self._descended() if self.known is None else self.known
         if u is None:
-            start = self._most_promising()
-            u = (
-                None
-                if start is None
-                else descend(self, start, self.low, self.high, ROUNDS, GAIN_NATS).known_x
-            )
-        e = None if u is None else self.error_v(u)
-        jacobian = None if u is None or e is None else self.jacobian(u, e)
-        return None if u is None or e is None or jacobian is None else _scored(self, u, e, jacobian)
+            return None
+        e = self.error_v(u)
+        jacobian = None if e is None else self.jacobian(u, e)
+        return None if e is None or jacobian is None else _scored(self, u, e, jacobian)
+
+    def _descended(self) -> Array | None:
+        start = self._most_promising()
+        if start is None:
+            return None
+        return descend(self, start, self.low, self.high, ROUNDS, GAIN_NATS).known_x
 
     def _most_promising(self) -> Array | None:
         """Of the starts the one from which a step promises most; None where none can be simulated."""

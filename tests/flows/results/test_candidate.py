@@ -64,6 +64,7 @@ def test_coverage_is_tracked_for_both_ensembles(store_alone):
     metrics = [
         run.data.metrics for run in runs_of(store_alone, "candidate") if "aesi.failed" not in run.data.tags
     ]
+    assert metrics
     for one in metrics:
         assert 50 < one["intervals/valid_coverage_pct"] <= 100
         assert 50 < one["intervals/valid_coverage_pct_aesi_ii"] <= 100

@@ -90,9 +90,9 @@ def test_the_first_cases_of_a_seed_are_a_fair_small_set(first):
 
 
 def test_a_temperature_that_is_the_answer_is_in_no_column():
-    for one in plan(0):
-        if any(RECIPES[name].warm for name in one.recipes if name in RECIPES):
-            assert one.warmth == "none"
+    answers = [one for one in plan(0) if any(RECIPES[name].warm for name in one.recipes if name in RECIPES)]
+    assert answers
+    assert {one.warmth for one in answers} == {"none"}
 
 
 def test_wrong_parameters_are_beyond_what_parametrisations_differ_by():

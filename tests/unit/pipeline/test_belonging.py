@@ -63,5 +63,10 @@ def test_what_cannot_be_of_this_cell_is_told_with_the_likely_cause(m50, record, 
     assert "\n" not in message
 
 
+def test_a_record_of_a_cell_thirty_times_smaller_is_not_taken_for_one_in_minutes_alone(m50, record):
+    with pytest.raises(DataError, match=r"--unit time_s=min or h.*or the cell file is another's"):
+        check_belongs(m50, [replace(record, current_a=record.current_a / 30.0)])
+
+
 def test_a_profile_without_a_voltage_says_nothing(m50, record):
     check_belongs(m50, [replace(record, voltage_v=np.full_like(record.voltage_v, np.nan))])
