@@ -38,7 +38,7 @@ SMALL_C_RATE = 0.1
 """Below it a cell all but rests."""
 SOC_GRID = 1201
 """States of charge at which a voltage is looked up."""
-SOC_MARGIN = 0.1
+BEYOND_SOC = 0.1
 """What a voltage beyond the window stands for."""
 
 
@@ -150,4 +150,4 @@ def _soc_of(cell: Cell, voltage_v: Array) -> Array:
     soc = np.linspace(0.0, 1.0, SOC_GRID)
     ocv = np.maximum.accumulate(cell.rest_voltage_v(soc))
     inside = np.interp(voltage_v, ocv, soc)
-    return np.where(voltage_v < ocv[0], -SOC_MARGIN, np.where(voltage_v > ocv[-1], 1.0 + SOC_MARGIN, inside))
+    return np.where(voltage_v < ocv[0], -BEYOND_SOC, np.where(voltage_v > ocv[-1], 1.0 + BEYOND_SOC, inside))

@@ -14,7 +14,7 @@ from flows.tracking.store import Store
 
 SHORTEST_ID = 4
 """Letters of a run's id that may stand for it."""
-OF_THE_RESULT = ("chosen_candidate",)
+OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 """Parameters that are what came of a run, not what was asked for."""
 
 
@@ -76,6 +76,7 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         started=datetime.fromtimestamp(run.info.start_time / 1000, UTC).strftime("%Y-%m-%d %H:%M"),
         settings={k: v for k, v in run.data.params.items() if k not in OF_THE_RESULT},
         metrics=run.data.metrics,
+        chosen=run.data.params.get("chosen_model", ""),
         tags=run.data.tags,
         comparison=_content(store, run, "comparison.json"),
         discovery=_content(store, run, "discovery.json") if "verdict" in run.data.tags else {},

@@ -9,6 +9,7 @@ from typing import Any
 
 from aesi.pipeline.report.page import write_plain_page
 from aesi.pipeline.report.table_formats import ABSENT
+from aesi.sparse.search.genome import GENE_WORDS
 
 COLUMNS = {
     "free_run/test_rmse_mv": "RMSE, free run, mV",
@@ -35,7 +36,7 @@ MOST_COLUMNS = 40
 class ComparedRun:
     """One tracked run.
 
-    settings : dotted key -> text.  metrics : by MLflow's names.
+    settings : dotted key -> text.  metrics : by MLflow's names.  chosen : the model that a search ended with.
     comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
     """
 
@@ -45,6 +46,7 @@ class ComparedRun:
     started: str
     settings: Mapping[str, str]
     metrics: Mapping[str, float]
+    chosen: str = ""
     tags: Mapping[str, str] = field(default_factory=dict)
     comparison: Mapping[str, Any] = field(default_factory=dict)
     discovery: Mapping[str, Any] = field(default_factory=dict)
@@ -139,7 +141,7 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
         tuple(
             (
                 ComparedCell(run.label),
-                ComparedCell(run.settings.get("chosen_model", ABSENT)),
+                ComparedCell(run.chosen or ABSENT),
                 *(_figure(run, n) for n in names),
             )
             for run in runs
@@ -151,9 +153,8 @@ def _figure(run: ComparedRun, name: str) -> ComparedCell:
     value = run.metrics.get(name)
     if value is None:
         return ComparedCell(ABSENT)
-    model = run.settings.get("chosen_model", "")
     regime, _, figure = name.partition("/")
-    known = run.comparison.get("intervals", {}).get(model, {}) if regime == "free_run" else {}
+    known = run.comparison.get("intervals", {}).get(run.chosen, {}) if regime == "free_run" else {}
     ends = known.get(figure)
     return ComparedCell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
 
@@ -202,7 +203,7 @@ def _genes(runs: Sequence[ComparedRun]) -> PageTable | None:
         "genes",
         "What the search chose",
         "The genes of the chosen candidate.",
-        ("run", *names),
+        ("run", *(GENE_WORDS.get(name, name) for name in names)),
         tuple(
             (ComparedCell(run.label), *(_value(run.comparison.get("genome", {}).get(name)) for name in names))
             for run in runs
@@ -250,7 +251,9 @@ TABLES: tuple[Callable[[Sequence[ComparedRun]], PageTable | None], ...] = (
 def _value(value: Any) -> ComparedCell:
     if value is None:
         return ComparedCell(ABSENT)
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if isinstance(value, bool):
+        return ComparedCell("yes" if value else "no")
+    if not isinstance(value, int | float):
         return ComparedCell(str(value))
     return ComparedCell(_text(value), float(value))
 

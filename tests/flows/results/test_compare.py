@@ -21,12 +21,13 @@ def run_of(number, **settings):
         name=f"cell {number}",
         experiment="study",
         started="2026-01-01 00:00",
-        settings={"seed": str(number), "data.dt_s": "1.0", "chosen_model": "ESPM + AESI I", **settings},
+        settings={"seed": str(number), "data.dt_s": "1.0", **settings},
         metrics={
             "free_run/test_rmse_mv": 2.0 + number,
             "one_step/test_rmse_mv": 0.5,
             "intervals/coverage_pct": 90.5,
         },
+        chosen="ESPM + AESI I",
         comparison={
             "genome": {"lambda1": 0.1 * (number + 1), "d": 2},
             "terms": {"T1(I)": 0.5, f"T{number}(soc)": 0.1},
@@ -45,6 +46,17 @@ def test_only_settings_that_differ_are_shown(tmp_path):
     assert html.count("2.5 to 3.5") == 1  # the range of the free run, not of the figure one step ahead
     assert "T1(soc)" in html
     assert "T1(I)" not in html  # all runs hold it
+
+
+def test_the_model_that_a_search_ended_with_is_no_setting(tracked):
+    store, tags = Store(), {KIND: "run"}
+    for chosen in ("ESPM + AESI I", "ESPM + AESI II"):
+        run_id = store.create_run(store.experiment("two"), "two", tags)
+        store.client.log_param(run_id, "chosen_model", chosen)
+        store.client.set_terminated(run_id)
+    shown = compare(["two"], tracked / "page.html")
+    assert differing_settings(shown) == []
+    assert [run.chosen for run in shown] == ["ESPM + AESI I", "ESPM + AESI II"]
 
 
 def test_the_page_needs_nothing_from_elsewhere(tmp_path):
