@@ -39,6 +39,7 @@ FULL = {
     "cell": {
         "bpx": "",
         "soc0": None,
+        "soh": 0.98,
         "effects": {},
         "effect_files": [],
         "start": "declared",
