@@ -28,7 +28,7 @@ def sentence(
     head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
     where = f"at {time_s[at]:.6g} s (row {at})"
     degc = kelvin - ZERO_CELSIUS_K
-    tail = 'or use on_depletion="clip".'
+    tail = 'or, in Python, let it run on with on_depletion="clip".'
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
     if what == NO_SOLUTION and driest < DRY_SHARE:
         what = SALT

@@ -15,6 +15,7 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
+from aesi.errors import DataError
 from aesi.physics.arguments import check_temperature
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.pipeline.belonging import check_belongs
@@ -23,6 +24,7 @@ from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement, Spectrum
+from aesi.tracer.case.checks import SHORTEST_S
 
 SCHEMA = "aesi.calibration/2"
 NAMED_OPEN = 3
@@ -88,8 +90,15 @@ def calibrate_files(
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
-    """Raises InputError for a record that is given twice, or a temperature of one that no cell has."""
+    """Raises InputError for a record that is given twice or too short, or a temperature of one that no cell has."""
     check_distinct(measurements)
+    for record in measurements:
+        span_s = float(record.time_s[-1] - record.time_s[0])
+        if span_s < SHORTEST_S:
+            raise DataError(
+                f"{record.name} lasts {span_s:.3g} s, in which neither diffusion nor the slope of the open-circuit "
+                f"voltage shows; give records of at least {SHORTEST_S:g} s."
+            )
     for name, value in (temperatures_degc or {}).items():
         check_temperature(value, f"the temperature of {name}")
 

@@ -1,7 +1,9 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
-#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc] [OUT_FOLDER]
-# Without arguments all four, into this folder. Each takes some minutes of one processor.
+#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
+# Without arguments all three, into this folder. Each takes some minutes of one processor. The shipped file of the LG 18650HG2
+# is from before a cycler's zero was read off whole cycles: what this gives today needs the capacity of each record's day, and
+# is worse, as it is, on the records that both are fitted to (docs/cells.md).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -27,17 +29,10 @@ hg2() {
     p=$data/lg_18650hg2
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
-        "$p/40degC_c20_ocv.csv" "$p/0degC_c20_ocv.csv" \
         --out "$out/lg_18650hg2.bpx.json"
 }
-hg2_25degc() {
-    p=$data/lg_18650hg2
-    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated at 25 degC alone" \
-        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
-        --out "$out/lg_18650hg2_25degc.bpx.json"
-}
 case $which in
-all) panasonic && panasonic_25degc && hg2 && hg2_25degc ;;
-panasonic | panasonic_25degc | hg2 | hg2_25degc) "$which" ;;
+all) panasonic && panasonic_25degc && hg2 ;;
+panasonic | panasonic_25degc | hg2) "$which" ;;
 *) echo "there is no cell $which" >&2 && exit 2 ;;
 esac

@@ -46,6 +46,8 @@ def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_pa
     record = read_measurement(write_record(tmp_path))
     with pytest.raises(DataError, match="twice among the data"):
         calibrate_files(BPX, [record, record], tmp_path / "new.json")
+    with pytest.raises(DataError, match="give records of at least 300 s"):
+        calibrate_files(BPX, [record.between(0.0, 100.0)], tmp_path / "new.json")
     kelvin = Request(temperatures_degc={record.name: 298.15})
     with pytest.raises(InputError, match=f"the temperature of {record.name} = 298.15 degC is outside"):
         calibrate_files(BPX, [record], tmp_path / "new.json", kelvin)
