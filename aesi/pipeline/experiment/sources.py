@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from aesi.data.read import read
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError
+from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
 from aesi.records import ROLES, Measurement, Role
@@ -28,7 +29,10 @@ class Sources:
 
 
 def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
-    """What the experiment names; cell : the BPX file from which virtual records are made."""
+    """What the experiment names; cell : the BPX file from which virtual records are made.
+
+    Raises DataError where a record that judges is fitted or chosen on as well.
+    """
     if config.data.kind == "virtual":
         return _virtual(config, cell)
     data = config.data
@@ -38,6 +42,9 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     records: dict[str, tuple[Measurement, float | None]] = {
         name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
     }
+    test = [records[name][0] for name in roles["test"]]
+    for role in ("train", "valid"):
+        check_distinct([records[name][0] for name in roles[role]], test)
     return Sources(records, roles)
 
 

@@ -34,6 +34,16 @@ def test_the_error_is_the_missing_resistance(record):
         assert np.std(rest) == pytest.approx(NOISE_V, rel=0.1)
 
 
+def test_a_record_that_is_trained_on_may_not_judge(record, tmp_path):
+    same = tmp_path / "the_same.csv"
+    same.write_bytes(record.read_bytes())
+    for train, valid, test in (([record], [], [record]), ([record], [], [same]), ([record], [same], [same])):
+        roles = {"train": train, "valid": valid, "test": test}
+        data = {"kind": "files", **{role: [str(path) for path in paths] for role, paths in roles.items()}}
+        with pytest.raises(DataError, match="among the data and the tests; what is fitted cannot judge"):
+            load(experiment(record, data=data))
+
+
 def test_a_validation_share_is_cut_from_the_end_of_every_training_repeat(record):
     config = experiment(record)
     repeats = config.data.repeats.model_copy(update={"valid_share": 0.25})

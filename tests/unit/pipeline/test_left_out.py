@@ -26,6 +26,7 @@ def loaded(tmp_path_factory):
 
 
 def test_a_recalibration_that_every_part_bears_out_is_kept_whole(loaded):
+    assert loaded.left_out.parts
     for part in loaded.left_out.parts:
         error = part.series.left_by(DECLARED)[part.rows]
         assert slope_on(error, error - part.series.left_by(RECALIBRATED)[part.rows]) == pytest.approx(
