@@ -14,8 +14,8 @@ NMC drive, 78.1 % of the worst test drive, at a Winkler score of 46.1 mV, those 
 80.2 % at 60.2 mV. With |I|, its mean over a minute, x and the distance in charge in place of p, and the wider of bands
 calibrated on parts and on drives, it was 96.8 and 77.7 % at 57.0 mV, and 94.1 and 63.4 % at 90.5 mV. In the same order
 on the other cells, mV: LG M50T 21.6, 28.9 instead of 22.1, 33.6; LG HG2 30.9, 34.0 instead of 35.9, 40.8; Panasonic
-29.7, 39.2 instead of 33.1, 43.0; nowhere less than 91 % of a drive is covered there. With |I| beside p the score of the
-NMC drive is 4 mV higher; with x in place of its logarithm 2 mV.
+29.7, 39.2 instead of 33.1, 43.0, with an earlier file; nowhere less than 91 % of a drive is covered there. With |I|
+beside p the score of the NMC drive is 4 mV higher; with x in place of its logarithm 2 mV.
 """
 
 from __future__ import annotations
