@@ -107,8 +107,8 @@ def outside_finding(model: Row) -> str:
         return ""
     return (
         f"{share:.1f} % of the test samples lie outside the range the correction was trained on; its inputs are "
-        "held at the edge there. Its bands in free run reach as much farther as it would go on from the edge, "
-        "which nothing has calibrated."
+        "held at the edge there. Its bands in free run are wider there by what it would add if it went on beyond the "
+        "edge; no data has calibrated that."
     )
 
 
