@@ -36,7 +36,7 @@ def seen_nats(case: BlindCase) -> float | None:
     problem = with_fine_numerics(
         inverse_problem(Cell.from_bpx(case.declared), case.measurements, case.soc0, model=model)
     )
-    return _said_more(problem, case.effects)
+    return _said_more(problem, case.effects, Archive(None, ""))
 
 
 def seen_on_measured(
@@ -45,14 +45,14 @@ def seen_on_measured(
     """Nats that the best of several right answers says more of unseen data than the declared model, where a model of a
     measured cell errs as such models do; None where there is no right name, or none of them can be simulated."""
     problem = replace(inverse_problem(declared, [data], soc0), trust="measured")
-    said = [_said_more(problem, (name,)) for name in answers]
+    archive = Archive(None, "")  # of all answers: what they are held against is fitted once
+    said = [_said_more(problem, (name,), archive) for name in answers]
     return max((nats for nats in said if nats is not None), default=None)
 
 
-def _said_more(problem: InverseProblem, effects: tuple[str, ...]) -> float | None:
+def _said_more(problem: InverseProblem, effects: tuple[str, ...], archive: Archive) -> float | None:
     """Than the best hypothesis that lacks one of the effects, nats."""
     blocks = blocks_of(problem)
-    archive = Archive(None, "")
 
     def fit(hypothesis: tuple[str, ...]) -> FittedHypothesis | None:
         return fitted_hypothesis(problem, blocks, hypothesis, None, archive)

@@ -33,7 +33,7 @@ from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
 
 EVALUATIONS = 100
-"""At most: the descents to the shipped cell files end before, by GAIN."""
+"""At most: the descents to both files of the Panasonic NCR18650PF and to an LG 18650HG2 end before, by GAIN."""
 GAIN = 1e-4
 """Of the cost: a step that gains less than this share of it is the last."""
 NOTED_ZERO = 0.02
