@@ -90,7 +90,7 @@ def calibrate_files(
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
-    """Raises InputError for a record that is given twice or too short, or a temperature of one that no cell has."""
+    """Raises DataError for a record that is given twice or too short, InputError for a temperature that no cell has."""
     check_distinct(measurements)
     for record in measurements:
         span_s = float(record.time_s[-1] - record.time_s[0])
