@@ -151,10 +151,13 @@ class Model:
         cell = self.cell_at(x)
         return [r.rows.voltage_v - self.run(i, cell, x)[0] for i, r in enumerate(self.records)]
 
+    def misfits(self, x: Array) -> list[Array]:
+        """(rows,) of each record: errors over what they are expected to be, large ones by their size."""
+        return [w * saturated(e) for w, e in zip(self.weights, self.errors(x), strict=True)]
+
     def residual(self, x: Array) -> Array:
-        """All errors over what they are expected to be, large ones by their size, and the priors."""
-        parts = [w * saturated(e) for w, e in zip(self.weights, self.errors(x), strict=True)]
-        return np.concatenate([*parts, x])
+        """All misfits, and the priors."""
+        return np.concatenate([*self.misfits(x), x])
 
     def jacobian(self, x: Array) -> Array:
         """(rows + n, n) slopes of `residual`: one-sided differences, and in closed form for the knots."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.calibration.model import Model, saturated
+from aesi.calibration.model import Model
 from aesi.numerics.typing import Array
 from aesi.physics.balance import aged_range
 from aesi.physics.cell import Cell
@@ -68,6 +68,4 @@ def _all_as_aged(model: Model, x: Array, like: int) -> Array:
 
 def _cost(model: Model, x: Array) -> float:
     """Of the records alone, without the priors."""
-    return float(
-        sum(np.sum((w * saturated(e)) ** 2) for w, e in zip(model.weights, model.errors(x), strict=True))
-    )
+    return float(sum(np.sum(misfit**2) for misfit in model.misfits(x)))
