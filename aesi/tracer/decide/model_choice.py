@@ -62,6 +62,8 @@ def with_model(
     first = search(single, fits)
     if reduction is None or not reduction.notable:
         return told(first, "espm")
+    if problem.has_good:
+        return told(first, "espm", ", which approximates alike in the good records")
     if first.verdict.word == "unknown" and not _explains(first.paths["tight"], reduction):
         return told(first, "espm", ", which leaves far more than the two differ by")
     full = fine("dfn")
