@@ -241,7 +241,13 @@ def _told(
 
 
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, ...]:
-    notes = [note for record in (*evidence.path.problem.records, *tested) for note in record.notes]
+    records = evidence.path.problem.records
+    known = [
+        f"{r.name} is known to be good: what was found is what the others have beside it."
+        for r in records
+        if r.good
+    ]
+    notes = [*known, *(note for record in (*records, *tested) for note in record.notes)]
     notes += [note for path in evidence.paths.values() for note in path.notes]
     notes += evidence.limits
     if evidence.fault is not None:

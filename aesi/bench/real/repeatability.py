@@ -69,6 +69,7 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
         "good": good,
         "other": other,
         "model_error_mv": MV_PER_V * base.score.delta_v,
+        "soc0_off": [round(base.values["soc0"][str(k)] - r.soc0, 4) for k, r in enumerate(problem.records)],
         "sds": {name: round(sds, 2) for name, sds in ratios},
     }
 

@@ -13,12 +13,11 @@ import numpy as np
 
 from aesi.errors import DataError
 from aesi.numerics.typing import BoolArray
-from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Evidence
-from aesi.tracer.decide.verdict import Thresholds, Verdict, look_alikes
+from aesi.tracer.decide.verdict import Thresholds, Verdict, beyond, look_alikes
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.model_state import ModelState
@@ -55,16 +54,16 @@ def gathered_beside(
 
 def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     """The verdict on a search beside good records; its confidence is still to be read off the margin."""
-    problem, blocks = path.problem, path.blocks
+    problem = path.problem
     good = problem.good_rows
-    before, left = (left_v(blocks, one, ~good) for one in (path.base, path.chosen))
-    usual = left_v(blocks, path.chosen, good & problem.compared)
+    before, left = (left_v(path, one, ~good) for one in (path.base, path.chosen))
+    usual = left_v(path, path.chosen, good & problem.compared)
     allowed = usual * (1.0 + NINETY * _relative_sd(problem, good))
     named = path.chosen.hypothesis
     groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -_best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
     reason = (
-        f"{1e3 * before:.1f} mV on data of {others} that the fit has not seen before, {1e3 * left:.1f} mV after; "
+        f"{1e3 * before:.1f} mV beyond the noise on unseen data of {others} before, {1e3 * left:.1f} mV after; "
         f"{1e3 * usual:.1f} mV on the good records"
     )
     if left > allowed:
@@ -73,9 +72,10 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     return Verdict("found" if named else "none", named, groups, 0.0, left, allowed, reason, margin)
 
 
-def left_v(blocks: Blocks, one: FittedHypothesis, rows: BoolArray) -> float:
-    """Root mean square of the residual of some rows in blocks that were left out, V."""
-    return float(np.sqrt(np.mean(held_out_residual(blocks, one)[rows] ** 2)))
+def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
+    """What a hypothesis leaves beyond noise of some rows, in blocks that it has not seen, V RMS."""
+    rmse_v = float(np.sqrt(np.mean(held_out_residual(path.blocks, one)[rows] ** 2)))
+    return beyond(rmse_v, path.problem.noise_v)
 
 
 def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:
