@@ -111,8 +111,8 @@ def chosen_splits(
 
 
 def judged(fitted: Sequence[Fitted], tests: Sequence[ErrorSeries]) -> dict[str, Any]:
-    """Model -> RMSE (mV), reduction against the declared model (per cent), and band of the pooled test records; `drives`
-    has RMSE and coverage of each."""
+    """Model -> RMSE (mV), reduction against the declared model (per cent), and band of the pooled test records; of each
+    by itself in `drives`."""
     return {one.model.name: _figures(one, tests) for one in fitted}
 
 
