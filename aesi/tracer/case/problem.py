@@ -13,11 +13,11 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.parameters import Parameter
-from aesi.physics import simulate
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
+from aesi.tracer.case.fit_simulation import fit_simulation
 from aesi.tracer.case.free_parameter import (
     STATE_OF_CHARGE,
     FreeParameter,
@@ -27,9 +27,7 @@ from aesi.tracer.case.free_parameter import (
     own,
     state_of_charge,
 )
-from aesi.tracer.case.instruments import instruments_undone
 from aesi.tracer.case.records import PreparedRecord
-from aesi.tracer.case.stepping import FEWER_POINTS, stepping
 
 Trust = Literal["exact", "tight", "loose", "measured", "beside"]
 """How far the declared parameters are believed. exact: fitted to this very cell by this very model.  tight: a careful
@@ -163,23 +161,8 @@ class InverseProblem:
         hold: Hold,
         rest_voltage_v: float | None = None,
     ) -> Run:
-        """One simulation, at the measured temperature where there is one; stoichiometries that run out are clipped, so
-        that a search is not stopped by them."""
-        needed = tuple(a for a in effects if a.effect.infers is None or data.temperature_degc is None)
-        data, needed = instruments_undone(data, needed)
-        spared = (FEWER_POINTS,) if self.model == "dfn" else ()
-        return simulate(
-            self.cell,
-            data.time_s,
-            data.current_a,
-            soc0,
-            (*spared, *needed, *stepping(data)),
-            data.temperature_degc,
-            hold,
-            rest_voltage_v=rest_voltage_v,
-            on_depletion="clip",
-            model=self.model,
-        )
+        """One simulation, see `fit_simulation`."""
+        return fit_simulation(self.cell, data, soc0, effects, hold, self.model, rest_voltage_v)
 
     def why_not(self, hypothesis: Sequence[str]) -> str:
         """Why a hypothesis cannot be simulated at its typical values: one sentence."""
