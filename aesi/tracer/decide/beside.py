@@ -2,7 +2,7 @@
 
 The model errs on all of them. The good records say how large its error is in this cell, and what of the instruments
 all of them share; effects act on the others alone. What is named is a difference between records, and what a right
-answer may leave is what the model leaves of the good ones. What the cell is made with, and its age, are the same in all.
+answer may leave is what the model leaves of the good ones. What the cell is made with, and its age, are alike in all.
 """
 
 from __future__ import annotations
