@@ -260,11 +260,13 @@ class DiscoverConfig(Section):
 
     fit, test : names of records (kind: virtual has them by role); a record in both goes on where the fit ends.
     fit_until_s : record -> time up to which fits see it.  until_s : what comes later is left out of every test record.
+    good : records of the cell that are known to be good; what is sought is what those in `fit` have beside them.
     holdout : the last share of each record, kept back where there are no test records.
     """
 
     fit: tuple[str, ...] = ()
     test: tuple[str, ...] = ()
+    good: tuple[str, ...] = ()
     fit_until_s: dict[str, Positive] = {}
     until_s: Positive | None = None
     holdout: Share = 0.3

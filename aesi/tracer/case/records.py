@@ -47,6 +47,7 @@ class PreparedRecord:
     fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of charge
     and what it is uncertain by.  seen_rows : rows at the start that only lead to what is judged.
     soc0_doubt : how far the voltage's own reading is from a state of charge that was given.
+    good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
     the white noise in each row of `thin`.  noise_full_v : of that in `data`.
     """
@@ -66,6 +67,7 @@ class PreparedRecord:
     soc0_doubt: float = 0.0
     seen_rows: int = 0
     notes: tuple[str, ...] = ()
+    good: bool = False
 
     @property
     def name(self) -> str:
@@ -253,10 +255,18 @@ def prepare_all(
     soc0: float | None,
     holdout: float,
     given: Sequence[ActiveEffect] = (),
+    good: Sequence[Measurement] = (),
 ) -> tuple[PreparedRecord, ...]:
-    """`prepare` over several measurements, thinned until their sum is within what fits can afford."""
+    """`prepare` over several measurements, thinned until their sum is within what fits can afford.
+
+    good : those that are known to be good, which stand last. They are fitted whole, and start where their voltage says.
+    """
     step = THIN_STEP_S
-    while step <= 30.0 and sum(len(_thinned(cell, m, step)[0]) for m in measurements) > FIT_SAMPLES:
+    every = (*measurements, *good)
+    while step <= 30.0 and sum(len(_thinned(cell, m, step)[0]) for m in every) > FIT_SAMPLES:
         step *= 2.0
     shared = len(measurements) > 1
-    return tuple(prepare(cell, m, soc0, holdout, step, given=given, shared=shared) for m in measurements)
+    return (
+        *(prepare(cell, m, soc0, holdout, step, given=given, shared=shared) for m in measurements),
+        *(replace(prepare(cell, m, None, 0.0, step, given=given), good=True) for m in good),
+    )

@@ -61,6 +61,8 @@ def with_model(
     single = fine("espm")
     fits = kept(single, None)
     first = search(single, fits)
+    if problem.has_good:
+        return told(first, "espm", ", since the good records share what it approximates")
     reduction = _larger(reduction, first.paths["tight"])
     if reduction is None or not reduction.notable:
         return told(first, "espm")
