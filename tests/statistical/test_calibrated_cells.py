@@ -11,7 +11,6 @@ from aesi.data.catalogue import locate
 from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 
-OLDER = pytest.mark.xfail(reason="the shipped file is from before the zero of whole cycles", strict=False)
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
 
 
@@ -19,7 +18,7 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
 @pytest.mark.parametrize(
     ("name", "file", "data"),
     [
-        pytest.param("hg2", "lg_18650hg2", "lg_18650hg2", marks=OLDER),
+        ("hg2", "lg_18650hg2", "lg_18650hg2"),
         ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
         ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
     ],
