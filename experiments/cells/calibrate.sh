@@ -1,7 +1,8 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
-# Without arguments all three, into this folder. Each takes some minutes of one processor.
+# Without arguments all three, into this folder. Each takes some minutes of one processor. The shipped file of the Panasonic
+# over temperatures is from before its pulses, which are of three months, were fitted in one state (docs/cells.md).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
