@@ -40,11 +40,20 @@ def seen_nats(case: BlindCase) -> float | None:
 
 
 def seen_on_measured(
-    declared: Cell, data: Measurement, soc0: float | None, answers: Sequence[str]
+    declared: Cell,
+    data: Measurement,
+    soc0: float | None,
+    answers: Sequence[str],
+    good: Sequence[Measurement] = (),
+    holdout: float = 0.3,
 ) -> float | None:
     """Nats that the best of several right answers says more of unseen data than the declared model, where a model of a
-    measured cell errs as such models do; None where there is no right name, or none of them can be simulated."""
-    problem = replace(inverse_problem(declared, [data], soc0), trust="measured")
+    measured cell errs as such models do; None where there is no right name, or none of them can be simulated.
+
+    good : records of the cell that are known to be good.  holdout : last share of the data that is kept back.
+    """
+    problem = inverse_problem(declared, [data], soc0, holdout, good=good)
+    problem = replace(problem, trust="beside" if good else "measured")
     archive = Archive(None, "")  # of all answers: what they are held against is fitted once
     said = [_said_more(problem, (name,), archive) for name in answers]
     return max((nats for nats in said if nats is not None), default=None)

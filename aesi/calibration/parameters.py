@@ -75,6 +75,8 @@ RATES = (
     "convention: rates of cells of one chemistry scatter by a factor of three either way; no source opened"
 )
 TORTUOSITY = "convention: tortuosities scatter by a third; no source opened"
+SOLID_EA, SALT_EA = 20e3, 5e3
+"""J/mol, deviations of the prior: a convention, with the sources below between 12 and 81, and 12 and 21 kJ/mol."""
 ENERGIES = (
     "graphite 30.3, NCO 80.6 kJ/mol, Ecker et al. 2015, doi:10.1149/2.0551509jes; graphite-SiOx 17.4, NMC811 12.0, "
     "O'Regan et al. 2022, doi:10.1016/j.electacta.2022.140700; NMC811 25, O'Kane et al. 2022; all as PyBaMM has them"
@@ -162,12 +164,12 @@ def free_parameters(cell: Cell, span_k: float, same_cell: bool = False) -> tuple
     if span_k > SPAN_K:
         n, p, e = cell.negative, cell.positive, cell.electrolyte
         out += [
-            Free("negative.diffusivity_energy", n.diffusivity_ea_j_mol, 20e3, "J/mol", ENERGIES, low=0.0),
-            Free("positive.diffusivity_energy", p.diffusivity_ea_j_mol, 20e3, "J/mol", ENERGIES, low=0.0),
+            Free("negative.diffusivity_energy", n.diffusivity_ea_j_mol, SOLID_EA, "J/mol", ENERGIES, low=0.0),
+            Free("positive.diffusivity_energy", p.diffusivity_ea_j_mol, SOLID_EA, "J/mol", ENERGIES, low=0.0),
             Free("negative.rate_energy", RATE_ENERGY, RATE_ENERGY_SD, "J/mol", KINETIC_ENERGIES, low=0.0),
             Free("positive.rate_energy", RATE_ENERGY, RATE_ENERGY_SD, "J/mol", KINETIC_ENERGIES, low=0.0),
-            Free("electrolyte.conductivity_energy", e.conductivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
-            Free("electrolyte.diffusivity_energy", e.diffusivity_ea_j_mol, 5e3, "J/mol", SALT_ENERGIES, low=0.0),
+            Free("electrolyte.conductivity_energy", e.conductivity_ea_j_mol, SALT_EA, "J/mol", SALT_ENERGIES, low=0.0),
+            Free("electrolyte.diffusivity_energy", e.diffusivity_ea_j_mol, SALT_EA, "J/mol", SALT_ENERGIES, low=0.0),
             Free("negative.film_energy", FILM_ENERGY, FILM_ENERGY_SD, "J/mol", FILM_ENERGIES, low=0.0),
             Free("positive.film_energy", FILM_ENERGY, FILM_ENERGY_SD, "J/mol", FILM_ENERGIES, low=0.0),
         ]  # fmt: skip

@@ -20,6 +20,9 @@ Only rows inside the range that their model was trained on are counted: a model 
 drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
 band is wider by as much as the prediction would move if the model were extrapolated (`SparseModel.reach`).
 
+No piece tells of temperatures that no fitted row had. What is open of the activation energies there stands beside the
+calibrated width as an independent error (parameter_spread.py).
+
 Parts of a drive lie closer to what their models were fitted to than a drive that comes next, and whole drives may lie
 further away; both are left out, and calibrate together, since the scale tells how far each was.
 
@@ -35,32 +38,33 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from aesi.conformal.horizon_band import HorizonBand, calibrated_band
 from aesi.conformal.intervals import Intervals
 from aesi.conformal.local_scale import covariates
-from aesi.conformal.parameter_spread import spread
-from aesi.conformal.seen import growth
+from aesi.conformal.parameter_spread import spread, thermal_spread
 from aesi.errors import InputError
 from aesi.numerics.typing import Array, BoolArray, SavedState
 from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
 
-SCHEMA = "aesi.free_run_bands/7"
+SCHEMA = "aesi.free_run_bands/8"
 
 
 @dataclass(frozen=True, eq=False)
 class FreeRunBands:
     """Bands at miss rate `alpha` for each calibrated horizon, shortest first.
 
-    seen : what the model was fitted to.  root : what that leaves open of the physics (parameter_spread.py).
-    Either is None where nothing is known of it.
+    seen : what the model was fitted to.  root : what that leaves open of the physics, energies_j_mol : what is open of
+    its change with temperature (parameter_spread.py). Each is None where nothing is known of it.
     """
 
     alpha: float
     horizons: tuple[HorizonBand, ...]
     seen: Visited | None = None
     root: Array | None = None
+    energies_j_mol: Array | None = None
 
     def __repr__(self) -> str:
         return f"FreeRunBands({100 * (1 - self.alpha):.0f} %, {len(self.horizons)} horizons)"
@@ -76,6 +80,7 @@ class FreeRunBands:
         excess: Sequence[Array | None] | None = None,
         seen: Visited | None = None,
         root: Array | None = None,
+        energies_j_mol: Array | None = None,
         stretches: int | None = None,
     ) -> FreeRunBands:
         """Calibrate on out-of-sample prediction errors: of records, or pieces, that the model was not fitted to.
@@ -87,7 +92,7 @@ class FreeRunBands:
         inside : one (n_i,) array a record, True inside the trained range of the model that predicted; None for
         everywhere.
         excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it keeps no leverage.
-        seen, root : of the model that the bands are for.
+        seen, root, energies_j_mol : of the model that the bands are for.
         stretches : how many stretches of the records err independently over a whole drive; by default their pieces.
 
         Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
@@ -102,7 +107,7 @@ class FreeRunBands:
             calibrated_band(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s, stretches)
             for horizon in sorted(errors_by_horizon)
         ]
-        return cls(alpha, tuple(bands), seen, root)
+        return cls(alpha, tuple(bands), seen, root, energies_j_mol)
 
     def at(
         self,
@@ -110,16 +115,16 @@ class FreeRunBands:
         spread_v: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
-        temperature_degc: Array | None = None,
+        thermal_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to predictions made `horizon_s` ahead; between two calibrated horizons
         the half-width is interpolated in the logarithm of time.
 
         spread_v : (n,) of `spread`.  reach_v : (n,) what to add to the half-width, how far the prediction would move if
-        the model went on beyond its trained range.
+        the model went on beyond its trained range.  thermal_v : (n,) of `thermal`.
         """
         elapsed = np.full(len(spread_v), horizon_s)
-        return self._around(elapsed, spread_v, excess, reach_v, temperature_degc)
+        return self._around(elapsed, spread_v, excess, reach_v, thermal_v)
 
     def along(
         self,
@@ -127,34 +132,40 @@ class FreeRunBands:
         spread_v: Array,
         excess: Array | None = None,
         reach_v: Array | float = 0.0,
-        temperature_degc: Array | None = None,
+        thermal_v: Array | float = 0.0,
     ) -> tuple[Array, Array]:
         """(low, high), (n,) V relative to a free run of n samples from a measurement at its first sample.
 
         Below the shortest horizon its band holds; from ten times the longest finite one on, that of the
-        whole drive.  spread_v, reach_v : as for `at`.
+        whole drive.  spread_v, reach_v, thermal_v : as for `at`.
         """
         elapsed = dt_s * np.arange(len(spread_v), dtype=np.float64)
-        return self._around(elapsed, spread_v, excess, reach_v, temperature_degc)
+        return self._around(elapsed, spread_v, excess, reach_v, thermal_v)
 
     def spread(self, series: ErrorSeries) -> Array:
         """(n,) V, what the fitted rows leave open of the physics along a record; nought where that is not known.
 
         Raises InputError for a record without the slopes that it takes."""
-        if self.root is None:
+        return (
+            np.zeros(len(series)) if self.root is None else spread(_slopes(series, len(self.root)), self.root)
+        )
+
+    def thermal(self, series: ErrorSeries) -> Array:
+        """(n,) V, what the fitted temperatures leave open of the physics along a record; nought where that is not
+        known, or the temperature was not measured.
+
+        Raises InputError for a record without the slopes that it takes."""
+        if self.energies_j_mol is None or self.seen is None:
             return np.zeros(len(series))
-        if series.slopes_v is None or series.slopes_v.shape[1] != len(self.root):
-            raise InputError(
-                f"{series.name}: the band asks for {len(self.root)} slopes of the physics; run the experiment again."
-            )
-        return spread(series.slopes_v, self.root)
+        slopes = _slopes(series, len(self.energies_j_mol))
+        return thermal_spread(slopes, self.energies_j_mol, self.seen.per_energy(series.temperature_degc))
 
     def intervals(
         self, series: ErrorSeries, free: FreeRun, reach_v: Array | float = 0.0, horizon_s: float | None = None
     ) -> Intervals:
         """The band along a free run of a record, or of predictions `horizon_s` ahead, with their own `reach_v`;
         `warm` is False outside the trained range, where the band is not calibrated."""
-        where = self.spread(series), free.excess, reach_v, series.temperature_degc
+        where = self.spread(series), free.excess, reach_v, self.thermal(series)
         low, high = self.along(series.dt_s, *where) if horizon_s is None else self.at(horizon_s, *where)
         return Intervals(low, high, ~free.outside)
 
@@ -166,6 +177,7 @@ class FreeRunBands:
             "horizons": [band.to_state() for band in self.horizons],
             "seen": None if self.seen is None else self.seen.to_state(),
             "root": self.root,
+            "energies_j_mol": self.energies_j_mol,
         }
 
     @classmethod
@@ -177,10 +189,12 @@ class FreeRunBands:
             )
         alpha = float(state["alpha"])
         seen = None if state["seen"] is None else Visited.from_state(state["seen"])
-        root = None if state["root"] is None else np.asarray(state["root"], dtype=float)
-        return cls(
-            alpha, tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"]), seen, root
+        root, energies = (
+            None if state[key] is None else np.asarray(state[key], dtype=float)
+            for key in ("root", "energies_j_mol")
         )
+        horizons = tuple(HorizonBand.from_state(item, alpha) for item in state["horizons"])
+        return cls(alpha, horizons, seen, root, energies)
 
     def _around(
         self,
@@ -188,13 +202,23 @@ class FreeRunBands:
         spread_v: Array,
         excess: Array | None,
         reach_v: Array | float,
-        temperature_degc: Array | None,
+        thermal_v: Array | float,
     ) -> tuple[Array, Array]:
-        grown = 1.0 if self.seen is None else growth(self.seen, temperature_degc)
-        columns = covariates(spread_v, excess, grown)
+        columns = covariates(spread_v, excess)
         halves = np.array([band.half_width(columns) for band in self.horizons])
+        # What an earlier measurement takes off the calibrated width, it takes off what the temperature leaves open too.
+        halves *= np.hypot(1.0, ndtri(1 - self.alpha / 2) * thermal_v / halves[-1])
         half = _between(halves, [band.horizon_s for band in self.horizons], elapsed_s) + reach_v
         return -half, half
+
+
+def _slopes(series: ErrorSeries, count: int) -> Array:
+    """(n, count) V."""
+    if series.slopes_v is None or series.slopes_v.shape[1] != count:
+        raise InputError(
+            f"{series.name}: the band asks for {count} slopes of the physics; run the experiment again."
+        )
+    return series.slopes_v
 
 
 def _between(halves: Array, horizons: Sequence[float], elapsed_s: Array) -> Array:

@@ -63,15 +63,11 @@ class LocalScale:
         return cls(np.asarray(state["weights"], dtype=float), float(state["floor"]))
 
 
-def covariates(spread_v: Array, excess: Array | None = None, growth: Array | float = 1.0) -> Array:
-    """(n, p) columns of (1): spread_v (n,) V, excess (n,), nought where the model cannot tell.
-
-    growth : (n,) by how much errors are larger than at the fitted temperatures (seen.py); the spread follows that by
-    itself, as the physics does.
-    """
+def covariates(spread_v: Array, excess: Array | None = None) -> Array:
+    """(n, p) columns of (1): spread_v (n,) V, excess (n,), nought where the model cannot tell."""
     n = len(spread_v)
     beyond = np.zeros(n) if excess is None else np.log1p(excess)
-    return np.column_stack([growth * np.ones(n), spread_v, growth * beyond])
+    return np.column_stack([np.ones(n), spread_v, beyond])
 
 
 def _nonnegative_quantile(columns: Array, sizes: Array, level: float) -> Array:

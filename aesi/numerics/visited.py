@@ -54,14 +54,19 @@ class Visited:
         """(n,) exp(-(d / LENGTH)**2 / 2), of a model's errors there and at the nearest visited state of charge."""
         return np.asarray(np.exp(-0.5 * (self.distance(soc) / LENGTH) ** 2))
 
-    def thermal_distance(self, temperature_degc: Array | None) -> Array | float:
-        """(n,) E / R |1 / T - 1 / T_near|, >= 0: log of what overpotentials change by from the nearest temperature of
-        the span, with an activation energy E between those of kinetics and diffusion. 0 where none was measured."""
+    def per_energy(self, temperature_degc: Array | None) -> Array | float:
+        """(n,) mol/J, |1 / T - 1 / T_near| / R, >= 0: by how much the logarithm of a rate at T moves with its
+        activation energy, if it is known at the nearest temperature of the span. 0 where none was measured."""
         if self.temperature_degc is None or temperature_degc is None:
             return 0.0
         near = np.clip(temperature_degc, *self.temperature_degc) + ZERO_CELSIUS_K
         apart = np.abs(1.0 / (temperature_degc + ZERO_CELSIUS_K) - 1.0 / near)
-        return np.asarray(np.nan_to_num(ENERGY_J_MOL / GAS_CONSTANT_J_MOL_K * apart))
+        return np.asarray(np.nan_to_num(apart / GAS_CONSTANT_J_MOL_K))
+
+    def thermal_distance(self, temperature_degc: Array | None) -> Array | float:
+        """(n,) >= 0: log of what overpotentials change by from the nearest temperature of the span, with an activation
+        energy between those of kinetics and diffusion."""
+        return ENERGY_J_MOL * self.per_energy(temperature_degc)
 
     def to_state(self) -> SavedState:
         """Plain values."""

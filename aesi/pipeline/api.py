@@ -38,6 +38,7 @@ def discover(
     effect_files: Sequence[str | PathLike[str]] = (),
     model: ModelName | None = None,
     soh: float | None = None,
+    good: Data = (),
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
 ) -> Finding:
@@ -51,16 +52,17 @@ def discover(
     effect_files : Python files with effects of your own; they are run, so name only files that you trust.
     model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably.
     soh : share of the cell file's capacity that the cell had then; None takes all of it.
+    good : measurements of the same cell that are known to be good: what is sought is what `data` have beside them.
     out : a folder for discovery.json, report.html and model/, and for fits, so that an interrupted search goes on.
 
     Raises AesiError, one sentence, for what cannot be read, decided or be of this cell.
     """
-    given, looked, tested = declared_model(cell).with_soh(soh), _listed(data), _listed(tests)
-    rows = MOST_ROWS // max(1, len(looked) + len(tested))
-    measurements, judged = (tuple(_read(one, rows, hold) for one in part) for part in (looked, tested))
-    check_belongs(given.cell, [*measurements, *judged])
+    given, parts = declared_model(cell).with_soh(soh), [_listed(part) for part in (data, tests, good)]
+    rows = MOST_ROWS // max(1, sum(len(part) for part in parts))
+    measurements, judged, known = (tuple(_read(one, rows, hold) for one in part) for part in parts)
+    check_belongs(given.cell, [*measurements, *judged, *known])
     files = tuple(Path(file) for file in effect_files)
-    case = Case(given, measurements, judged, soc0, holdout, max_effects, seed, files, model=model)
+    case = Case(given, measurements, judged, soc0, holdout, max_effects, seed, files, model=model, good=known)
     finding = Finding(case, run_case(case, None if out is None else Path(out), progress))
     if out is not None:
         finding.save(Path(out))

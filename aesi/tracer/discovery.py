@@ -16,9 +16,10 @@ from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
-from aesi.tracer.case.checks import check_record, check_same_cell
+from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
+from aesi.tracer.decide.beside import gathered_beside
 from aesi.tracer.decide.evidence import Evidence, gathered
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
 from aesi.tracer.decide.verdict import Thresholds, Verdict
@@ -106,6 +107,7 @@ def discover(
     archive: FilePath | None = None,
     progress: Progress | None = None,
     model: ModelName | None = None,
+    good: Sequence[Measurement] = (),
 ) -> Discovery:
     """Find what `cell` lacks to explain the measurements.
 
@@ -115,17 +117,20 @@ def discover(
     effects : what may be tried.  given : effects that the declared model has already.  archive : a file that
     keeps fits, so that an interrupted search resumes.  model : "espm" or "dfn" for every hypothesis; None takes the
     porous electrode where it differs notably from the single particle.
+    good : records of the same cell that are known to be good. What is sought then is what the measurements have that
+    these have not.
 
     Raises DataError where the data cannot decide anything or do not belong to the cell.
     """
     began = time.perf_counter()
     if not measurements:
         raise DataError("give at least one measurement to look at.")
-    for data in (*measurements, *tests):
+    for data in (*measurements, *good, *tests):
         check_voltage(cell, data)
     problem = inverse_problem(
-        cell, measurements, soc0, 0.0 if tests else holdout, effects, given, model or "espm"
+        cell, measurements, soc0, 0.0 if tests else holdout, effects, given, model or "espm", good
     )
+    check_compared(problem)
     records = problem.records
     tested = tuple(prepare_test(cell, data, measurements, soc0, given) for data in tests)
     declared = ModelState(problem)
@@ -135,7 +140,8 @@ def discover(
     spent = _Spent(progress)
 
     def search(one: InverseProblem, kept: Archive) -> Evidence:
-        return gathered(one, max_effects, kept, Thresholds(), spent)
+        look = gathered_beside if one.has_good else gathered
+        return look(one, max_effects, kept, Thresholds(), spent)
 
     def kept(one: InverseProblem, beside: Archive | None) -> Archive:
         return Archive(archive, context_of(one), beside)
@@ -154,12 +160,13 @@ def inverse_problem(
     effects: Mapping[str, Effect] = CATALOGUE,
     given: Sequence[ActiveEffect] = (),
     model: ModelName = "espm",
+    good: Sequence[Measurement] = (),
 ) -> InverseProblem:
     """What `discover` searches; the arguments are its own.
 
     Raises DataError where a record has too little to decide anything.
     """
-    records = prepare_all(cell, measurements, soc0, holdout, given)
+    records = prepare_all(cell, measurements, soc0, holdout, given, good)
     for record in records:
         check_record(cell, record)
     there = {active.id for active in given} - _own(effects)
@@ -234,7 +241,13 @@ def _told(
 
 
 def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, ...]:
-    notes = [note for record in (*evidence.path.problem.records, *tested) for note in record.notes]
+    records = evidence.path.problem.records
+    known = [
+        f"{r.name} is known to be good: what was found is what the others have beside it."
+        for r in records
+        if r.good
+    ]
+    notes = [*known, *(note for record in (*records, *tested) for note in record.notes)]
     notes += [note for path in evidence.paths.values() for note in path.notes]
     notes += evidence.limits
     if evidence.fault is not None:

@@ -187,10 +187,16 @@ def discover(
     test: Annotated[
         list[Path] | None, typer.Option("--test", help="Measurement that chooses nothing; may be repeated.")
     ] = None,
+    good: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--good", help="Record of the cell that is known to be good: what do the others have beside it?"
+        ),
+    ] = None,
     soc0: options.Soc0 = None,
     soh: options.Soh = None,
     holdout: Annotated[
-        float, typer.Option(min=0.05, max=0.9, help="Last share of the data kept back, without --test.")
+        float, typer.Option(min=0.0, max=0.9, help="Last share of the data kept back, without --test.")
     ] = 0.3,
     max_effects: Annotated[int, typer.Option(min=0, max=10, help="Most effects that are added.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
@@ -228,7 +234,7 @@ def discover(
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
-    options.say_reading([*data, *(test or [])])
+    options.say_reading([*data, *(test or []), *(good or [])])
     from aesi.pipeline.discovery.cases import case_of_files
     from flows.jobs.start import discover as flow
 
@@ -247,8 +253,9 @@ def discover(
         without or [],
         model,
         soh,
+        good or [],
     )
-    options.say_notes(note for m in (*case.measurements, *case.tests) for note in m.notes)
+    options.say_notes(note for m in case.records for note in m.notes)
     flow(case, out, prefect)
 
 

@@ -119,7 +119,8 @@ def _subject(case: Case, experiment: str) -> Subject:
     from aesi.records import digest
     from flows.tracking.tracker import Subject
 
-    key = digest(*(m.time_s for m in case.measurements), *(m.voltage_v for m in case.measurements))
+    fitted = (*case.measurements, *case.good)
+    key = digest(*(m.time_s for m in fitted), *(m.voltage_v for m in fitted))
     return Subject(experiment, case.seed, key)
 
 
@@ -140,6 +141,7 @@ def _track_case(tracker: Tracker | None, case: Case) -> None:
             "data": ", ".join(m.name for m in case.measurements),
             "data_digest": ", ".join(m.digest for m in case.measurements),
             "test": ", ".join(m.name for m in case.tests),
+            **({"good": ", ".join(m.name for m in case.good)} if case.good else {}),
             "soc0": case.soc0,
             "soh": case.soh,
             "holdout": case.holdout,

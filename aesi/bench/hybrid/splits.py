@@ -111,7 +111,8 @@ def chosen_splits(
 
 
 def judged(fitted: Sequence[Fitted], tests: Sequence[ErrorSeries]) -> dict[str, Any]:
-    """Model -> RMSE (mV), reduction against the declared model (per cent), and band of the pooled test records."""
+    """Model -> RMSE (mV), reduction against the declared model (per cent), and band of the pooled test records; of each
+    by itself in `drives`."""
     return {one.model.name: _figures(one, tests) for one in fitted}
 
 
@@ -130,6 +131,12 @@ def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
         "mser_pct": float(100.0 * (1.0 - np.mean(left**2) / np.mean(declared**2))),
         "diverged": sum(run.diverged_at is not None for run in runs),
     }
+    ends = np.cumsum([len(series) for series in tests])[:-1]
+    drives = {
+        series.name: {"rmse_mv": MV_PER_V * float(np.sqrt(np.mean(part**2)))}
+        for series, part in zip(tests, np.split(left, ends), strict=True)
+    }
+    figures["drives"] = drives
     if one.bands is None:
         return figures
     alpha = one.bands.alpha
@@ -140,11 +147,12 @@ def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
     low = np.concatenate([band.lower_v for band in bands])
     high = np.concatenate([band.upper_v for band in bands])
     covered = (low <= left) & (left <= high)
-    ends = np.cumsum([len(series) for series in tests])[:-1]
+    for drive, part in zip(drives.values(), np.split(covered, ends), strict=True):
+        drive["coverage_pct"] = 100.0 * float(part.mean())
     figures |= {
         "rows": len(left),
         "coverage_pct": 100.0 * float(covered.mean()),
-        "worst_drive_coverage_pct": 100.0 * min(float(part.mean()) for part in np.split(covered, ends)),
+        "worst_drive_coverage_pct": min(drive["coverage_pct"] for drive in drives.values()),
         "width_mv": MV_PER_V * float(np.mean(high - low)),
         "winkler_mv": MV_PER_V * float(np.mean(_winkler(left, low, high, alpha))),
     }

@@ -8,7 +8,10 @@ from typing import Literal
 
 from aesi.bench.real.faults import FaultKind
 
-Group = Literal["withheld", "fault", "physics", "ageing", "witness", "control"]
+Group = Literal[
+    "withheld", "fault", "physics", "ageing", "witness", "control", "fault_beside", "control_beside"
+]
+"""`beside`: with a record of the cell beside it that is known to be good."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,7 @@ class RealCase:
     record: 'temperature' (the thermocouple), 'capacity' (share lost against the record in `against`) or 'declared
     capacity' (share that the record in `against` lacks of what the file declares).
     spectra : file of impedance in the record's set, taken beside the record.
+    good : records of the same cell that the finder is told to be good.
     matched : the case that is the same without what was put in or withheld.
     source : of the answer.  development : whether its figures choose anything.
     """
@@ -58,5 +62,6 @@ class RealCase:
     measured: Literal["temperature", "capacity", "declared capacity"] | None = None
     against: Take | None = None
     spectra: str | None = None
+    good: tuple[Take, ...] = ()
     matched: str | None = None
     development: bool = False

@@ -27,6 +27,8 @@ from aesi.records import Measurement, Spectrum
 from aesi.tracer import Discovery, discover
 
 LIMIT_S = 600.0
+HELD_OUT = 0.3
+"""Last share of a record that chooses nothing, as `aesi discover` has it."""
 MOST_ROWS = 20_000
 """Rows that a case is read with; more are averaged, as `aesi discover` does."""
 DRAWN = 160
@@ -47,15 +49,17 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         "record": f"{case.take.set}/{case.take.file}",
         "seconds_of_record": case.take.stop_s,
         "given": "temperature" if case.take.temperature else "no temperature",
+        "good_records": [f"{take.set}/{take.file}" for take in case.good],
         "put_in": f"{case.fault.kind} {case.fault.size:g}" if case.fault else "",
         "answer": list(case.answers),
         "source": case.source,
         "matched": case.matched,
     }
     try:
-        data = _read(case.take)
-        declared = Cell.from_bpx(_cell(case.cell, Path(cells)))
+        data = record(case.take)
+        declared = declared_cell(case.cell, cells)
         known = _known(case, data, declared)
+        good = [record(take) for take in case.good]
     except DataError as error:
         return row | {"verdict": "not run", "error": str(error), **spent.row}
     soc0 = case.soc0
@@ -63,16 +67,19 @@ def judged(case: RealCase, cells: str, limit_s: float | None = LIMIT_S) -> dict[
         data = with_fault(data, case.fault.kind, case.fault.size)
         declared = declared_with_fault(declared, case.fault.kind, case.fault.size)
         soc0 = soc0_with_fault(soc0, case.fault.kind, case.fault.size)
-    found = answer_of(lambda: discover(declared, [data], soc0=soc0), limit_s)
+    held = 0.0 if good else HELD_OUT  # what a record has beside good ones is asked of all of it
+    found = answer_of(lambda: discover(declared, [data], soc0=soc0, holdout=held, good=good), limit_s)
     if isinstance(found, NoAnswer):
         return row | found.row | {"effects": [], "named": False} | spent.row
     answer = _held_against(case, known, found, discovery_content(found), data, declared, soc0)
-    return row | answer | spent.row | {"seen_nats": seen_on_measured(declared, data, soc0, case.answers)}
+    seen = seen_on_measured(declared, data, soc0, case.answers, good, held)
+    return row | answer | spent.row | {"seen_nats": seen}
 
 
-def _cell(name: str, folder: Path) -> Path:
+def declared_cell(name: str, cells: str) -> Cell:
+    """By the name that a case gives.  cells : folder of the cell files.  Raises DataError where a data set lacks it."""
     place, colon, file = name.partition(":")
-    return locate(place, file) if colon else folder / name
+    return Cell.from_bpx(locate(place, file) if colon else Path(cells) / name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +97,7 @@ def _known(case: RealCase, data: Measurement, declared: Cell) -> Known:
     truth = dict(case.parameters)
     course, lost = None, None
     if case.group == "withheld":
-        full = _read(replace(case.take, temperature=True))
+        full = record(replace(case.take, temperature=True))
         if full.temperature_degc is None:
             raise DataError(f"{full.name} has no column of temperature.")
         course = full.temperature_degc
@@ -98,7 +105,7 @@ def _known(case: RealCase, data: Measurement, declared: Cell) -> Known:
         reference_degc = declared.initial_temperature_k - ZERO_CELSIUS_K
         truth["ambient_temperature.shift_k"] = float(np.mean(course)) - reference_degc
     if case.against is not None:
-        other_ah = _charge_ah(_read(case.against))
+        other_ah = _charge_ah(record(case.against))
         by_file = case.measured == "declared capacity"
         lost = 1 - (other_ah / declared.capacity_ah if by_file else _charge_ah(data) / other_ah)
     spectra = () if case.spectra is None else read_spectra(locate(case.take.set, case.spectra))
@@ -126,7 +133,8 @@ def _held_against(
     return row
 
 
-def _read(take: Take) -> Measurement:
+def record(take: Take) -> Measurement:
+    """As the finder is given it.  Raises DataError where it cannot be had."""
     columns: dict[str, str | None] | None = None if take.temperature else {"temperature_degc": None}
     path = locate(take.set, take.file)
     if take.set in ("about_energy_nmc", "lg_m50t_w8"):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from aesi.bench.real.case import Fault, RealCase, Take
 from aesi.bench.real.faults import FaultKind
+from aesi.bench.real.good import beside_good
 
 HG2, PANASONIC, NMC, M50T = "lg_18650hg2", "panasonic_ncr18650pf", "about_energy_nmc", "lg_m50t_w8"
 CELLS = {
@@ -84,6 +85,7 @@ SPECTRA = {"25degC": "25degC_eis", "10degC": "10degC_eis"}
 def plan() -> tuple[RealCase, ...]:
     """All cases in a fixed order; every other one of a group is for development."""
     cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing(), *_witnesses()]
+    cases += beside_good(cases)
     there = {case.name for case in cases}
     seen: dict[str, int] = {}
     out = []

@@ -57,6 +57,7 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
         **rate(of("physics"), "named").named("physics_named"),
         "size_error_median": _median(sized, "size_error"),
         **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named("size_covered"),
+        **_beside(of("fault_beside"), of("control_beside")),
         **_initial_state([r for r in of("fault") if r["put_in"].startswith(SOC0)]),
         **_controls(of("control"), rows),
         **rate(of("ageing"), "named").named("ageing_named"),
@@ -85,6 +86,24 @@ def _withheld(rows: Sequence[CaseRow]) -> CaseRow:
 def _seen(rows: Sequence[CaseRow]) -> list[CaseRow]:
     """Of which the right name says enough of unseen data to be admitted."""
     return [r for r in rows if r.get("seen_nats") is not None and r["seen_nats"] > SEEN_NATS]
+
+
+def _beside(rows: Sequence[CaseRow], controls: Sequence[CaseRow]) -> CaseRow:
+    """Of faults and contacts with good records of the cell beside them, and of records without a fault."""
+    faults = [r for r in rows if r["answer"]]
+    sized = [r for r in faults if r.get("size_error") is not None]
+    silent = [r for r in rows if not r["answer"]]
+    return {
+        **rate(faults, "named").named("beside_named"),
+        **rate(_seen(faults), "named").named("beside_seen_named"),
+        "beside_named_by_kind": _by_kind(faults),
+        "beside_size_error_median": _median(sized, "size_error"),
+        **rate([r for r in sized if r.get("size_covered") is not None], "size_covered").named(
+            "beside_size_covered"
+        ),
+        **rate(silent, "named").named("beside_wrong_soc0_silent"),
+        **rate(controls, "named").named("beside_control_silent"),
+    }
 
 
 def _initial_state(rows: Sequence[CaseRow]) -> CaseRow:

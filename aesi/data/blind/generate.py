@@ -59,10 +59,11 @@ class _Bench:
         model: LaboratoryModel | None = None,
         radial_points: int | None = None,
         profiles: Sequence[Profile] | None = None,
+        between: int = 1,
     ) -> list[TrueRun]:
-        """The cell with these changes under its tests."""
+        """The cell with these changes under its tests, in so many rows for each of them."""
         setup = Setup(self.declared, model or self.spec.model, (*self.own, *applied), radial_points)
-        return [simulate_truth(setup, profile) for profile in profiles or self.profiles]
+        return [simulate_truth(setup, profile, between) for profile in profiles or self.profiles]
 
     def unexplained(
         self,
@@ -92,16 +93,20 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     strange = [name for name in spec.recipes if name in STRANGERS]
     truth = {f"own.{a.change}.{k}": v for a in bench.own for k, v in a.values.items()}
     truth.update({f"{RECIPES[n].label}.{k}": v for n, values in sizes.items() for k, v in values.items()})
-    traces = _changed(bench, sizes)
+    between = max((RECIPES[name].between for name in known), default=1)
+    traces = _changed(bench, sizes, between)
     for name in strange:
         traces = _with_stranger(name, traces, bench, truth, int(rng.integers(2**31)))
     written = [Written(t.time_s, t.current_a, t.voltage_v) for t in traces]
     for name in known:
         written = [RECIPES[name].instrument(one, sizes[name]) for one in written]
+    written = [Written(w.time_s[::between], w.current_a[::between], w.voltage_v[::between]) for w in written]
     truth["rms_mv"] = MV_PER_V * _rms(bench.unexplained(written))
     label, also = _label(known, strange)
     neutral = (REDUCTION,) if spec.model == "DFN" else ()
-    measurements = tuple(_measured(spec, one, t, rng) for one, t in zip(written, traces, strict=True))
+    measurements = tuple(
+        _measured(spec, one, t, rng, between) for one, t in zip(written, traces, strict=True)
+    )
     soc0 = spec.soc0 if spec.soc0_given else None
     return BlindCase(spec, measurements, label, also, neutral, soc0, bench.declared, truth)
 
@@ -199,27 +204,27 @@ def _effect_alone(recipe: Recipe, values: Mapping[str, float], bench: _Bench) ->
     return bench.unexplained(written, "SPMe", COARSE_POINTS)
 
 
-def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench) -> list[Array]:
+def _difference(recipe: Recipe, values: Mapping[str, float], bench: _Bench, between: int = 1) -> list[Array]:
     """What an option of the single particle changes against the same option without effect, a record each."""
     assert recipe.change is not None
     assert recipe.reference is not None
     points = recipe.radial_points
-    changed = bench.run((Applied(recipe.change, dict(values)),), "SPMe", points)
-    without = bench.run((recipe.reference(),), "SPMe", points)
+    changed = bench.run((Applied(recipe.change, dict(values)),), "SPMe", points, between=between)
+    without = bench.run((recipe.reference(),), "SPMe", points, between=between)
     return [c.voltage_v - w.voltage_v for c, w in zip(changed, without, strict=True)]
 
 
-def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]]) -> list[TrueRun]:
-    """The noise-free records of the cell with all its effects."""
+def _changed(bench: _Bench, sizes: Mapping[str, dict[str, float]], between: int) -> list[TrueRun]:
+    """The noise-free records of the cell with all its effects, in so many rows for each of its tests."""
     together = [
         Applied(str(RECIPES[n].change), v)
         for n, v in sizes.items()
         if RECIPES[n].change and not RECIPES[n].reference
     ]
-    traces = bench.run(tuple(together))
+    traces = bench.run(tuple(together), between=between)
     for name, values in sizes.items():
         if RECIPES[name].reference:
-            added = _difference(RECIPES[name], values, bench)
+            added = _difference(RECIPES[name], values, bench, between)
             traces = [_shifted(t, a) for t, a in zip(traces, added, strict=True)]
     return traces
 
@@ -251,9 +256,12 @@ def _label(known: list[str], strange: list[str]) -> tuple[str, tuple[str, ...]]:
     return "+".join(dict.fromkeys(RECIPES[name].label for name in known)), also
 
 
-def _measured(spec: CaseSpec, written: Written, trace: TrueRun, rng: np.random.Generator) -> Measurement:
+def _measured(
+    spec: CaseSpec, written: Written, trace: TrueRun, rng: np.random.Generator, between: int
+) -> Measurement:
     instrument = Instrument(spec.voltage_noise_v, spec.current_noise_a)
-    shown = TrueRun(written.time_s, written.current_a, written.voltage_v, trace.temperature_degc, trace.soc)
+    degc, soc = trace.temperature_degc[::between], trace.soc[::between]
+    shown = TrueRun(written.time_s, written.current_a, written.voltage_v, degc, soc)
     return instrument.write(shown, spec.name, rng, spec.warmth != "none")
 
 

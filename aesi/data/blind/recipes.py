@@ -30,6 +30,11 @@ class Written:
     voltage_v: Array
 
 
+FINER = 10
+"""Rows of the cell for one of an instrument that reads between them: a straight line between two rows of a second is up
+to 25 mV off where the current jumps."""
+
+
 def _as_is(written: Written, values: Values) -> Written:
     return written
 
@@ -47,6 +52,7 @@ class Recipe:
     needs_soc0 : whether an unknown state of charge takes it up.  warm : whether it is about the temperature, which
     no column then gives away.
     radial_points : of the two runs whose difference counts; their mesh error cancels.
+    between : the instrument reads between rows: so many of the cell are made for each of its own.
     """
 
     label: str
@@ -62,6 +68,7 @@ class Recipe:
     needs_soc0: bool = False
     warm: bool = False
     radial_points: int | None = None
+    between: int = 1
 
 
 def _beyond(parameter: str, base: float) -> float:
@@ -267,6 +274,10 @@ RECIPES: dict[str, Recipe] = {
         also=("ocp_shape",),
         needs_soc0=True,
     ),
-    "voltage_lag": Recipe("clock_skew", lambda m, q, s: {"lag_s": 0.3 * m}, instrument=_lag, most=10.0),
-    "clock_rate": Recipe("clock_skew", lambda m, q, s: {"skew": 0.02 * m}, instrument=_rate, most=4.0),
+    "voltage_lag": Recipe(
+        "clock_skew", lambda m, q, s: {"lag_s": 0.3 * m}, instrument=_lag, most=10.0, between=FINER
+    ),
+    "clock_rate": Recipe(
+        "clock_skew", lambda m, q, s: {"skew": 0.02 * m}, instrument=_rate, most=4.0, between=FINER
+    ),
 }

@@ -91,9 +91,10 @@ class Setup:
         return [(find_change(a.change), find_change(a.change).complete(a.values)) for a in self.applied]
 
 
-def simulate_truth(setup: Setup, profile: Profile) -> TrueRun:
+def simulate_truth(setup: Setup, profile: Profile, between: int = 1) -> TrueRun:
     """The trace of a set-up under a profile, from the cache where it is there.
 
+    between : traces have so many rows for each of the profile, for instruments that read between its rows.
     Raises SimulationError where the model stops early or loses charge; DataError for a cell file that cannot
     be read.
     """
@@ -107,6 +108,7 @@ def simulate_truth(setup: Setup, profile: Profile) -> TrueRun:
     key = key_of(
         {
             **mesh,
+            **({"between": between} if between > 1 else {}),
             "version": VERSION,
             "pybamm": pybamm.__version__,
             "bpx": content,
@@ -118,10 +120,16 @@ def simulate_truth(setup: Setup, profile: Profile) -> TrueRun:
             "soc0": profile.soc0,
         }
     )
-    kept = cached("laboratory", key, lambda: _simulate(setup, profile))
-    return TrueRun(
-        profile.time_s, profile.current_a, kept["voltage_v"], kept["temperature_degc"], kept["soc"]
-    )
+    time = finer(profile.time_s, between)
+    kept = cached("laboratory", key, lambda: _simulate(setup, profile, time))
+    current = np.interp(time, profile.time_s, profile.current_a)
+    return TrueRun(time, current, kept["voltage_v"], kept["temperature_degc"], kept["soc"])
+
+
+def finer(time_s: Array, between: int) -> Array:
+    """(n,) s with so many rows for each; every `between`-th is one that was given."""
+    rows = np.arange(between * (len(time_s) - 1) + 1) / between
+    return np.asarray(np.interp(rows, np.arange(len(time_s)), time_s), dtype=float)
 
 
 def edges(profile: Profile) -> Array:
@@ -155,7 +163,7 @@ def parameter_values(bpx: Path, soc0: float) -> Any:
     return values
 
 
-def _simulate(setup: Setup, profile: Profile) -> dict[str, Array]:
+def _simulate(setup: Setup, profile: Profile, time: Array) -> dict[str, Array]:
     import pybamm
 
     os.environ.setdefault("PYBAMM_DISABLE_TELEMETRY", "true")
@@ -172,17 +180,17 @@ def _simulate(setup: Setup, profile: Profile) -> dict[str, Array]:
     values["Current function [A]"] = pybamm.Interpolant(profile.time_s, current, pybamm.t)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        solution = _solve(setup, profile, values, options)
-    time = profile.time_s
+        solution = _solve(setup, profile, time, values, options)
     voltage = np.asarray(solution["Voltage [V]"](time), dtype=float)
     temperature = np.asarray(solution["Volume-averaged cell temperature [C]"](time), dtype=float)
     moved = float(solution["Discharge capacity [A.h]"](time[-1]))
-    asked = float(np.trapezoid(current, time)) / SECONDS_PER_HOUR
+    asked = float(np.trapezoid(current, profile.time_s)) / SECONDS_PER_HOUR
     if abs(moved - asked) > CHARGE_TOLERANCE * capacity:
         raise SimulationError(
             f"{profile.name}: the model moved {moved:.6g} Ah where the current has {asked:.6g} Ah; "
             "a pulse was stepped over."
         )
+    current = np.interp(time, profile.time_s, current)
     charge = np.concatenate([[0.0], np.cumsum(0.5 * (current[1:] + current[:-1]) * np.diff(time))])
     for change, chosen in changes:
         voltage = change.terminal_voltage(time, current, voltage, chosen)
@@ -234,7 +242,7 @@ def _options(asked: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return options
 
 
-def _solve(setup: Setup, profile: Profile, values: Any, options: dict[str, Any]) -> Any:
+def _solve(setup: Setup, profile: Profile, time: Array, values: Any, options: dict[str, Any]) -> Any:
     import pybamm
 
     model = getattr(pybamm.lithium_ion, setup.model)(options)
@@ -256,7 +264,7 @@ def _solve(setup: Setup, profile: Profile, values: Any, options: dict[str, Any])
         model, parameter_values=values, solver=solver, var_pts=_mesh(setup), submesh_types=kinds
     )
     try:
-        solution = simulation.solve(edges(profile), t_interp=profile.time_s)
+        solution = simulation.solve(edges(profile), t_interp=time)
     except (pybamm.SolverError, pybamm.ModelError, ValueError) as error:
         raise SimulationError(f"{profile.name}: {setup.model} cannot be solved: {error}") from None
     if solution.t[-1] < length * (1 - 1e-9):

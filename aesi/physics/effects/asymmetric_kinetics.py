@@ -43,5 +43,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=make_asymmetric,
+    of_every_record=True,
     experiment="charge and discharge pulses of the same size, from C/10 to 5C",
 )

@@ -76,5 +76,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=vary_diffusivities,
+    of_every_record=True,
     experiment="GITT over the whole range of state of charge",
 )

@@ -36,5 +36,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=add_capacity,
+    of_every_record=True,
     experiment="impedance from 1 Hz to 10 kHz, or pulses sampled at 1 ms",
 )

@@ -43,5 +43,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=plate,
+    of_every_record=True,
     experiment="a charge pulse at low temperature and the voltage plateau of the rest after it",
 )

@@ -68,5 +68,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_voltage=hysteresis,
+    of_every_record=True,
     experiment="rests of some hours at the same state of charge, reached by charge and by discharge",
 )

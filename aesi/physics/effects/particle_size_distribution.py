@@ -62,5 +62,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=spread_sizes,
+    of_every_record=True,
     experiment="relaxation after a long pulse, sampled over hours",
 )

@@ -70,6 +70,7 @@ EFFECT = Effect(
     PARAMETERS,
     on_model=warm,
     infers="temperature",
+    of_every_record=True,
     experiment="a thermocouple on the case",
     told_apart={
         "ambient_temperature": (

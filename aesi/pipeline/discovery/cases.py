@@ -35,20 +35,22 @@ def case_of_files(
     without: Sequence[str] = (),
     model: ModelName | None = None,
     soh: float | None = None,
+    good: Sequence[Path] = (),
 ) -> Case:
     """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
 
-    soh : share of the file's capacity that the cell had then; None takes all of it.
+    soh : share of the file's capacity that the cell had then; None takes all of it.  good : files of records that are
+    known to be good.
     Raises DataError where a file cannot be of the cell.
     """
-    paths = (*data, *tests)
+    paths = (*data, *tests, *good)
     rows = MOST_ROWS // max(1, len(paths))
     records = [read(path, reading or Reading(), max_rows=rows).held(hold) for path in paths]
     check_belongs(declared_model(cell).with_soh(soh).cell, records)
     return Case(
         cell,
         tuple(records[: len(data)]),
-        tuple(records[len(data) :]),
+        tuple(records[len(data) : len(data) + len(tests)]),
         soc0,
         holdout,
         max_effects,
@@ -58,6 +60,7 @@ def case_of_files(
         tuple(without),
         model,
         soh,
+        tuple(records[len(data) + len(tests) :]),
     )
 
 
@@ -65,7 +68,7 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
     """The case that an experiment with a `discover` section describes."""
     wanted = config.discover or DiscoverConfig()
     cell = cell_path(config)
-    fit, test = discovery_records(config, wanted, cell)
+    fit, test, good = discovery_records(config, wanted, cell)
     if not fit:
         raise ConfigError(f"{config.name}: discover.fit names no record; give at least one to look at.")
     return Case(
@@ -78,4 +81,5 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         config.seed,
         model=config.cell.model,
         soh=config.cell.soh,
+        good=good,
     )

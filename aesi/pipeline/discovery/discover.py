@@ -42,6 +42,7 @@ class Case:
     only, without : ids of the effects that are tried, or are not; all where neither names one.
     model : "espm" or "dfn" for every hypothesis; None: that of a saved porous electrode, else what the data ask for.
     soh : share of the cell's capacity that it had then; None takes all of it.
+    good : records of the same cell that are known to be good.
     """
 
     cell: Path | HybridModel
@@ -56,10 +57,16 @@ class Case:
     without: tuple[str, ...] = ()
     model: ModelName | None = None
     soh: float | None = None
+    good: tuple[Measurement, ...] = ()
 
     def __post_init__(self) -> None:
         """Raises DataError for a record that is given twice."""
-        check_distinct(self.measurements, self.tests)
+        check_distinct((*self.measurements, *self.good), self.tests)
+
+    @property
+    def records(self) -> tuple[Measurement, ...]:
+        """All of them: those that are looked at, those that are known to be good, and those that choose nothing."""
+        return (*self.measurements, *self.good, *self.tests)
 
     def declared(self) -> HybridModel:
         """What the cell is declared to be.  Raises CellError or InputError for what cannot be read."""
@@ -88,6 +95,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
         archive=None if out is None else out / ARCHIVE,
         progress=progress,
         model=case.model or ("dfn" if given.model == "dfn" else None),
+        good=case.good,
     )
 
 
@@ -95,7 +103,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
     from aesi.pipeline.report import write_discovery_report
 
-    content = discovery_content(found, [note for m in (*case.measurements, *case.tests) for note in m.notes])
+    content = discovery_content(found, [note for m in case.records for note in m.notes])
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content, indent=1, allow_nan=False)
     (out / "discovery.json").write_text(text + "\n", encoding="utf-8")

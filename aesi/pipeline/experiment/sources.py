@@ -50,21 +50,24 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
 
 def discovery_records(
     config: ExperimentConfig, wanted: DiscoverConfig, cell: Path
-) -> tuple[tuple[Measurement, ...], tuple[Measurement, ...]]:
-    """The records that a discovery looks at, and those that judge it; of a virtual cell its training and test records.
+) -> tuple[tuple[Measurement, ...], tuple[Measurement, ...], tuple[Measurement, ...]]:
+    """The records that a discovery looks at, those that judge it, and those that are known to be good; of a virtual
+    cell its training and test records.
 
     cell : the BPX file from which virtual records are made.
     """
     if config.data.kind == "virtual":
         experiment = virtual_experiment(config, cell)
-        return experiment.train, experiment.test
+        return experiment.train, experiment.test, ()
     where = _locator(config)
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
         return tuple(read(where(name), config.data.reading.but(stop_s=stop_s.get(name))) for name in names)
 
-    return until(wanted.fit, wanted.fit_until_s), until(
-        wanted.test, dict.fromkeys(wanted.test, wanted.until_s)
+    return (
+        until(wanted.fit, wanted.fit_until_s),
+        until(wanted.test, dict.fromkeys(wanted.test, wanted.until_s)),
+        until(wanted.good, {}),
     )
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.calibration.parameters import RATE_ENERGY_SD, SALT_EA, SOLID_EA
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, simulate
 from aesi.physics.balance import same_rest
@@ -28,12 +29,13 @@ SOC0, CONTACT = "soc0", "contact"
 @dataclass(frozen=True)
 class FileParameter:
     """owner : an effect of the catalogue, or SOC0 or CONTACT.  deviation : of its value, of its logarithm where `log`;
-    of the contact resistance in V at a current of 1C."""
+    of the contact resistance in V at a current of 1C.  energy_j_mol : deviation of the activation energy of a rate."""
 
     owner: str
     name: str
     deviation: float
     log: bool = False
+    energy_j_mol: float = 0.0
 
 
 def _waves() -> Iterator[FileParameter]:
@@ -44,7 +46,8 @@ def _waves() -> Iterator[FileParameter]:
             yield FileParameter(POTENTIALS, name, POTENTIAL_SHARE * parameter.spread.loose)
 
 
-RATES = ("solid_diffusivity", "charge_transfer_kinetics")
+RATES = {"solid_diffusivity": SOLID_EA, "charge_transfer_kinetics": RATE_ENERGY_SD}
+"""Effect -> deviation of its activation energies, as a calibration starts from; a file of one temperature keeps it."""
 POTENTIALS = "ocp_shape"
 POTENTIAL_SHARE = 0.6
 """Of the spread that the catalogue gives for half cells of other makes."""
@@ -53,15 +56,17 @@ KNOBS = (
     FileParameter(SOC0, "shift", 0.001),
     FileParameter(CONTACT, "resistance_ohm", 0.03),
     *(
-        FileParameter(owner, f"{side}_factor", 0.15, log=True)
-        for owner in RATES
+        FileParameter(owner, f"{side}_factor", 0.15, True, energy)
+        for owner, energy in RATES.items()
         for side in ("negative", "positive")
     ),
-    FileParameter("electrolyte_transport", "conductivity_factor", 0.1, log=True),
-    FileParameter("electrolyte_transport", "diffusivity_factor", 0.6, log=True),
+    FileParameter("electrolyte_transport", "conductivity_factor", 0.1, True, SALT_EA),
+    FileParameter("electrolyte_transport", "diffusivity_factor", 0.6, True, SALT_EA),
     *(FileParameter(owner, "loss", 0.0003) for owner in BALANCE),
     *_waves(),
 )
+ENERGIES_J_MOL = np.array([knob.energy_j_mol / knob.deviation for knob in KNOBS])
+"""(n_knobs,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
 ALL = tuple(range(len(KNOBS)))
 INITIAL_STATE = (0,)
 RESISTOR = (1,)

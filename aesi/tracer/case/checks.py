@@ -30,6 +30,16 @@ CONDITIONS = 5
 """Of an unmeasured quantity, over its range: a cell at -10 degC whose temperature nobody gives is off by 290 mV."""
 
 
+def check_compared(problem: InverseProblem) -> None:
+    """Raises DataError where no record that is known to be good has been at the states of charge of the others."""
+    if problem.has_good and not (problem.compared & problem.good_rows).any():
+        others = ", ".join(r.name for r in problem.records if not r.good)
+        raise DataError(
+            f"no record that is known to be good passes through the states of charge of {others}, so that it says "
+            "nothing of the model's error there; give one that does."
+        )
+
+
 def check_record(cell: Cell, record: PreparedRecord) -> None:
     """Raises DataError for a record that is too short, or that asks for more charge than the cell has."""
     thin = record.thin

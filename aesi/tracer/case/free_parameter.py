@@ -15,9 +15,12 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.parameters import Parameter
+from aesi.physics.effect import Effect
 
 STATE_OF_CHARGE = "soc0"
 """Owner of the parameters that shift a record's initial state of charge."""
+OF_ALL_RECORDS = " of all records"
+"""Ends the owner of a declared parameter that good records and others share, beside an effect of the others alone."""
 FURTHEST_SDS = 4.0
 """An own parameter may not leave this many of its standard deviations."""
 TINY = 1e-6
@@ -158,3 +161,33 @@ def starts(free: Sequence[FreeParameter]) -> list[Array]:
         other[shapes] = (bounds[:, 0] + share * (bounds[:, 1] - bounds[:, 0]))[shapes]
         out.append(other)
     return out
+
+
+def of_all_records(effect: str) -> str:
+    """Owner of the parameters of an effect that all records share, the good ones too."""
+    return effect + OF_ALL_RECORDS
+
+
+def acting_on(
+    effects: Mapping[str, Effect], values: Mapping[str, Mapping[str, float]], good: bool
+) -> dict[str, dict[str, float]]:
+    """Id of an effect -> name -> value on one record: what all records share and what is under test, as deviations
+    added in the parameter's own scale, within its bounds.
+
+    values : owner -> name -> value.  good : of a record that is known to be good, which only has what all share.
+    """
+    out: dict[str, dict[str, float]] = {}
+    for owner, given in values.items():
+        name = owner.removesuffix(OF_ALL_RECORDS)
+        if owner == STATE_OF_CHARGE or (good and name == owner):
+            continue
+        there = out.setdefault(name, {})
+        for key, value in given.items():
+            there[key] = _moved(effects[name].parameters[key], there[key], value) if key in there else value
+    return out
+
+
+def _moved(p: Parameter, value: float, further: float) -> float:
+    centre = p.default if p.neutral is None else p.neutral
+    both = value * further / centre if p.log and centre > 0 else value + further - centre
+    return min(max(both, p.bounds[0]), p.bounds[1])

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.errors import AesiError
 from aesi.physics.simulation import ModelName
-from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 
 MODELS: tuple[ModelName, ModelName] = ("espm", "dfn")
 
@@ -36,13 +36,14 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
 
 @dataclass(frozen=True)
 class Reduction:
-    """What the single particle leaves out of the declared porous electrode.
+    """What the single particle leaves out of the porous electrode of one cell.
 
-    shift_v : root mean square over what fits see, V.  noise_v : of the sensors there.
+    shift_v : root mean square over what fits see, V.  noise_v : of the sensors there.  of : which cell, in words.
     """
 
     shift_v: float
     noise_v: float
+    of: str
 
     @property
     def notable(self) -> bool:
@@ -51,26 +52,26 @@ class Reduction:
 
     @property
     def sentence(self) -> str:
-        """By how much the two models of the declared cell differ."""
+        """By how much the two models differ."""
         return (
-            f"the porous electrode (dfn) and the single particle (espm) of the declared cell differ by "
+            f"the porous electrode (dfn) and the single particle (espm) of {self.of} differ by "
             f"{1e3 * self.shift_v:.2f} mV RMS here, {self.shift_v / self.noise_v:.2g} times the noise"
         )
 
 
-def reduction_of(problem: InverseProblem) -> Reduction | None:
-    """By how much both models of the declared cell differ on its records; None where one of them cannot be simulated,
-    or where the declared model already holds an effect that takes the reduction back."""
+def reduction_of(problem: InverseProblem, values: ValuesByOwner | None = None) -> Reduction | None:
+    """By how much both models of a cell differ on its records; None where one of them cannot be simulated, or where the
+    declared model already holds an effect that takes the reduction back.
+
+    values : owner -> name -> value where a hypothesis ended; None: the declared cell.
+    """
     if any(active.effect.refines == "reduction" for active in problem.fixed):
         return None
-    moved = []
-    try:
-        for record, data in zip(problem.records, problem.seen, strict=True):
-            reduced, full = (
-                replace(problem, model=name).run(data, record.soc0, problem.fixed, record.thin_hold).voltage_v
-                for name in MODELS
-            )
-            moved.append(full - reduced)
-    except AesiError:
+    declared = {STATE_OF_CHARGE: {str(i): record.soc0 for i, record in enumerate(problem.records)}}
+    reduced_v, full_v = (
+        replace(problem, model=name).predict(declared if values is None else values) for name in MODELS
+    )
+    if reduced_v is None or full_v is None:
         return None
-    return Reduction(float(np.sqrt(np.mean(np.concatenate(moved) ** 2))), problem.noise_v)
+    shift_v = float(np.sqrt(np.mean((full_v - reduced_v) ** 2)))
+    return Reduction(shift_v, problem.noise_v, "the declared cell" if values is None else "what was found")

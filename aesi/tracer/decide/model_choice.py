@@ -1,9 +1,10 @@
 """Single particle or porous electrode: settled before an effect is blamed on the cell.
 
 Parameters that were fitted with one of the two hold what it approximates, and are of that one.
-Where the two models of the declared cell differ by a notable share of the noise, all hypotheses use the fuller one; but
-not where the single particle cannot explain the data, and could not though all of that difference were taken off what
-it leaves: what is missing is something else then, and a search takes ten times as long.
+Where the two models of the declared cell, or of what the single particle ends with, differ by a notable share of the
+noise, all hypotheses use the fuller one; but not where the single particle cannot explain the data, and could not
+though all of that difference were taken off what it leaves: what is missing is something else then, and a search takes
+ten times as long.
 What was measured may still be a single particle's (a thin electrode, a file made with one): what the two searches end
 with is weighed as any two hypotheses are.
 """
@@ -43,12 +44,12 @@ def with_model(
     """The search with the model that the user named, or else with the one that the parameters of the cell were fitted
     with, or else with the one that the records ask for."""
     reduction = reduction_of(problem)
-    differ = "" if reduction is None else f"; {reduction.sentence}"
 
     def fine(name: ModelName) -> InverseProblem:
         return with_fine_numerics(replace(problem, model=name))
 
     def told(evidence: Evidence, name: ModelName, why: str = "") -> tuple[Evidence, ModelChoice]:
+        differ = "" if reduction is None else f"; {reduction.sentence}"
         words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
         return evidence, ModelChoice(name, words, reduction)
 
@@ -60,6 +61,9 @@ def with_model(
     single = fine("espm")
     fits = kept(single, None)
     first = search(single, fits)
+    if problem.has_good:
+        return told(first, "espm", ", since the good records share what it approximates")
+    reduction = _larger(reduction, first.paths["tight"])
     if reduction is None or not reduction.notable:
         return told(first, "espm")
     if first.verdict.word == "unknown" and not _explains(first.paths["tight"], reduction):
@@ -69,6 +73,15 @@ def with_model(
     if with_single_particle(second, first):
         return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
+
+
+def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
+    """Of what both models differ by on the declared cell and on what the search with the single particle ended with: a
+    cell whose electrolyte or particles are not as declared may need the porous electrode where the declared one does
+    not."""
+    ended = reduction_of(path.problem, path.chosen.values)
+    known = [one for one in (declared, ended) if one is not None]
+    return max(known, key=lambda one: one.shift_v, default=None)
 
 
 def with_single_particle(full: Evidence, single: Evidence) -> bool:

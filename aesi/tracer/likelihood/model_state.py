@@ -33,11 +33,11 @@ class ModelState:
         """Where a fit ended."""
         return cls(problem, linear_values(one), tuple(one.hypothesis))
 
-    def effects(self) -> tuple[ActiveEffect, ...]:
-        """What is simulated on top of the declared cell."""
+    def effects(self, good: bool = False) -> tuple[ActiveEffect, ...]:
+        """What is simulated on top of the declared cell.  good : of a record that is known to be good."""
         if self.values is None:
             return self.problem.fixed
-        return self.problem.active(self.values)
+        return self.problem.active(self.values, good)
 
     def simulated(self, record: PreparedRecord, index: int | None, thin: bool) -> Run:
         """One record.
@@ -46,7 +46,7 @@ class ModelState:
         or the one at which this model rests at its first voltage.
         """
         data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
-        effects, run = self.effects(), self.problem.run
+        effects, run = self.effects(record.good), self.problem.run
         if self.values is not None and index is not None:
             return run(data, self.values[STATE_OF_CHARGE][str(index)], effects, hold)
         if self.values is not None and record.basis == "full charge":

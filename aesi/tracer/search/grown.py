@@ -8,7 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 from aesi.numerics.typing import Array
-from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem
 from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, promise
 from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive, fit_name
@@ -38,11 +38,13 @@ def promising(parent: Parent, slopes: Mapping[str, Array]) -> list[str]:
 
 def _has_something_to_say(problem: InverseProblem, name: str) -> bool:
     """Not what infers a quantity that every record holds, nor what a file has right that was fitted to this very
-    cell."""
+    cell, nor, where good records stand beside the others, what all records of a cell share."""
     effect = problem.effects[name]
     if effect.infers is not None and all(r.data.temperature_degc is not None for r in problem.records):
         return False
-    return not (problem.trust == "measured" and effect.of_design)
+    if problem.has_good and effect.of_every_record:
+        return False
+    return not (problem.trust in MEASURED_CELL and effect.of_design)
 
 
 def growths_on(

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from aesi.bench.real import chosen, judged, plan, summary, write_report
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import of_model, of_spectrum
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.bench.real.judge import _cell, _known, _read
+from aesi.bench.real.judge import _known, declared_cell, record
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement, Spectrum
@@ -28,6 +27,8 @@ def test_the_plan_has_what_a_benchmark_on_measured_cells_needs():
     assert groups["control"] == 20
     assert groups["witness"] == 2
     assert groups["fault"] == 45
+    assert groups["fault_beside"] == 51
+    assert groups["control_beside"] == 9
     assert groups["withheld"] >= 12
     assert abs(sum(case.development for case in cases) - len(cases) / 2) <= 3
     for case in cases:
@@ -44,6 +45,18 @@ def test_cases_are_chosen_by_group_and_by_what_they_are_for():
     assert {case.group for case in chosen(only="ageing")} == {"ageing"}
     assert {case.development for case in chosen(development=False)} == {False}
     assert len(chosen(cases=3)) == 3
+
+
+def test_faults_beside_good_records_are_the_same_faults():
+    by_name = {case.name: case for case in plan()}
+    beside = [case for case in by_name.values() if case.group == "fault_beside"]
+    for case in beside:
+        alone = by_name[case.name.removeprefix("beside-")]
+        assert (case.fault, case.take, case.answers) == (alone.fault, alone.take, alone.answers)
+        assert case.good
+        assert case.take not in case.good
+        assert by_name[case.matched].good == case.good
+        assert by_name[case.matched].fault is None
 
 
 def test_faults_by_hand():
@@ -214,8 +227,8 @@ def test_a_contact_is_in_the_ohmic_part_of_the_model_and_slow_kinetics_in_the_ot
 
 def known(name):
     case = next(case for case in plan() if case.name == name)
-    data = _read(case.take)
-    return case, data, _known(case, data, Cell.from_bpx(_cell(case.cell, Path(CELLS))))
+    data = record(case.take)
+    return case, data, _known(case, data, declared_cell(case.cell, CELLS))
 
 
 @pytest.mark.parametrize("name", ["control-about_energy_nmc-1C", "ageing-25degC_1c_end"])
@@ -235,7 +248,7 @@ def test_a_withheld_temperature_is_in_the_answer_and_not_in_the_data(shared_data
     assert len(truth.temperature_degc) == len(data)
     assert truth.parameters["ambient_temperature.shift_k"] == pytest.approx(10.9 - 25, abs=0.3)
     given = replace(case, take=replace(case.take, temperature=True))
-    assert _read(given.take).temperature_degc is not None
+    assert record(given.take).temperature_degc is not None
 
 
 def test_the_spectra_of_a_witness_are_those_of_its_month(shared_data):

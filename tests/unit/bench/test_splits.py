@@ -13,6 +13,7 @@ from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.records import ErrorSeries
 from aesi.sparse.yardsticks import Bare
+from flows.benchmarks.splits import summary
 
 EXPERIMENT_FILES = Path(__file__).resolve().parents[3] / "experiments"
 
@@ -75,3 +76,7 @@ def test_both_reductions_are_of_the_squared_error():
     assert figures["ESPM recalibrated"]["mser_pct"] == pytest.approx(99.0)
     assert against(figures["ESPM recalibrated"], figures["ESPM"]) == pytest.approx(99.0)
     assert against(figures["ESPM"], figures["ESPM recalibrated"]) == pytest.approx(-9900.0)
+    assert figures["ESPM"]["drives"]["other"]["rmse_mv"] == pytest.approx(10.0)
+    row = {"cell": "nmc", "development": True, "models": figures}
+    best = summary([row])["all"]["nmc"]["best_in_hindsight"]
+    assert best == {"mser_recalibrated_pct_mean": 0.0, "mser_recalibrated_pct_worst": 0.0}

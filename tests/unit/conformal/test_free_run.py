@@ -7,6 +7,7 @@ import pytest
 
 from aesi.conformal import WHOLE_DRIVE, FreeRunBands
 from aesi.errors import FitError, InputError
+from aesi.numerics.visited import Visited
 from aesi.records import ErrorSeries, FreeRun
 
 DT = 1.0
@@ -73,7 +74,7 @@ def test_survives_json() -> None:
 
 
 def test_bands_of_an_earlier_schema_are_refused() -> None:
-    with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/7.*run the experiment again"):
+    with pytest.raises(InputError, match=r"free_run_bands/2.*free_run_bands/8.*run the experiment again"):
         FreeRunBands.from_dict(fitted().to_dict() | {"schema": "aesi.free_run_bands/2"})
 
 
@@ -85,6 +86,32 @@ def test_a_record_outside_the_trained_range_is_flagged() -> None:
     np.testing.assert_array_equal(fitted().intervals(series, run).warm, ~outside)
     ahead = fitted().intervals(series, run, horizon_s=10.0)
     np.testing.assert_array_equal(ahead.upper_v, fitted().at(10.0, np.zeros(N))[1])
+
+
+def test_at_a_temperature_that_no_fitted_row_had_what_is_open_of_the_energies_widens_the_band():
+    error, _ = drive(34)
+    seen = Visited(np.array([0.5]), (25.0, 30.0))
+    bands = replace(fitted(), seen=seen, energies_j_mol=np.array([30e3, 40e3]))
+    slopes = 1e-3 * np.column_stack([np.ones(N), np.zeros(N)])
+    run = FreeRun(error, None, np.zeros(N, dtype=bool))
+
+    def width(degc, horizon_s=None):
+        measured = None if degc is None else np.full(N, degc)
+        series = replace(record(error), slopes_v=slopes, temperature_degc=measured)
+        return bands.intervals(series, run, horizon_s=horizon_s).upper_v
+
+    np.testing.assert_array_equal(width(28.0), width(None))
+    # 1 mV times 30 kJ/mol / R (1 / 283.15 K - 1 / 298.15 K), by hand 0.6411, and the 95 % quantile of a normal error.
+    cold = 1.645 * 0.6411e-3
+    np.testing.assert_allclose(width(10.0, WHOLE_DRIVE), np.hypot(width(28.0, WHOLE_DRIVE), cold), rtol=1e-3)
+    # From 30 to 45 degC 0.5612.
+    hot = 1.645 * 0.5612e-3
+    np.testing.assert_allclose(width(45.0, WHOLE_DRIVE), np.hypot(width(28.0, WHOLE_DRIVE), hot), rtol=1e-3)
+    # A measurement 10 s ago takes off as much of it as of the rest.
+    grown = width(10.0, WHOLE_DRIVE) / width(28.0, WHOLE_DRIVE)
+    np.testing.assert_allclose(width(10.0, 10.0), grown * width(28.0, 10.0), rtol=1e-12)
+    again = FreeRunBands.from_dict(json.loads(json.dumps(bands.to_dict(), default=lambda a: a.tolist())))
+    np.testing.assert_array_equal(again.energies_j_mol, bands.energies_j_mol)
 
 
 def test_a_record_brings_the_slopes_that_the_band_asks_for() -> None:

@@ -42,6 +42,15 @@ def test_a_short_pulse_after_a_long_rest_is_not_stepped_over(nmc):
     assert trace.soc[-1] == pytest.approx(0.6 - 2.0 * 5 / 3600, abs=1e-9)
 
 
+def test_rows_between_those_of_a_profile_are_simulated_and_no_straight_lines(nmc):
+    coarse, fine = (simulate_truth(Setup(nmc, "SPMe"), short(), between) for between in (1, 4))
+    np.testing.assert_allclose(fine.time_s[::4], coarse.time_s)
+    np.testing.assert_allclose(fine.voltage_v[::4], coarse.voltage_v, atol=2e-5)
+    np.testing.assert_allclose(fine.soc[::4], coarse.soc, atol=1e-9)
+    lines = np.interp(fine.time_s, coarse.time_s, coarse.voltage_v)
+    assert np.max(np.abs(fine.voltage_v - lines)) > 1e-3
+
+
 def test_a_contact_resistance_is_a_drop_of_r_times_i(nmc):
     added = voltage(nmc, Applied("series_resistance", {"resistance_ohm": 1e-3})) - voltage(nmc)
     # 1e-6 relative tolerance of the solver on 3.7 V.

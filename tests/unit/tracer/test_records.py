@@ -47,6 +47,20 @@ def test_a_lag_of_half_a_second_is_seen_in_rows_of_a_second(cell, rng):
     assert np.array_equal(still, bare)
 
 
+def test_a_thinned_record_of_the_declared_cell_leaves_nothing(cell, rng):
+    time = np.arange(0.0, 900.0, 0.1)
+    jumps = np.repeat(rng.normal(5.0, 60.0, 180), 50)
+    drive = Measurement(time, jumps, simulate(cell, time, jumps, 0.8).voltage_v, name="drive")
+    plain = averaged_over(drive, 1.0)
+    record = prepare(cell, drive, 0.8, 0.0)
+    assert len(record.thin) == len(plain) < len(time) / 9
+    thin_v = simulate(cell, plain.time_s, plain.current_a, 0.8, hold="linear").voltage_v
+    assert np.max(np.abs(plain.voltage_v - thin_v)) > 2e-3  # kinetics are no linear function of the current
+    np.testing.assert_allclose(record.thin.voltage_v, thin_v, atol=1e-9)
+    lost = np.abs(plain.voltage_v - thin_v)
+    assert np.all(record.white_v >= 0.5 * lost)
+
+
 def pulses(amplitude_a):
     """Ten-second pulses at 10 Hz, each followed by ten minutes of rest, logged once a minute."""
     one = np.concatenate([np.arange(0.1, 10.05, 0.1), np.arange(60.0, 610.0, 60.0)])
@@ -83,7 +97,7 @@ def test_averages_are_not_noisier_than_the_rows_of_a_drive_that_never_rests(cell
     voltage = simulate(cell, time, current, soc0=0.8).voltage_v + 1e-3 * rng.normal(size=len(time))
     record = prepare(cell, Measurement(time, current, voltage, name="restless"), 0.8, 0.0)
     assert noise_floor_v(record.thin.voltage_v, record.thin.current_a) > 1.5 * record.noise_full_v
-    assert record.noise_v == pytest.approx(record.noise_full_v)
+    assert record.noise_v == pytest.approx(record.noise_full_v, rel=0.01)
 
 
 def test_noise_floor_is_found_under_a_drive(rng):

@@ -15,6 +15,7 @@ from aesi.conformal.parameter_spread import covariance_root, spread
 from aesi.numerics.typing import Array, BoolArray
 from aesi.numerics.visited import Visited
 from aesi.pipeline.experiment.recalibrate import MEMORY_S, MODEL_ERROR_V
+from aesi.pipeline.product.deviations import ENERGIES_J_MOL
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -86,6 +87,7 @@ class OutOfSampleErrors:
             excess=self.excess,
             seen=self.seen,
             root=self.root,
+            energies_j_mol=None if self.root is None else ENERGIES_J_MOL,
             stretches=stretches,
         )
 

@@ -1,0 +1,68 @@
+"""The faults again with good records of the cell beside them, and records without a fault."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from aesi.bench.real.case import RealCase, Take
+
+GOOD: dict[str, tuple[str, ...]] = {
+    "lg_18650hg2": ("25degC_mixed3",),
+    "panasonic_ncr18650pf": ("25degC_cycle_3",),
+    "about_energy_nmc": ("C2", "1C"),
+}
+"""Of a cell: another drive of the kind that the faults are put into, or discharges where there is no other."""
+WITHOUT_FAULT: dict[str, tuple[str, ...]] = {
+    "lg_18650hg2": ("25degC_la92", "25degC_us06", "25degC_cap_1c_b"),
+    "panasonic_ncr18650pf": ("25degC_hwfet", "25degC_cycle_2", "25degC_us06"),
+    "about_energy_nmc": (),
+}
+"""Beside the record that is faulty elsewhere."""
+
+
+def beside_good(cases: Sequence[RealCase]) -> list[RealCase]:
+    """Each fault and contact among the cases with the good records of its cell, then the records without a fault."""
+    faulty = [c for c in cases if c.fault is not None and c.fault.kind != "capacity_in_file"]
+    first = {c.take.set: c for c in reversed(faulty)}
+    return [
+        *(
+            replace(
+                c,
+                name=f"beside-{c.name}",
+                group="fault_beside",
+                good=_good(c),
+                matched=_nothing(c, c.take.file),
+            )
+            for c in faulty
+        ),
+        *(
+            _without_fault(first[cell], file)
+            for cell, files in WITHOUT_FAULT.items()
+            for file in (first[cell].take.file, *files)
+        ),
+    ]
+
+
+def _without_fault(case: RealCase, file: str) -> RealCase:
+    return replace(
+        case,
+        name=_nothing(case, file),
+        group="control_beside",
+        take=replace(case.take, file=file),
+        soc0=1.0,
+        answers=(),
+        source="the same cell at the same temperature, nothing put in",
+        parameters={},
+        fault=None,
+        good=_good(case),
+        matched=None,
+    )
+
+
+def _good(case: RealCase) -> tuple[Take, ...]:
+    return tuple(Take(case.take.set, file) for file in GOOD[case.take.set])
+
+
+def _nothing(case: RealCase, file: str) -> str:
+    return f"beside-nothing-{case.take.set}-{file}"

@@ -1,0 +1,116 @@
+"""How alike does a model err on records of one cell? Measures what the tracer takes for chance beside good records.
+
+Of every two development records of a cell one is taken as known to be good, and each effect is fitted to what the other
+has beside it, to first order. Nothing was put in, so that sizes over their standard deviations scatter by one where the
+model error is weighed rightly.
+
+    python -m aesi.bench.real.repeatability
+
+prints a line a pair, and a last one with the root mean square of those ratios by effect, how many pairs have one beyond
+2.58 (99 % of a normal distribution), and the geometric mean of the model error.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+
+from aesi.bench.real.case import Take
+from aesi.bench.real.judge import declared_cell, record
+from aesi.bench.real.plan import CELLS, HG2, NMC, PANASONIC, WINDOW_S
+from aesi.constants import MV_PER_V
+from aesi.tracer.case.blocks import blocks_of
+from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.likelihood.growth import Grown, Parent
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import base_of
+from aesi.tracer.search.grown import ended, growths_on
+
+ALIKE: dict[str, tuple[str, ...]] = {
+    HG2: ("25degC_mixed1", "25degC_mixed2", "25degC_mixed3"),
+    PANASONIC: ("25degC_cycle_1", "25degC_cycle_2", "25degC_cycle_3", "25degC_la92"),
+    NMC: ("drive_cycle", "C2", "1C"),
+}
+"""Development records of one cell at one temperature."""
+BEYOND_SDS = 2.58
+"""99 % of a normal distribution."""
+
+
+def pairs() -> Iterator[tuple[str, str, str]]:
+    """Data set, good record, other record."""
+    for cell, files in ALIKE.items():
+        for good, other in permutations(files, 2):
+            yield cell, good, other
+
+
+def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") -> dict[str, Any]:
+    """Sizes over standard deviations by parameter of an effect, and the size of the model error, mV, of one pair."""
+    problem = inverse_problem(
+        declared_cell(CELLS[cell], cells),
+        [record(Take(cell, other, WINDOW_S))],
+        1.0,
+        0.0,
+        good=[record(Take(cell, good))],
+    )
+    problem = replace(problem, trust="beside")
+    blocks, archive = blocks_of(problem), Archive(None, "")
+    base = base_of(problem, blocks, archive)
+    if base is None:
+        return {"cell": cell, "good": good, "other": other, "failed": True}
+    grown = ended(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
+    ratios = [_ratio(one) for one in grown if one is not None]
+    return {
+        "cell": cell,
+        "good": good,
+        "other": other,
+        "model_error_mv": MV_PER_V * base.score.delta_v,
+        "soc0_off": [round(base.values["soc0"][str(k)] - r.soc0, 4) for k, r in enumerate(problem.records)],
+        "sds": {name: round(sds, 2) for name, sds in ratios},
+    }
+
+
+def _ratio(one: Grown) -> tuple[str, float]:
+    """Of the amplitude of the effect that was grown which is furthest from nought; nought where all ended there."""
+    effect = one.hypothesis[-1]
+    sds = np.sqrt(np.diagonal(one.score.covariance))
+    x = one.point.x + one.score.shift
+    found = [
+        x[j] / sds[j] for j, f in enumerate(one.free) if f.owner == effect and f.amplitude and sds[j] > 0
+    ]
+    return effect, float(max(found, key=abs, default=0.0))
+
+
+def main() -> None:
+    """Print a line a pair and the summary."""
+    rows = []
+    for cell, good, other in pairs():
+        rows.append(scatter(cell, good, other))
+        print(json.dumps(rows[-1]), flush=True)
+    ran = [row for row in rows if "sds" in row]
+    by_effect: dict[str, list[float]] = {}
+    for row in ran:
+        for name, sds in row["sds"].items():
+            by_effect.setdefault(name, []).append(sds)
+    beyond = sum(max(abs(v) for v in row["sds"].values()) > BEYOND_SDS for row in ran)
+    errors_mv = [row["model_error_mv"] for row in ran]
+    summary = {
+        "pairs": len(ran),
+        "rms_sds": {name: round(_rms(sds), 2) for name, sds in by_effect.items()},
+        "rms_sds_of_all": round(_rms([v for sds in by_effect.values() for v in sds]), 2),
+        "pairs_beyond": beyond,
+        "model_error_mv": round(float(np.exp(np.mean(np.log(errors_mv)))), 2),
+    }
+    print(json.dumps({"summary": True, **summary}))
+
+
+def _rms(values: list[float]) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+if __name__ == "__main__":
+    main()

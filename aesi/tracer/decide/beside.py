@@ -1,0 +1,89 @@
+"""What is different about some records, with others of the same cell beside them that are known to be good?
+
+The model errs on all of them. The good records say how large its error is in this cell, and what of the instruments
+all of them share; effects act on the others alone. What is named is a difference between records, and what a right
+answer may leave is what the model leaves of the good ones. What the cell is made with, and its age, are alike in all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import BoolArray
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
+from aesi.tracer.decide.confidence import frequency_maps, kind_of
+from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Evidence
+from aesi.tracer.decide.verdict import Thresholds, Verdict, beyond, look_alikes
+from aesi.tracer.decide.written import limits_of
+from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
+from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.forward import searched
+from aesi.tracer.search.path import Path, Report
+from aesi.tracer.search.wrong_parameters import NINETY
+
+
+def gathered_beside(
+    problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
+) -> Evidence:
+    """Search for what the records have that the good ones have not, and judge.
+
+    Raises DataError where the model cannot be simulated on the records.
+    """
+    beside = replace(problem, trust="beside")
+    path = searched(beside, min(max_effects, MEASURED_EFFECTS), lambda blocks, fit: False, archive, report)
+    if path is None:
+        raise DataError(
+            f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
+        )
+    verdict = judged_beside(path, thresholds)
+    verdict = replace(
+        verdict, confidence=frequency_maps()[kind_of(verdict.word, verdict.effects)].frequency(verdict.margin)
+    )
+    recalibrated, after = ModelState.of(beside, path.base), ModelState.of(beside, path.chosen)
+    fault = range_fault(after, ORDINARY_C)
+    if fault is not None:
+        return Evidence(path, {"beside": path}, recalibrated, ModelState(beside), verdict, fault)
+    limits = limits_of(after) if path.chosen.hypothesis else ()
+    return Evidence(path, {"beside": path}, recalibrated, after, verdict, None, limits)
+
+
+def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
+    """The verdict on a search beside good records; its confidence is still to be read off the margin."""
+    problem = path.problem
+    good = problem.good_rows
+    before, left = (left_v(path, one, ~good) for one in (path.base, path.chosen))
+    usual = left_v(path, path.chosen, good & problem.compared)
+    allowed = usual * (1.0 + NINETY * _relative_sd(problem, good))
+    named = path.chosen.hypothesis
+    groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -_best_gain(path))
+    others = ", ".join(r.name for r in problem.records if not r.good)
+    reason = (
+        f"{1e3 * before:.1f} mV beyond the noise on unseen data of {others} before, {1e3 * left:.1f} mV after; "
+        f"{1e3 * usual:.1f} mV on the good records"
+    )
+    if left > allowed:
+        reason += f", beyond {1e3 * allowed:.1f} mV no chance: not all of what is different is explained"
+        return Verdict("unknown", named, groups, 0.0, left, allowed, reason, max(margin, 0.0))
+    return Verdict("found" if named else "none", named, groups, 0.0, left, allowed, reason, margin)
+
+
+def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
+    """What a hypothesis leaves beyond noise of some rows, in blocks that it has not seen, V RMS."""
+    rmse_v = float(np.sqrt(np.mean(held_out_residual(path.blocks, one)[rows] ** 2)))
+    return beyond(rmse_v, path.problem.noise_v)
+
+
+def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:
+    """By how much the root mean squares of both kinds of record differ by chance, as a share: each of N independent
+    samples is uncertain by one over the root of 2 N."""
+    many = [float(problem.independent[rows].sum()) for rows in (good, ~good)]
+    return float(np.sqrt(sum(0.5 / n for n in many)))
+
+
+def _best_gain(path: Path) -> float:
+    return max((step.best_gain for step in path.steps), default=0.0)

@@ -1,0 +1,133 @@
+"""Records beside others of the same cell that are known to be good: what is different about the first?"""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from aesi.errors import DataError
+from aesi.physics.effects import CATALOGUE
+from aesi.tracer import discover
+from aesi.tracer.case.free_parameter import acting_on, of_all_records
+from aesi.tracer.case.problem import BESIDE_TIMES
+from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.search.archive import context_of
+from aesi.tracer.search.grown import promising
+
+OFFSET_V = 8e-3
+TRIED = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "ocv_hysteresis")
+
+
+@pytest.fixture
+def erring(cell, make):
+    """A record of a cell in which its model errs: by up to 4 mV with the state of charge, alike in all records, and by
+    1 mV over each 100 s for itself."""
+
+    def measurement(name, seed, offset_v=0.0):
+        data = make(seed=seed, n=7200)
+        charge = 0.9 - np.cumsum(data.current_a) / (3600.0 * cell.capacity_ah)
+        rng = np.random.default_rng(100 + seed)
+        own = np.repeat(rng.normal(0.0, 2e-3, len(data) // 100 + 1), 100)[: len(data)]
+        error = 4e-3 * np.sin(20.0 * charge) + own
+        return replace(data, voltage_v=data.voltage_v + error + offset_v, name=name)
+
+    return measurement
+
+
+@pytest.fixture
+def tried():
+    return {name: CATALOGUE[name] for name in TRIED}
+
+
+def test_an_offset_within_the_models_error_is_found_beside_a_good_record(cell, tried, erring):
+    good, other = erring("good", 1), erring("other", 2, OFFSET_V)
+    found = discover(cell, [other], soc0=0.9, effects=tried, good=[good])
+    assert found.verdict.word == "found"
+    assert found.verdict.effects == ("voltage_sensor_offset",)
+    size = next(c for c in found.candidates if c.effect == "voltage_sensor_offset").parameters["offset_v"]
+    assert size.low <= OFFSET_V <= size.high
+    assert "other" in found.verdict.reason
+    residuals = {f.name: f for f in found.files if f.part == "fit"}
+    assert np.mean(residuals["other"].residual_v("after")) == pytest.approx(0.0, abs=2e-3)
+    shift = residuals["good"].voltages["after"] - residuals["good"].voltages["recalibrated"]
+    assert np.max(np.abs(shift)) < 2e-3  # the fault is not one of the good record
+
+
+def test_nothing_is_found_without_a_fault(cell, tried, erring):
+    found = discover(cell, [erring("other", 2)], soc0=0.9, effects=tried, good=[erring("good", 1)])
+    assert found.verdict.word == "none"
+    assert found.verdict.effects == ()
+
+
+def test_a_good_record_only_has_what_all_records_share():
+    shared = of_all_records("clock_skew")
+    values = {"soc0": {"0": 0.9}, shared: {"lag_s": 0.1}, "clock_skew": {"skew": 0.01, "lag_s": 0.3}}
+    assert acting_on(CATALOGUE, values, good=True) == {"clock_skew": {"lag_s": 0.1}}
+    there = acting_on(CATALOGUE, values, good=False)["clock_skew"]
+    assert there == {"lag_s": pytest.approx(0.4), "skew": 0.01}
+    gains = {of_all_records("current_sensor_gain"): {"gain": 1.1}, "current_sensor_gain": {"gain": 1.02}}
+    assert acting_on(CATALOGUE, gains, good=False)["current_sensor_gain"]["gain"] == pytest.approx(1.122)
+
+
+def test_effects_under_test_move_the_other_records_alone(cell, tried, erring):
+    problem = inverse_problem(cell, [erring("other", 2)], 0.9, effects=tried, good=[erring("good", 1)])
+    problem = replace(problem, trust="beside")
+    soc0 = {"soc0": {str(i): r.soc0 for i, r in enumerate(problem.records)}}
+    moved = problem.predict({**soc0, "voltage_sensor_offset": {"offset_v": OFFSET_V}}) - problem.predict(soc0)
+    assert moved[problem.slices[0]] == pytest.approx(OFFSET_V)
+    assert moved[problem.slices[1]] == pytest.approx(0.0)
+    owners = {f.owner for f in problem.free(("voltage_sensor_offset",))}
+    assert {"voltage_sensor_offset", of_all_records("voltage_sensor_offset")} <= owners
+
+
+def test_what_the_cell_is_made_with_and_its_age_do_not_compete_beside_good_records(cell, make):
+    alone, beside = (
+        replace(inverse_problem(cell, [make()], 0.9, good=good), trust="beside")
+        for good in ([], [make(seed=3)])
+    )
+
+    def competing(problem):
+        fit = SimpleNamespace(hypothesis=())
+        return set(promising(SimpleNamespace(problem=problem, fit=fit), {}))
+
+    assert competing(beside) == {
+        "ambient_temperature",
+        "series_resistance",
+        "leakage_current",
+        "current_sensor_gain",
+        "current_sensor_offset",
+        "voltage_sensor_offset",
+        "clock_skew",
+    }
+    assert competing(beside) < competing(alone)
+
+
+def test_good_records_count_where_the_others_have_been(cell, make):
+    short, whole = replace(make(seed=2, n=900), name="short"), replace(make(seed=1), name="good")
+    problem = replace(inverse_problem(cell, [short], 0.9, 0.0, good=[whole]), trust="beside")
+    z, good = problem.declared_soc, problem.good_rows
+    outside = good & (z < z[~good].min() - 0.06)
+    assert outside.any()
+    assert not problem.independent[outside].any()
+    assert problem.independent[~good].sum() > 0
+    measured = replace(problem, trust="measured").independent
+    assert problem.independent[~good] == pytest.approx(BESIDE_TIMES * measured[~good])
+
+
+def test_a_good_record_elsewhere_says_nothing(cell, tried, make):
+    low = replace(make(seed=1, soc0=0.2, n=600), name="low")
+    with pytest.raises(DataError, match="passes through the states of charge of made"):
+        discover(cell, [make(seed=2, n=600)], soc0=0.9, effects=tried, good=[low])
+
+
+def test_without_good_records_nothing_is_told_apart(cell, tried, make):
+    data = make()
+    alone, beside = (
+        inverse_problem(cell, [data], 0.9, effects=tried, good=good) for good in ([], [make(seed=3)])
+    )
+    assert not alone.has_good
+    assert not alone.good_rows.any()
+    assert {f.owner for f in alone.free(())} == {"soc0", "voltage_sensor_offset"}
+    assert context_of(alone) != context_of(beside)
+    assert alone.active({"soc0": {"0": 0.9}}) == alone.fixed
