@@ -17,8 +17,8 @@ from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
 from aesi.errors import DataError
 from aesi.physics.arguments import check_temperature
+from aesi.physics.belongs import check_belongs
 from aesi.physics.simulation import MODEL_WORDS, ModelName
-from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
