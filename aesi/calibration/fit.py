@@ -21,7 +21,7 @@ from aesi.calibration.result import (
     intervals,
     undetermined,
 )
-from aesi.calibration.rewind import capacities, rewound, serving
+from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import SPAN_K, Shapes
 from aesi.calibration.start import one_branch, sized, with_activation
 from aesi.constants import ZERO_CELSIUS_K
@@ -71,9 +71,8 @@ def calibrate(
     scaled = jacobian * weights[:, None]
     covariance = np.linalg.inv(scaled.T @ scaled)
     declared = _declared_errors(cell, model)
-    rms = [float(np.sqrt(np.mean(e**2))) for e in errors]
-    like = serving(model, x)
-    found, warmth = with_heat(rewound(model, x, like), model.records)
+    fitted, simulated = ([_rms(e) for e in each] for each in (errors, model.errors(model.as_simulated(x))))
+    found, warmth = with_heat(rewound(model, x), model.records)
     return Calibration(
         cell=found,
         declared=cell,
@@ -81,11 +80,11 @@ def calibrate(
         undetermined=undetermined(model, scaled),
         at_bounds=at_bounds(model, x),
         errors=tuple(
-            RecordError(r.name, _degc(r), b, a) for r, b, a in zip(model.records, declared, rms, strict=True)
+            RecordError(r.name, _degc(r), *three)
+            for r, *three in zip(model.records, declared, fitted, simulated, strict=True)
         ),
-        capacities=capacities(model, x, like),
-        like=like,
-        notes=(*notes, *_told(model, x), *_of_age(model, like), *warmth),
+        capacities=capacities(model, x),
+        notes=(*notes, *_told(model, x), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
@@ -146,9 +145,11 @@ def _declared_errors(cell: Cell, model: Model) -> list[float]:
     """RMSE of the start file as it is, V."""
     x = np.zeros(model.layout.size)
     runs = [model.run(i, cell, x)[0] for i in range(len(model.records))]
-    return [
-        float(np.sqrt(np.mean((r.rows.voltage_v - v) ** 2))) for r, v in zip(model.records, runs, strict=True)
-    ]
+    return [_rms(r.rows.voltage_v - v) for r, v in zip(model.records, runs, strict=True)]
+
+
+def _rms(error_v: Array) -> float:
+    return float(np.sqrt(np.mean(error_v**2)))
 
 
 def _told(model: Model, x: Array) -> tuple[str, ...]:
@@ -172,15 +173,6 @@ def _told(model: Model, x: Array) -> tuple[str, ...]:
                 f"{record.name}: fits with {100 * silicon:.0f} % of the silicon in the negative electrode."
             )
     return tuple(out)
-
-
-def _of_age(model: Model, like: int) -> tuple[str, ...]:
-    """A sentence on the record of whose age the file is, where there are several."""
-    if len(model.records) == 1:
-        return ()
-    return (
-        f"{model.records[like].name}: the file has the capacity that the cell had then, which serves all records best.",
-    )
 
 
 def _degc(record: Prepared) -> float | None:

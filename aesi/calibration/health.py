@@ -66,12 +66,12 @@ def _films_ohm(cell: Cell) -> float:
 
 def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
     """95 % interval of each quantity: the covariance of the fit, carried through to first order."""
-    at = np.array(astuple(health_of(rewound(found.model, found.x, found.like))))
+    at = np.array(astuple(health_of(rewound(found.model, found.x))))
     slopes = np.zeros((len(at), len(found.x)))
     for j in range(len(found.x)):
         there = found.x.copy()
         there[j] += STEP
-        slopes[:, j] = (np.array(astuple(health_of(rewound(found.model, there, found.like)))) - at) / STEP
+        slopes[:, j] = (np.array(astuple(health_of(rewound(found.model, there)))) - at) / STEP
     reach = REACH * np.sqrt(np.einsum("ij,jk,ik->i", slopes, found.covariance, slopes))
     middle = np.array(astuple(health_of(found.cell)))
     return {

@@ -34,12 +34,14 @@ class Interval:
 
 @dataclass(frozen=True)
 class RecordError:
-    """RMSE of one record's rows, V: as the start file declares the cell, and calibrated."""
+    """RMSE of one record's rows, V: as the start file declares the cell, calibrated with what the record has of its
+    own, and without it, as the file is simulated on the currents as measured."""
 
     name: str
     temperature_degc: float | None
     before_v: float
     after_v: float
+    simulated_v: float
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,7 @@ class Calibration:
 
     parameters : name -> value with its interval.  undetermined : combinations that the data leave open.
     at_bounds : parameters that ended on a bound.  errors : of each record.  capacities : share of the cell's capacity
-    that each record's has.  like : index of the record of whose age the cell is.  x, covariance : working vector and
-    its covariance, for the posterior.
+    that each record's has.  x, covariance : working vector and its covariance, for the posterior.
     """
 
     cell: Cell
@@ -77,7 +78,6 @@ class Calibration:
     at_bounds: tuple[str, ...]
     errors: tuple[RecordError, ...]
     capacities: Mapping[str, float]
-    like: int
     notes: tuple[str, ...]
     seconds: float
     model: Model

@@ -1,10 +1,21 @@
-"""Does a record belong to a cell?  How far beyond the file's limits it may go, for every command that fits."""
+"""Whether a record can be of the cell that a file declares, for every command that simulates or fits one.
+
+A voltage far beyond the file's limits is another cell's. At every row the voltage bounds the state of charge: the cell
+rests somewhere within a drop of it that no cell exceeds. The charge between two rows then bounds the capacity from both
+sides, and a declared capacity well outside these bounds is another cell's, or the record's current or time is in
+another unit.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass
+
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
+from aesi.numerics.typing import Array, IntArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
 
@@ -12,6 +23,37 @@ VOLTAGE_MARGIN_V = 0.3
 """Beyond the voltage limits of the file that a record may go: fast pulses and old cells do."""
 SOC_MARGIN = 0.12
 """Beyond full and empty, by the declared capacity: new cells hold more than they are sold for."""
+ROWS = 300
+"""Of a record that are looked at, evenly spread: each pair of them bounds the capacity."""
+TELLING_SHARE = 0.3
+"""Of the charge moved: less between two rows is within hysteresis and relaxation."""
+TELLING_SOC, FEWEST_SOC = 0.25, 0.02
+DROP_V = 0.06
+DROP_V_PER_C = 0.25
+COLD_DEGC, COLD_SPAN_K, COLD_FACTOR = 15.0, 25.0, 4.0
+AFTER_S, AFTER_SHARE = 1800.0, 0.3
+"""Drops that no cell exceeds, DROP_V and DROP_V_PER_C when warm: the measured records stay within
+0.05 V + 0.2 V a C-rate above 15 degC, and within four times that at -10 degC."""
+TOO_LARGE, TOO_SMALL = 2.0, 1.25
+"""By how much the declared capacity may exceed, or fall short of, what the record allows: a cell may have lost half of
+it, and batches differ by less. The measured records want at most 1.05 times the capacity of their own cell's file, the
+drive of an LG M50T 1.31 times that of a Panasonic NCR18650PF."""
+ABOVE_FULL_V = 0.1
+"""A voltage at rest further above that of a full cell belongs to another chemistry."""
+SMALL_C_RATE = 0.1
+"""Below it a cell all but rests."""
+SOC_GRID = 1201
+"""States of charge at which a voltage is looked up."""
+BEYOND_SOC = 0.1
+"""What a voltage beyond the window stands for."""
+
+
+@dataclass(frozen=True)
+class CapacityBounds:
+    """low_ah, high_ah : between them lies the capacity of any cell with these open-circuit potentials."""
+
+    low_ah: float
+    high_ah: float
 
 
 def check_voltage(cell: Cell, data: Measurement) -> None:
@@ -25,3 +67,106 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
             f"{cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to another cell, "
             "or the voltage is not in volts."
         )
+
+
+def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
+    """Raises DataError, one sentence, for the first record that cannot be of this cell."""
+    for record in records:
+        if not np.all(np.isfinite(record.voltage_v)):
+            continue
+        _check_window(cell, record)
+        _check_capacity(cell, record)
+
+
+def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
+    """What the voltages and the charge of a record say of the capacity: 0 and infinity where they say nothing."""
+    rows = np.unique(np.linspace(0, len(record) - 1, ROWS).astype(int))
+    charge = _charge_ah(record)[rows]
+    drop = _largest_drop_v(cell, record, rows)
+    current, voltage = record.current_a[rows], record.voltage_v[rows]
+    calm = np.abs(current) < SMALL_C_RATE * cell.nominal_capacity_ah
+    high = _soc_of(cell, voltage + np.where(calm | (current > 0), drop, DROP_V))
+    low = _soc_of(cell, voltage - np.where(calm | (current < 0), drop, DROP_V))
+    moved = charge[None, :] - charge[:, None]  # discharged from row i to row j
+    at_least = low[:, None] - high[None, :]  # of state of charge lost from i to j
+    at_most = np.maximum(high[:, None] - low[None, :], FEWEST_SOC)
+    telling = moved > TELLING_SHARE * float(np.ptp(charge))
+    most = telling & (at_least > TELLING_SOC)
+    largest = float(np.min(moved[most] / at_least[most], initial=np.inf))
+    smallest = float(np.max(moved[telling] / at_most[telling], initial=0.0))
+    return CapacityBounds(smallest, largest)
+
+
+def _check_window(cell: Cell, record: Measurement) -> None:
+    calm = np.abs(record.current_a) < SMALL_C_RATE * cell.nominal_capacity_ah
+    full_v = max(float(cell.rest_voltage_v(np.array([1.0]))[0]), cell.upper_voltage_v)
+    above = calm & (record.voltage_v > full_v + ABOVE_FULL_V)
+    if np.any(above):
+        row = int(np.argmax(above))
+        raise DataError(
+            f"{record.name}, {record.time_s[row]:.6g} s: {record.voltage_v[row]:.3f} V at "
+            f"{record.current_a[row]:.3g} A, but {cell.name} is full at {full_v:.3f} V: the record and the "
+            "cell file are of different cells."
+        )
+
+
+def _check_capacity(cell: Cell, record: Measurement) -> None:
+    bounds = capacity_bounds(cell, record)
+    declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
+    moved = float(np.ptp(_charge_ah(record)))
+    low_v, high_v = float(np.min(record.voltage_v)), float(np.max(record.voltage_v))
+    said = f"{record.name}: {moved:.4g} Ah move between {low_v:.3f} and {high_v:.3f} V, as in a cell of"
+    if bounds.low_ah > TOO_SMALL * declared:
+        raise DataError(
+            f"{said} {bounds.low_ah:.3g} Ah or more, but {cell.name} has {declared:.3g} Ah: "
+            f"{_cause(bounds.low_ah / declared, record)}."
+        )
+    if declared > TOO_LARGE * bounds.high_ah:
+        raise DataError(
+            f"{said} {bounds.high_ah:.3g} Ah or less, but {cell.name} has {declared:.3g} Ah: "
+            f"{_cause(bounds.high_ah / declared, record)}."
+        )
+
+
+def _cause(ratio: float, record: Measurement) -> str:
+    """What the ratio of capacities rather says: units differ by factors that cells do not."""
+    if ratio > 200.0:
+        return "the current is in mA or the time in ms; declare it: --unit current_a=mA, or --unit time_s=ms"
+    if ratio < 1.0 / 1000.0:
+        return "the time is in hours; declare it: --unit time_s=h"
+    if ratio < 1.0 / 15.0:
+        return "the time is in minutes or hours (declare it: --unit time_s=min or h), or the cell file is another's"
+    one_way = np.min(record.current_a) >= 0.0 or np.max(record.current_a) <= 0.0
+    if ratio > 1.0 and one_way:
+        return (
+            "the cell file is another cell's, or the current is written without its sign (--state COLUMN names the "
+            "column that says which way it flows)"
+        )
+    return "the cell file is another cell's, or the current is that of several cells in parallel"
+
+
+def _charge_ah(record: Measurement) -> Array:
+    """(n,) Ah discharged since the first row; a row's current has held since the row before, as loggers write."""
+    step = np.diff(record.time_s)
+    return np.concatenate([[0.0], np.cumsum(record.current_a[1:] * step)]) / SECONDS_PER_HOUR
+
+
+def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray) -> Array:
+    """(n_rows,) V: the drop that no cell exceeds under its current, or after that of the half hour before."""
+    size = np.abs(record.current_a)
+    since = np.searchsorted(record.time_s, record.time_s[rows] - AFTER_S)
+    before = np.array([np.max(size[first : row + 1]) for first, row in zip(since, rows, strict=True)])
+    rate = np.maximum(size[rows], AFTER_SHARE * before) / cell.nominal_capacity_ah
+    drop = DROP_V + DROP_V_PER_C * rate
+    if record.temperature_degc is None:
+        return drop
+    cold = np.clip((COLD_DEGC - record.temperature_degc[rows]) / COLD_SPAN_K, 0.0, 2.0)
+    return drop * (1.0 + (COLD_FACTOR - 1.0) * cold)
+
+
+def _soc_of(cell: Cell, voltage_v: Array) -> Array:
+    """(n,) state of charge at which the cell rests at these voltages, held at a little beyond empty and full."""
+    soc = np.linspace(0.0, 1.0, SOC_GRID)
+    ocv = np.maximum.accumulate(cell.rest_voltage_v(soc))
+    inside = np.interp(voltage_v, ocv, soc)
+    return np.where(voltage_v < ocv[0], -BEYOND_SOC, np.where(voltage_v > ocv[-1], 1.0 + BEYOND_SOC, inside))

@@ -72,7 +72,8 @@ class Effect:
     in the cell.
     of_design : True for what a cell is made with and keeps (potentials, geometry, transport, kinetics); a file that was
     fitted to this very cell has it right, as far as the model goes.
-    of_every_record : True for physics by constants of the cell, which no record is without where another one has it.
+    of_every_record : True for physics by constants of the cell, and for its age: what no record is without where
+    another one of those days has it.
     experiment : which one shows it.  told_apart : id of another effect -> which one tells the two apart.
     """
 

@@ -11,7 +11,7 @@ from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, read
 from aesi.physics import ModelName
-from aesi.pipeline.belonging import check_belongs
+from aesi.physics.belongs import check_belongs
 from aesi.pipeline.calibrate import check_records
 from aesi.pipeline.discovery.cases import MOST_ROWS
 from aesi.pipeline.discovery.discover import Case, run_case

@@ -17,8 +17,8 @@ from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
 from aesi.errors import DataError
 from aesi.physics.arguments import check_temperature
+from aesi.physics.belongs import check_belongs
 from aesi.physics.simulation import MODEL_WORDS, ModelName
-from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
@@ -130,6 +130,7 @@ def calibration_content(
                 "temperature_degc": e.temperature_degc,
                 "before_rmse_mv": MV_PER_V * e.before_v,
                 "after_rmse_mv": MV_PER_V * e.after_v,
+                "as_simulated_rmse_mv": MV_PER_V * e.simulated_v,
                 "capacity_share": found.capacities[e.name],
             }
             for e in found.errors
@@ -196,16 +197,18 @@ def to_text(content: dict[str, Any]) -> str:
     """The report as Markdown."""
     lines = [
         f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", "",
-        "| file | mean temperature, degC | before, mV | after, mV | capacity |", "|---|---|---|---|---|",
+        "| file | mean temperature, degC | before, mV | after, mV | as simulated, mV | capacity |",
+        "|---|---|---|---|---|---|",
     ]  # fmt: skip
     lines += [
         f"| {f['name']} | {_number(f['temperature_degc'])} | {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} "
-        f"| {f['capacity_share']:.3f} |"
+        f"| {f['as_simulated_rmse_mv']:.2f} | {f['capacity_share']:.3f} |"
         for f in content["files"]
     ]
     lines += [
         "",
-        "Errors are RMSE on the data that were fitted; the capacity is that of the record over the file's.",
+        "Errors are RMSE on the data that were fitted: after, each record with what it has of its own (its capacity "
+        "over the file's, its start, its cycler's zero); as simulated, the file as it is on the current as measured.",
         "",
     ]
     lines += ["| state of health | value | 95 % interval |", "|---|---|---|"]

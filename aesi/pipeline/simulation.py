@@ -16,9 +16,9 @@ from aesi.data.reading import Reading
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
+from aesi.physics.belongs import check_belongs
 from aesi.physics.effects import activated
 from aesi.physics.effects.self_heating import of_file
-from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction

@@ -1,9 +1,8 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
-# Without arguments all three, into this folder. Each takes some minutes of one processor. The shipped file of the LG 18650HG2
-# is from before a cycler's zero was read off whole cycles: what this gives today needs the capacity of each record's day, and
-# is worse, as it is, on the records that both are fitted to (docs/cells.md).
+# Without arguments all three, into this folder. Each takes some minutes of one processor. The shipped file of the Panasonic
+# over temperatures is from before its pulses, which are of three months, were fitted in one state (docs/cells.md).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -28,7 +27,8 @@ panasonic_25degc() {
 hg2() {
     p=$data/lg_18650hg2
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
-        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
+        --data "$p/25degC_c20_ocv.csv" "$p/40degC_c20_ocv.csv" "$p/0degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" \
+        "$p/25degC_mixed1.csv.gz" \
         --out "$out/lg_18650hg2.bpx.json"
 }
 case $which in

@@ -34,15 +34,17 @@ def batch(
     workers: int = 2,
     runner: Runner = "local",
     address: str | None = None,
+    soh: float | None = None,
 ) -> list[dict[str, Any]]:
     """Run the jobs of a folder or table; the rows of the summary, which is written anew after each.
 
+    soh : state of health of every cell that the plan gives none.
     Raises InputError for a plan that cannot be read; a job that fails is a row with its reason.
     """
     environment.prepare_process()
     console = Console()
     started = time.monotonic()
-    jobs = read_plan(source, cell)
+    jobs = read_plan(source, cell, soh)
     out.mkdir(parents=True, exist_ok=True)
     cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
     console.say(f"{cells} from {source}; results in {out}")

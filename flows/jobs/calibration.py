@@ -26,7 +26,8 @@ def calibrate(
     content = calibrate_files(cell, measurements, out, request)
     for row in content["files"]:
         console.say(
-            f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after"
+            f"  {row['name']}: {row['before_rmse_mv']:.2f} mV before, {row['after_rmse_mv']:.2f} mV after, "
+            f"{row['as_simulated_rmse_mv']:.2f} mV as the file is simulated"
         )
     for row in content["impedance"]:
         console.say(f"  {row['name']}, state of charge {row['soc']:.2f}: |Z| {row['rms_pct']:.0f} % off")

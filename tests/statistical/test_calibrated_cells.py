@@ -11,7 +11,9 @@ from aesi.data.catalogue import locate
 from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 
-OLDER = pytest.mark.xfail(reason="the shipped file is from before the zero of whole cycles", strict=False)
+MONTHS = pytest.mark.xfail(
+    reason="pulses of three months, in whose one state the command's file is worse at 25 degC", strict=False
+)
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
 
 
@@ -19,8 +21,8 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
 @pytest.mark.parametrize(
     ("name", "file", "data"),
     [
-        pytest.param("hg2", "lg_18650hg2", "lg_18650hg2", marks=OLDER),
-        ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
+        ("hg2", "lg_18650hg2", "lg_18650hg2"),
+        pytest.param("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf", marks=MONTHS),
         ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
     ],
 )

@@ -30,7 +30,7 @@ MOST_ROWS = 4000
 class Prepared:
     """One record as a calibration sees it.
 
-    data : as measured.  rows, hold, longest_s : what is simulated.  kelvin : (rows,) K or None for the cell's own.
+    data : as measured.  rows, hold : what is simulated.  kelvin : (rows,) K or None for the cell's own.
     start : state of charge at the first row; soc_sd : what it is uncertain by here.  slow : C/7 at most.
     flows : (rows,) 1 where a current flows, else 0.  trusted : (rows,) see `Thinned`.
     """
@@ -38,7 +38,6 @@ class Prepared:
     data: Measurement
     rows: Measurement
     hold: Hold
-    longest_s: float
     kelvin: Array | None
     start: InitialState
     soc_sd: float
@@ -70,17 +69,22 @@ def _prepared(
     window_s = max(1.0, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
     thin = thinned(data, cell.capacity_ah, window_s)
     start = initial_state(cell, data, soc0, data.hold or "backward", shared=shared, model=physics)
-    sd = start.sd if start.basis == "given" else max(start.sd, SOC_SD)
+    slow = is_slow(thin.data, cell.nominal_capacity_ah)
+    if start.basis == "given":
+        sd = start.sd
+    elif start.basis == "full charge" and not slow:
+        sd = 0.0
+    else:
+        sd = max(start.sd, SOC_SD)
     temperature = thin.data.temperature_degc
     return Prepared(
         data=data,
         rows=thin.data,
         hold=(data.hold or assumed_hold(data.time_s)) if thin.data is data else thin.hold,
-        longest_s=thin.longest_s,
         kelvin=None if temperature is None else np.ascontiguousarray(temperature + ZERO_CELSIUS_K),
         start=start,
         soc_sd=sd,
-        slow=is_slow(thin.data, cell.nominal_capacity_ah),
+        slow=slow,
         trusted=thin.trusted,
         flows=flowing(thin.data.current_a).astype(float),
     )

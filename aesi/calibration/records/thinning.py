@@ -23,7 +23,7 @@ SOON_S = 1.0
 class Thinned:
     """What a fit simulates.
 
-    data : the rows.  hold : how the current runs between them.  longest_s : of the model's steps.
+    data : the rows.  hold : how the current runs between them.
     trusted : (rows,) False where a step of the current lies within the row: instruments read current and voltage some
     hundredths of a second apart.
     """
@@ -31,7 +31,6 @@ class Thinned:
     data: Measurement
     trusted: BoolArray
     hold: Hold
-    longest_s: float
 
 
 def thinned(data: Measurement, capacity_ah: float, window_s: float = WINDOW_S) -> Thinned:
@@ -40,9 +39,9 @@ def thinned(data: Measurement, capacity_ah: float, window_s: float = WINDOW_S) -
     steady = condensed(data, capacity_ah, longest_s, SPACING)
     if steady is None:
         rows = averaged_over(data, window_s)
-        return Thinned(rows, np.ones(len(rows), dtype=bool), "linear", max(window_s, 1.0))
+        return Thinned(rows, np.ones(len(rows), dtype=bool), "linear")
     rows, _ = steady
     gaps = np.diff(rows.time_s)
     followed = np.append(gaps[1:], np.inf) < SOON_S
     trusted = np.concatenate([[True], ~(current_steps(rows, capacity_ah) & followed)])
-    return Thinned(rows, trusted, "backward", min(max(float(np.median(gaps)), 1.0), 30.0))
+    return Thinned(rows, trusted, "backward")

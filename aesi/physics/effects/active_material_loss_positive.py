@@ -47,5 +47,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=lose_material,
+    of_every_record=True,
     experiment="a full C/20 discharge between the voltage limits and the coulombs that go back in, read as dV/dQ",
 )

@@ -39,5 +39,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=lose_lithium,
+    of_every_record=True,
     experiment="a full C/20 discharge between the voltage limits and the coulombs that go back in",
 )

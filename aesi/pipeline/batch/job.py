@@ -86,6 +86,7 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         settings.holdout,
         settings.max_effects,
         settings.seed,
+        soh=job.soh,
     )
     content = write_discovery(folder, case, run_case(case, folder))
     row: dict[str, Any] = {

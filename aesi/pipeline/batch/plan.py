@@ -2,7 +2,7 @@
 
 A folder holds one subfolder a cell with its records, and a BPX file in it (or one for all, given). A table is a CSV
 with the columns `name` and `data` (several files separated by `;`), and where wanted `cell` (BPX file), `test`, `soc0`,
-`specimen` and `at`: rows of one specimen are check-ups of one cell, at a time or throughput of any unit.
+`soh`, `specimen` and `at`: rows of one specimen are check-ups of one cell, at a time or throughput of any unit.
 """
 
 from __future__ import annotations
@@ -10,14 +10,14 @@ from __future__ import annotations
 import csv
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from aesi.errors import InputError
 
 CELL_FILES = ("*.bpx.json", "*.json")
 RECORDS = (".csv", ".gz", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax", ".txt")
-COLUMNS = ("name", "data", "cell", "test", "soc0", "specimen", "at")
+COLUMNS = ("name", "data", "cell", "test", "soc0", "soh", "specimen", "at")
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Job:
     """One cell and its records.
 
     specimen, at : which physical cell a check-up is of, and when; empty and None where there is one alone.
+    soh : share of the cell file's capacity that the cell had in its discovery; None for all of it.
     """
 
     name: str
@@ -34,10 +35,11 @@ class Job:
     soc0: float | None = None
     specimen: str = ""
     at: float | None = None
+    soh: float | None = None
 
     def key(self, settings: str) -> str:
         """What identifies the job: the content of its files and the settings it is run with."""
-        sha = hashlib.sha256(f"{settings}|{self.soc0}|{bool(self.specimen)}".encode())
+        sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
         for path in (self.cell, *self.data, *self.tests):
             files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
             for file in files:
@@ -45,10 +47,10 @@ class Job:
         return sha.hexdigest()[:16]
 
 
-def read_plan(source: Path, cell: Path | None = None) -> tuple[Job, ...]:
+def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) -> tuple[Job, ...]:
     """The jobs of a folder or a table.
 
-    cell : the BPX file (or model folder) of every job that names none.
+    cell : the BPX file (or model folder) of every job that names none.  soh : of every job that names none.
     Raises InputError, one sentence, for what is missing.
     """
     if not source.exists():
@@ -60,7 +62,7 @@ def read_plan(source: Path, cell: Path | None = None) -> tuple[Job, ...]:
         raise InputError(f"{source}: two rows are named {twice!r}; names tell the folders of results apart.")
     if not jobs:
         raise InputError(f"{source} holds no cell: one subfolder each with its records, or a table of them.")
-    return jobs
+    return tuple(job if job.soh is not None else replace(job, soh=soh) for job in jobs)
 
 
 def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
@@ -122,5 +124,12 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
         raise InputError(f"{table}, line {line}: there is no file {missing[0]}.")
     specimen = (row.get("specimen") or "").strip()
     return Job(
-        name, own[0] if own else cell or Path(), data, files("test"), number("soc0"), specimen, number("at")
+        name,
+        own[0] if own else cell or Path(),
+        data,
+        files("test"),
+        number("soc0"),
+        specimen,
+        number("at"),
+        number("soh"),
     )

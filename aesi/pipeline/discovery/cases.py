@@ -8,7 +8,7 @@ from pathlib import Path
 from aesi.data.read import Reading, read
 from aesi.errors import ConfigError
 from aesi.physics import ModelName
-from aesi.pipeline.belonging import check_belongs
+from aesi.physics.belongs import check_belongs
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig

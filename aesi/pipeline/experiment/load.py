@@ -14,8 +14,8 @@ from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
+from aesi.physics.belongs import check_belongs
 from aesi.physics.effects import activated
-from aesi.pipeline.belonging import check_belongs
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under

@@ -173,8 +173,8 @@ class SearchConfig(Section):
     fold : rows of the pieces that validate in turn where no records are set aside for it; None for whole training
     records, halves of training repeats, or an eighth of a single record.
     regime : what the losses measure.  weights : gamma of the losses (out-of-bag, validation, sparsity) in the
-    scalar fitness.  pearson_train, pearson_valid : epsilon of the two constraints, which the paper sets (-1: none; a
-    correction that left-out drives do not bear out fades by itself).
+    scalar fitness (`aesi.sparse.search.evaluate.FitnessWeights`).  pearson_train, pearson_valid : epsilon of the two
+    constraints, which the paper sets (-1: none; a correction that left-out drives do not bear out fades by itself).
     warm_start : begin with a few plain candidates (strong ridge on the whole library).
     timeout_s, memory_mb : what one candidate may take before it counts as failed.
     """
@@ -192,7 +192,7 @@ class SearchConfig(Section):
     tau: tuple[Share, Share] = (0.3, 0.7)
     pearson_train: Annotated[float, Field(ge=-1, le=1)] = -1.0
     pearson_valid: Annotated[float, Field(ge=-1, le=1)] = -1.0
-    weights: tuple[float, float, float] = (0.05, 0.90, 0.05)
+    weights: tuple[float, float, float] = (0.5, 0.5, 0.0)
     warm_start: bool = True
     timeout_s: Positive = 300.0
     memory_mb: Positive = 6000.0

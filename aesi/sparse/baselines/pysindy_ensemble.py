@@ -16,7 +16,7 @@ import numpy as np
 from aesi.errors import FitError
 from aesi.sparse.baselines.single import Single, evaluate_single
 from aesi.sparse.model import SparseModel
-from aesi.sparse.search.evaluate import FitnessWeights, sparse_model
+from aesi.sparse.search.evaluate import sparse_model
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
@@ -63,7 +63,7 @@ def _setting(problem: Problem) -> Genome:
     for d, ridge in product(range(1, min(2, top) + 1), _RIDGES):
         genome = Genome.whole(problem.library, ridge, THRESHOLD, d=d, feedback=False)
         fit = STRidge(ridge, THRESHOLD).fit_factor
-        single = evaluate_single(problem, genome, fit, NAME, FitnessWeights(0.5, 0.5, 0.0))
+        single = evaluate_single(problem, genome, fit, NAME)
         if isinstance(single, Single):
             singles.append(single)
     if not singles:

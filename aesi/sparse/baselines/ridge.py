@@ -12,19 +12,15 @@ import numpy as np
 from aesi.errors import FitError
 from aesi.sparse.baselines.single import Single, evaluate_single
 from aesi.sparse.model import SparseModel
-from aesi.sparse.search.evaluate import FitnessWeights
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.stridge import STRidge
-
-# Sparsity is no aim here.
-_WEIGHTS = FitnessWeights(0.5, 0.5, 0.0)
 
 
 def plain_ridge(problem: Problem) -> SparseModel:
     """The best of the grid; nothing is random. Raises FitError where all of them diverge."""
     outcomes = [
-        evaluate_single(problem, genome, STRidge(genome.lambda1, 0.0).fit_factor, "ridge", _WEIGHTS)
+        evaluate_single(problem, genome, STRidge(genome.lambda1, 0.0).fit_factor, "ridge")
         for genome in _grid(problem)
     ]
     singles = [outcome for outcome in outcomes if isinstance(outcome, Single)]

@@ -2,7 +2,7 @@
 
 The model errs on all of them. The good records say how large its error is in this cell, and what of the instruments
 all of them share; effects act on the others alone. What is named is a difference between records, and what a right
-answer may leave is what the model leaves of the good ones.
+answer may leave is what the model leaves of the good ones. What the cell is made with, and its age, are alike in all.
 """
 
 from __future__ import annotations
@@ -44,11 +44,12 @@ def gathered_beside(
     verdict = replace(
         verdict, confidence=frequency_maps()[kind_of(verdict.word, verdict.effects)].frequency(verdict.margin)
     )
-    recalibrated, after = ModelState.of(beside, path.base), ModelState.of(beside, path.chosen)
+    recalibrated = ModelState.of(beside, path.base)
+    after = ModelState.of(beside, path.chosen) if verdict.effects else recalibrated
     fault = range_fault(after, ORDINARY_C)
     if fault is not None:
         return Evidence(path, {"beside": path}, recalibrated, ModelState(beside), verdict, fault)
-    limits = limits_of(after) if path.chosen.hypothesis else ()
+    limits = limits_of(after) if verdict.effects else ()
     return Evidence(path, {"beside": path}, recalibrated, after, verdict, None, limits)
 
 
@@ -60,6 +61,8 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     usual = left_v(path, path.chosen, good & problem.compared)
     allowed = usual * (1.0 + NINETY * _relative_sd(problem, good))
     named = path.chosen.hypothesis
+    if left > allowed and path.gain(path.chosen) * (usual / left) ** 2 < path.admission_nats:
+        named = ()  # of the error that these records show by themselves it does not say enough
     groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -_best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
     reason = (

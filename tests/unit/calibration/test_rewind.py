@@ -1,37 +1,49 @@
-"""The age of the cell that is written: that of the record with which all records are met best."""
+"""The state of the cell that is written: that of the records with a load; slow ones have a share of their own."""
 
 import numpy as np
 import pytest
 
 from aesi.calibration.fit import problem
-from aesi.calibration.model import AGEING_SD
+from aesi.calibration.model import LOADED_SD, SLOW_SD
 from aesi.calibration.parameters import with_interfaces
-from aesi.calibration.rewind import capacities, rewound, serving
+from aesi.calibration.rewind import capacities, rewound
 from aesi.physics import simulate
 from aesi.records import Measurement
 
-LOST = 0.03
 
-
-def discharge(cell, name: str) -> Measurement:
-    """At C/2 from full, after a rest, to a tenth above empty."""
-    time = np.arange(0.0, 6900.0, 10.0)
-    current = np.where(time > 300.0, 0.5 * cell.nominal_capacity_ah, 0.0)
+def discharge(cell, name: str, c_rate: float) -> Measurement:
+    """From full, after a rest, to a tenth above empty."""
+    time = np.arange(0.0, 300.0 + 3300.0 / c_rate, 5.0 / c_rate)
+    current = np.where(time > 300.0, c_rate * cell.nominal_capacity_ah, 0.0)
     voltage = simulate(cell, time, current, 1.0, (), None, "backward").voltage_v
     return Measurement(time, current, voltage, None, name)
 
 
-def test_it_is_the_one_that_serves_most_records(start):
+@pytest.fixture(scope="module")
+def model(start):
     whole = with_interfaces(start)
-    aged = whole.with_soh(1.0 - LOST)
-    cells = {"fresh": whole, "aged": aged, "aged_too": aged}
-    records = [discharge(cell, name) for name, cell in cells.items()]
-    model = problem(whole, records, 1.0, {}, same_cell=True)[0]
+    records = [discharge(whole, "slow", 0.1), discharge(whole, "loaded", 0.5)]
+    return problem(whole, records, None, {}, same_cell=True)[0]
+
+
+def test_it_is_the_one_that_shares_are_deviations_from(model):
     x = np.zeros(model.layout.size)
-    x[[model.layout.age(1), model.layout.age(2)]] = np.log(1.0 - LOST) / AGEING_SD
-    like = serving(model, x)
-    assert like == 1
-    shares = capacities(model, x, like)
-    assert shares == pytest.approx({"fresh": 1.0 / (1.0 - LOST), "aged": 1.0, "aged_too": 1.0})
-    fresh, old = (rewound(model, x, index) for index in (0, 1))
-    assert old.capacity_ah == pytest.approx((1.0 - LOST) * fresh.capacity_ah)
+    alone = rewound(model, x)
+    x[[model.layout.age(0), model.layout.age(1)]] = 1.0, -1.0
+    assert rewound(model, x) == alone
+    shares = capacities(model, x)
+    assert shares == pytest.approx({"slow": np.exp(SLOW_SD), "loaded": np.exp(-LOADED_SD)})
+
+
+def test_a_loaded_record_that_was_charged_starts_where_a_simulation_of_the_file_does(model):
+    slow, loaded = model.records
+    assert loaded.start.basis == slow.start.basis == "full charge"
+    assert loaded.soc_sd == 0.0 < slow.soc_sd
+
+
+def test_a_fit_steps_as_finely_as_the_file_is_simulated(model):
+    x = np.zeros(model.layout.size)
+    rows = model.records[1].rows
+    fitted = model.run(1, model.cell_at(x), x)[0]
+    simulated = simulate(model.cell_at(x), rows.time_s, rows.current_a, 1.0, (), None, "backward").voltage_v
+    assert np.abs(fitted - simulated).max() < 1e-3

@@ -110,7 +110,7 @@ def test_where_a_porous_electrode_runs_dry_its_solution_goes_on_to_the_cut_off()
     cell = cell_of("lg_18650hg2")
     time = np.arange(0.0, 100.0, 0.25)
     current = np.full(len(time), 4.0 * cell.nominal_capacity_ah)
-    run = simulate(cell, time, current, 0.72, (), -2.1, on_depletion="clip", model="dfn")
+    run = simulate(cell, time, current, 0.85, (), 0.0, on_depletion="clip", model="dfn")
     ends = int(np.argmax(run.voltage_v < cell.lower_voltage_v))
     dry = np.abs(run.series["c_eL"]) < 0.01 * cell.electrolyte.c0_mol_m3
     assert ends > 0

@@ -49,6 +49,16 @@ def test_a_table_names_cells_tests_and_check_ups(tmp_path):
     assert (second.tests, second.soc0, second.at) == ((), None, 200.0)
 
 
+def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
+    touched(tmp_path / "s.csv")
+    table = tmp_path / "plan.csv"
+    table.write_text("name,data,soh\nold,s.csv,0.8\nnew,s.csv,\n")
+    old, new = read_plan(table, CELL, 0.95)
+    assert (old.soh, new.soh) == (0.8, 0.95)
+    assert old.key("") != read_plan(table, CELL, 0.95)[1].key("")
+    assert [job.soh for job in read_plan(table, CELL)] == [0.8, None]
+
+
 @pytest.mark.parametrize(
     ("content", "words"),
     [

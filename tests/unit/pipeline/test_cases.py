@@ -42,6 +42,17 @@ def test_a_record_that_is_fitted_cannot_judge(tmp_path):
         case_of_files(BPX, [record, record])
 
 
+def test_good_records_stand_beside_what_is_looked_at(tmp_path, shared_data, monkeypatch):
+    record = write_record(tmp_path)
+    with pytest.raises(DataError, match="is there twice among the data; give it once"):
+        case_of_files(BPX, [record], good=[record])
+    monkeypatch.setenv("AESI_DATA", str(shared_data / "measured"))
+    overrides = ["discover.fit=[drive_cycle]", "discover.good=[C2, 1C]", "discover.test=[]"]
+    case = case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
+    assert [m.name for m in case.good] == ["C2", "1C"]
+    assert [m.name for m in case.records] == ["drive_cycle", "C2", "1C"]
+
+
 def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_path):
     record = read_measurement(write_record(tmp_path))
     with pytest.raises(DataError, match="twice among the data"):

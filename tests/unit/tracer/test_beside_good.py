@@ -1,6 +1,7 @@
 """Records beside others of the same cell that are known to be good: what is different about the first?"""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
+from aesi.tracer.search.grown import promising
 
 OFFSET_V = 8e-3
 TRIED = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "ocv_hysteresis")
@@ -77,6 +79,28 @@ def test_effects_under_test_move_the_other_records_alone(cell, tried, erring):
     assert moved[problem.slices[1]] == pytest.approx(0.0)
     owners = {f.owner for f in problem.free(("voltage_sensor_offset",))}
     assert {"voltage_sensor_offset", of_all_records("voltage_sensor_offset")} <= owners
+
+
+def test_what_the_cell_is_made_with_and_its_age_do_not_compete_beside_good_records(cell, make):
+    alone, beside = (
+        replace(inverse_problem(cell, [make()], 0.9, good=good), trust="beside")
+        for good in ([], [make(seed=3)])
+    )
+
+    def competing(problem):
+        fit = SimpleNamespace(hypothesis=())
+        return set(promising(SimpleNamespace(problem=problem, fit=fit), {}))
+
+    assert competing(beside) == {
+        "ambient_temperature",
+        "series_resistance",
+        "leakage_current",
+        "current_sensor_gain",
+        "current_sensor_offset",
+        "voltage_sensor_offset",
+        "clock_skew",
+    }
+    assert competing(beside) < competing(alone)
 
 
 def test_good_records_count_where_the_others_have_been(cell, make):

@@ -8,7 +8,7 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
-from aesi.pipeline.belonging import capacity_bounds, check_belongs
+from aesi.physics.belongs import capacity_bounds, check_belongs
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
