@@ -63,10 +63,12 @@ def with_model(
     first = search(single, fits)
     if problem.has_good:
         return told(first, "espm", ", since the good records share what it approximates")
-    reduction = _larger(reduction, first.paths["tight"])
+    explained = first.verdict.word != "unknown" or _explains(first.paths["tight"], reduction)
+    if explained:
+        reduction = _larger(reduction, first.paths["tight"])
     if reduction is None or not reduction.notable:
         return told(first, "espm")
-    if first.verdict.word == "unknown" and not _explains(first.paths["tight"], reduction):
+    if not explained:
         return told(first, "espm", ", which leaves far more than the two differ by")
     full = fine("dfn")
     second = search(full, kept(full, fits))
@@ -98,8 +100,9 @@ def with_single_particle(full: Evidence, single: Evidence) -> bool:
     return believed((full.path, full.verdict), (single.path, single.verdict))
 
 
-def _explains(path: Path, reduction: Reduction) -> bool:
-    """Could what the two models differ by be all that a search leaves beyond what a right hypothesis may?"""
+def _explains(path: Path, reduction: Reduction | None) -> bool:
+    """Could what the two models of the declared cell differ by be all that a search leaves beyond what a right
+    hypothesis may?"""
     allowed_v = tolerance_v(path.problem, Thresholds())
     left_v = structured_v(path, path.chosen) if path.beyond_reach_v is None else path.beyond_reach_v
-    return left_v - reduction.shift_v <= allowed_v
+    return left_v - (0.0 if reduction is None else reduction.shift_v) <= allowed_v

@@ -52,7 +52,7 @@ def written(
     is not what is written.
 
     It may do harm in no range of charge, and has to run over the declared range.  recalibrated : with own parameters
-    alone; an effect that nothing speaks for enough is not written.
+    open, some of them with effects that stand in for what the cell lacks.
     """
     own = [one for one in recalibrated if _fault(one, declared, (*ORDINARY_C, *FAST_C)) is None]
     fault = None if named is None else _fault(named, declared, ORDINARY_C)
@@ -64,6 +64,17 @@ def written(
         return best.state, None
     names = " + ".join(named.state.hypothesis)
     return best.state, f"{names}: {fault or LESS_ELSEWHERE}; {_instead(best, declared)}"
+
+
+def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
+    """What is said of effects that are written and not named."""
+    beside = [name for name in state.hypothesis if name not in named]
+    if not beside:
+        return ()
+    return (
+        f"the model that is written is recalibrated with {' + '.join(beside)}, which leaves least on records left out; "
+        "that the cell lacks this is not shown: it stands in for what no hypothesis explains.",
+    )
 
 
 def limits_of(state: ModelState) -> tuple[str, ...]:
@@ -80,4 +91,9 @@ def _instead(taken: Option, declared: Option) -> str:
     if taken is declared:
         return "the declared model stays"
     left_mv, before_mv = 1e3 * taken.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
-    return f"written is the recalibrated model, which leaves {left_mv:.1f} mV there, the declared one {before_mv:.1f}"
+    names = " + ".join(taken.state.hypothesis)
+    beside = f" with {names}" if names else ""
+    return (
+        f"written is the recalibrated model{beside}, which leaves {left_mv:.1f} mV there, the declared one "
+        f"{before_mv:.1f}"
+    )

@@ -12,7 +12,7 @@ from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
 from aesi.tracer.decide.evidence import consistent
 from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v, unexplained_v
-from aesi.tracer.decide.written import Option, carries_best, worst_ratio, written
+from aesi.tracer.decide.written import Option, carries_best, stand_ins, worst_ratio, written
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
@@ -155,6 +155,22 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert "another model leaves less on records left out" in str(why)
     named = option(5.2, 38.5)  # within 5 % of the best on either
     assert written(declared, [option(5.4, 38.0)], named) == (named.state, None)
+
+
+def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to_be_no_finding(path):
+    def option(left_mv, *effects):
+        left_v = (1e-3 * left_mv,)
+        return Option(ModelState(path.problem, hypothesis=effects), LeftOut(left_v, left_v))
+
+    declared, plain, more = option(20.0), option(15.0), option(9.0, "series_resistance")
+    assert written(declared, [plain, more], None)[0] is more.state
+    assert written(declared, [plain, option(16.0, "series_resistance")], None)[0] is plain.state
+    (said,) = stand_ins(more.state, ())
+    assert "series_resistance" in said
+    assert "is not shown" in said
+    assert stand_ins(more.state, ("series_resistance",)) == stand_ins(plain.state, ()) == ()
+    _, why = written(declared, [more], option(19.9, "ocv_hysteresis"))
+    assert "recalibrated model with series_resistance, which leaves 9.0 mV there" in str(why)
 
 
 def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
