@@ -27,8 +27,7 @@ panasonic_25degc() {
 hg2() {
     p=$data/lg_18650hg2
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
-        --data "$p/25degC_c20_ocv.csv" "$p/40degC_c20_ocv.csv" "$p/0degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" \
-        "$p/25degC_mixed1.csv.gz" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
         --out "$out/lg_18650hg2.bpx.json"
 }
 case $which in
