@@ -66,6 +66,8 @@ class Discovery:
 
     model_effects : what `after` simulates with: the effects found, and the tolerated parameters where they
     settled.
+    written : ids of the effects that `after` has beside the declared model; not those of the verdict where these do not
+    carry over.
     own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
     soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
     part.  before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
@@ -88,6 +90,7 @@ class Discovery:
     choice: ModelChoice
     notes: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    written: tuple[str, ...] = ()
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
     seconds: float = 0.0
     simulations: int = 0
@@ -234,6 +237,7 @@ def _told(
         choice=choice,
         notes=(choice.sentence, *_notes(evidence, tested)),
         warnings=_warnings(files),
+        written=tuple(evidence.after.hypothesis),
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         seconds=seconds,
         simulations=simulations,

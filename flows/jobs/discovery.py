@@ -210,7 +210,9 @@ def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: P
 
 
 def _errors_of(content: dict[str, Any], part: str) -> str:
-    """The errors of one part; that of `after` only where something was added."""
-    words = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding added"}
-    shown = list(words) if content["effects"] else ["before", "recalibrated"]
-    return ", ".join(f"{content[state][part]['rmse_mv']:.2f} mV {words[state]}" for state in shown)
+    """The errors of one part; that of `after` only where it is more than a refit."""
+    from aesi.pipeline.report.words import states_of
+
+    return ", ".join(
+        f"{content[state][part]['rmse_mv']:.2f} mV {words}" for state, words in states_of(content).items()
+    )

@@ -132,6 +132,7 @@ def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, A
         "schema": SCHEMA,
         "verdict": verdict.word,
         "effects": list(verdict.effects),
+        "written": list(found.written),
         "indistinguishable": [list(group) for group in verdict.groups],
         "confidence": round(verdict.confidence, 4),
         "reason": verdict.reason,

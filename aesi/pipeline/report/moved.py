@@ -12,14 +12,17 @@ MOST_NAMED = 3
 """Parameters that one sentence names."""
 INITIAL_STATE = "soc0"
 """Stands for the effect of a row where a record's initial state of charge moved."""
-STATES = {"recalibrated": "Recalibrating", "after": "Beside the finding the fit"}
+RECALIBRATING, BESIDE, WRITTEN = "Recalibrating", "Beside the finding the fit", "The model that is written"
 
 
 def moved_findings(discovery: Mapping[str, Any]) -> list[str]:
     """A sentence for the recalibrated model and, where something was found, one for the model with it: what moved most,
     and what ended at the end of its range; none where nothing was fitted."""
     own = discovery.get("own_parameters", {})
-    shown = STATES if discovery["effects"] else {"recalibrated": STATES["recalibrated"]}
+    effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
+    shown = {"recalibrated": RECALIBRATING}
+    if effects or written:
+        shown["after"] = BESIDE if written == effects else WRITTEN
     return [_sentence(words, own[state]) for state, words in shown.items() if own.get(state)]
 
 

@@ -154,6 +154,15 @@ def name_confidence(discovery: Mapping[str, Any]) -> str:
     return f" ({share} confidence in {names})"
 
 
+def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
+    """The states of the model worth showing, in words: the last one where it is more than a refit."""
+    shown = {"before": "as declared", "recalibrated": "recalibrated"}
+    effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
+    if effects or written:
+        shown["after"] = "with the finding added" if written == effects else "as written"
+    return shown
+
+
 def reason_finding(discovery: Mapping[str, Any]) -> str:
     """What the verdict rests on: the error left beyond the noise against what any such model may leave."""
     left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
@@ -228,7 +237,8 @@ def discovery_consequence(view: DiscoveryView) -> str:
     }
     if any(value is None for value in values.values()):
         return ""
-    if not view.discovery["effects"]:
+    after = states_of(view.discovery).get("after")
+    if after is None:
         return (
             f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, and with its "
             f"own parameters refitted by {values['recalibrated']:.1f} mV; the noise floor is "
@@ -237,7 +247,7 @@ def discovery_consequence(view: DiscoveryView) -> str:
     return (
         f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
         f"same model with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model "
-        f"with the finding added by {values['after']:.1f} mV; the noise floor is "
+        f"{after} by {values['after']:.1f} mV; the noise floor is "
         f"{view.discovery['noise_floor_mv']:.1f} mV."
     )
 

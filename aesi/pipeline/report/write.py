@@ -18,7 +18,6 @@ from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, Row, RunVi
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-STATES = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding added"}
 TELLING_SHARE = 0.01
 """A share of the residual's variance below this is not worth a bar."""
 
@@ -64,7 +63,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         title=f"{view.title}: what the model of {view.cell} lacks",
         view=view,
         discovery=view.discovery,
-        states=STATES,
+        states=words.states_of(view.discovery),
         finding=words.discovery_finding(view),
         sentences=[
             sentence
@@ -90,7 +89,7 @@ def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:
     """A row a declared parameter: what it is, and where the refit and, with a finding, the fit with it put it."""
     own = discovery.get("own_parameters", {})
     rows: dict[str, dict[str, str]] = {}
-    for state in STATES if discovery["effects"] else ("recalibrated",):
+    for state in words.states_of(discovery):
         for row in own.get(state, ()):
             where = f"{moved_value(row)}{', at its limit' if row['at_limit'] else ''}"
             rows.setdefault(parameter_words(row), {})[state] = f"{where} ({row['deviations']:+.1f})"
@@ -100,7 +99,7 @@ def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:
 def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
     """All figures of a discovery, by name."""
     figures: dict[str, Figure] = {}
-    states = _states(view)
+    states = words.states_of(view.discovery)
     tested = view.of("test") or view.of("fit")
     for part in ("test", "fit"):
         if view.of(part):
@@ -116,11 +115,6 @@ def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
     if any(max(row["before"], row["after"]) > TELLING_SHARE for row in view.dependence):
         figures["dependence"] = hypotheses.dependence_bars(view.dependence, bool(view.effects))
     return figures
-
-
-def _states(view: DiscoveryView) -> dict[str, str]:
-    """The states of the model worth showing: where nothing was added, the last is that of a mere refit."""
-    return STATES if view.effects else {state: STATES[state] for state in ("before", "recalibrated")}
 
 
 def _over_the_range(traces: Sequence[DiscoveryTrace], states: Mapping[str, str]) -> dict[str, Figure]:

@@ -193,3 +193,19 @@ def test_lists_read_as_english():
     assert words.listed(["a"]) == "a"
     assert words.listed(["a", "b"]) == "a and b"
     assert words.listed(["a", "b", "c"]) == "a, b and c"
+
+
+@pytest.mark.parametrize(
+    ("effects", "written", "after"),
+    [
+        (["a"], ["a"], "with the finding added"),
+        (["a"], ["b"], "as written"),
+        (["a"], [], "as written"),
+        ([], ["b"], "as written"),
+        ([], [], None),
+    ],
+)
+def test_an_error_is_said_to_be_with_the_finding_only_where_that_is_what_is_written(effects, written, after):
+    shown = words.states_of({"effects": effects, "written": written})
+    assert shown.get("after") == after
+    assert list(shown)[:2] == ["before", "recalibrated"]
