@@ -7,6 +7,7 @@ from typing import Any
 
 from aesi.pipeline.report.sizes import TELLING, rounded
 from aesi.pipeline.report.views import Row
+from aesi.pipeline.report.words import WITH_FINDING, states_of
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""
@@ -19,10 +20,9 @@ def moved_findings(discovery: Mapping[str, Any]) -> list[str]:
     """A sentence for the recalibrated model and, where something was found, one for the model with it: what moved most,
     and what ended at the end of its range; none where nothing was fitted."""
     own = discovery.get("own_parameters", {})
-    effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
-    shown = {"recalibrated": RECALIBRATING}
-    if effects or written:
-        shown["after"] = BESIDE if written == effects else WRITTEN
+    shown, after = {"recalibrated": RECALIBRATING}, states_of(discovery).get("after")
+    if after is not None:
+        shown["after"] = BESIDE if after == WITH_FINDING else WRITTEN
     return [_sentence(words, own[state]) for state, words in shown.items() if own.get(state)]
 
 

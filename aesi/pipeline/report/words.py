@@ -154,12 +154,16 @@ def name_confidence(discovery: Mapping[str, Any]) -> str:
     return f" ({share} confidence in {names})"
 
 
+WITH_FINDING = "with the finding added"
+"""Said of the last state where what was found is what is written."""
+
+
 def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
     """The states of the model worth showing, in words: the last one where it is more than a refit."""
     shown = {"before": "as declared", "recalibrated": "recalibrated"}
     effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
     if effects or written:
-        shown["after"] = "with the finding added" if written == effects else "as written"
+        shown["after"] = WITH_FINDING if written == effects else "as written"
     return shown
 
 

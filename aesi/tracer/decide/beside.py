@@ -15,9 +15,8 @@ from aesi.errors import DataError
 from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
-from aesi.tracer.decide.confidence import frequency_maps, kind_of
-from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Evidence
-from aesi.tracer.decide.verdict import Thresholds, Verdict, beyond, look_alikes
+from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Evidence, with_confidence
+from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond, look_alikes
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.model_state import ModelState
@@ -40,10 +39,7 @@ def gathered_beside(
         raise DataError(
             f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
         )
-    verdict = judged_beside(path, thresholds)
-    verdict = replace(
-        verdict, confidence=frequency_maps()[kind_of(verdict.word, verdict.effects)].frequency(verdict.margin)
-    )
+    verdict = with_confidence(judged_beside(path, thresholds))
     recalibrated = ModelState.of(beside, path.base)
     after = ModelState.of(beside, path.chosen) if verdict.effects else recalibrated
     fault = range_fault(after, ORDINARY_C)
@@ -63,7 +59,7 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
     named = path.chosen.hypothesis
     if left > allowed and path.gain(path.chosen) * (usual / left) ** 2 < path.admission_nats:
         named = ()  # of the error that these records show by themselves it does not say enough
-    groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -_best_gain(path))
+    groups, margin = look_alikes(path, thresholds, max(allowed, left)) if named else ((), -best_gain(path))
     others = ", ".join(r.name for r in problem.records if not r.good)
     reason = (
         f"{1e3 * before:.1f} mV beyond the noise on unseen data of {others} before, {1e3 * left:.1f} mV after; "
@@ -86,7 +82,3 @@ def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:
     samples is uncertain by one over the root of 2 N."""
     many = [float(problem.independent[rows].sum()) for rows in (good, ~good)]
     return float(np.sqrt(sum(0.5 / n for n in many)))
-
-
-def _best_gain(path: Path) -> float:
-    return max((step.best_gain for step in path.steps), default=0.0)

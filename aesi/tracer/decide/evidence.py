@@ -95,7 +95,7 @@ def gathered(
     recalibrations = _recalibrations(problem, paths["tight"], archive)
     recalibrated = _recalibrated(problem, recalibrations)
     if verdict.word != "unknown":
-        return _adopted(path, paths, _with_confidence(verdict), recalibrated)
+        return _adopted(path, paths, with_confidence(verdict), recalibrated)
     measured, blocks = path_of("measured"), path.blocks
     options = [one for one in recalibrations if _borne_out(one)]
     options.append(Option.of(measured.problem, blocks, measured.base))
@@ -109,7 +109,7 @@ def gathered(
         named = Option.of(measured.problem, blocks, measured.chosen) if verdict.effects else None
     after, why = written(Option.of(problem, blocks, None), options, named)
     limits = (*stand_ins(after, verdict.effects), *limits_of(after)) if after.hypothesis else ()
-    return Evidence(path, paths, recalibrated, after, _with_confidence(verdict), why, limits)
+    return Evidence(path, paths, recalibrated, after, with_confidence(verdict), why, limits)
 
 
 def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
@@ -183,7 +183,8 @@ def _with_one_cause(
     return (one, replace(found, groups=(group,))) if found.word == "found" else (path, verdict)
 
 
-def _with_confidence(verdict: Verdict) -> Verdict:
+def with_confidence(verdict: Verdict) -> Verdict:
+    """The verdict with its confidence read off its margin."""
     kind = kind_of(verdict.word, verdict.effects)
     return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
 

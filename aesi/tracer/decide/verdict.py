@@ -109,7 +109,7 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
             f"{1e3 * left:.2f} mV beyond the noise on data that the fit has not seen, {1e3 * allowed:.2f} mV are "
             "within what a right model leaves"
         )
-        return Verdict("none", (), (), 0.0, left, allowed, reason, -_best_gain(path))
+        return Verdict("none", (), (), 0.0, left, allowed, reason, -best_gain(path))
     groups, margin = look_alikes(path, thresholds, allowed)
     reason = f"{1e3 * before:.2f} mV beyond the noise on unseen data before, {1e3 * left:.2f} mV after"
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
@@ -137,7 +137,8 @@ def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
     )
 
 
-def _best_gain(path: Path) -> float:
+def best_gain(path: Path) -> float:
+    """Nats that the best effect of any step says more, admitted or not."""
     return max((step.best_gain for step in path.steps), default=0.0)
 
 
