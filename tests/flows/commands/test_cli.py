@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from aesi.errors import InputError
 from flows import cli
+from flows.commands.options import dates, day
 
 
 def test_version(call):
@@ -117,6 +120,15 @@ def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
     assert code == 2
     assert "in kelvin? 298.15 K is 25 degC" in err
     assert not (tmp_path / "z.csv").exists()
+
+
+def test_days_of_records_are_read_by_record():
+    assert dates(["folder/pulses.csv.gz=2017-03-11"]) == {"pulses": date(2017, 3, 11)}
+    with pytest.raises(InputError, match="has to read FILE=YYYY-MM-DD"):
+        dates(["pulses.csv=yesterday"])
+    assert day("--as-of", "2017-03-11") == date(2017, 3, 11)
+    with pytest.raises(InputError, match="has to read YYYY-MM-DD"):
+        day("--as-of", "yesterday")
 
 
 def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):
