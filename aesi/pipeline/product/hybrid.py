@@ -15,6 +15,7 @@ import numpy as np
 from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
+from aesi.numerics.checked import numbers
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import active_effect
@@ -59,7 +60,7 @@ class HybridModel:
         current_a: Array,
         soc0: float | None = None,
         voltage_v: Array | None = None,
-        temperature_degc: Array | None = None,
+        temperature_degc: Array | float | None = None,
         error0_v: float = 0.0,
     ) -> Prediction:
         """Voltage under a current, with its band.
@@ -67,13 +68,15 @@ class HybridModel:
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
         sample predicted from those before it; None: free run, from the voltage error `error0_v` at the start.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
-        the model's own.
+        the model's own.  temperature_degc : as in `simulate`.
 
         Raises DataError where the record cannot be simulated or soc0 is unknown.
         """
-        measured = np.full(len(time_s), np.nan) if voltage_v is None else np.asarray(voltage_v, dtype=float)
+        rows = np.shape(time_s)
+        measured = np.full(rows, np.nan) if voltage_v is None else numbers(voltage_v, "voltage_v")
+        warm = np.full(rows, temperature_degc) if np.ndim(temperature_degc) == 0 else temperature_degc
         record = Measurement(
-            np.asarray(time_s, float), np.asarray(current_a, float), measured, temperature_degc, "the record"
+            time_s, current_a, measured, None if temperature_degc is None else warm, "the record"
         )
         if voltage_v is not None and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
