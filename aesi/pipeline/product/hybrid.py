@@ -72,12 +72,9 @@ class HybridModel:
 
         Raises DataError where the record cannot be simulated or soc0 is unknown.
         """
-        rows = np.shape(time_s)
-        measured = np.full(rows, np.nan) if voltage_v is None else numbers(voltage_v, "voltage_v")
-        warm = np.full(rows, temperature_degc) if np.ndim(temperature_degc) == 0 else temperature_degc
-        record = Measurement(
-            time_s, current_a, measured, None if temperature_degc is None else warm, "the record"
-        )
+        measured = np.full(np.shape(time_s), np.nan) if voltage_v is None else numbers(voltage_v, "voltage_v")
+        warm = _each_row(temperature_degc, np.shape(time_s))
+        record = Measurement(time_s, current_a, measured, warm, "the record")
         if voltage_v is not None and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
             raise DataError(
@@ -212,3 +209,10 @@ class HybridModel:
             soc=physics.soc,
             outside=onto(prediction.outside.astype(float)) > 0,
         )
+
+
+def _each_row(temperature_degc: Array | float | None, rows: tuple[int, ...]) -> Array | None:
+    if temperature_degc is None:
+        return None
+    given = numbers(temperature_degc, "temperature_degc")
+    return given if given.ndim else np.full(rows, given)
