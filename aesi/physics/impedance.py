@@ -25,7 +25,6 @@ import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.errors import DataError, SimulationError
-from aesi.numerics.checked import numbers
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.cell import Cell
@@ -37,6 +36,7 @@ from aesi.physics.espm.plain import rate_factor, shifted_ocp, stack_of
 from aesi.physics.espm.tables import solid_diffusion
 from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, model_with
+from aesi.records.checked import numbers
 
 SLOPE_STEP = 1e-4
 """Of stoichiometry: tables of potentials have steps of 1.2e-4."""

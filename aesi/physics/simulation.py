@@ -17,7 +17,6 @@ import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
-from aesi.numerics.checked import check_increasing, check_row, numbers
 from aesi.numerics.typing import Array
 from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
@@ -27,6 +26,7 @@ from aesi.physics.effect import ActiveEffect, Record, Trace
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
+from aesi.records.checked import check_increasing, check_row, numbers
 
 ModelName = Literal["espm", "dfn"]
 MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.checked import check_increasing, check_row, numbers
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.over_time import extent, over_time
+from aesi.records.checked import check_increasing, check_row, numbers
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,7 +15,6 @@ import numpy as np
 from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
-from aesi.numerics.checked import numbers
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.effects import active_effect
@@ -24,6 +23,7 @@ from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
+from aesi.records.checked import numbers
 from aesi.sparse import SparseModel
 
 
