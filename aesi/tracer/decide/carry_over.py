@@ -26,9 +26,9 @@ BY_CHANCE = 1.0 + (2.0 / RANGES / INDEPENDENT_CHARGE) ** -0.5
 """Times an error over one range of charge, by which it may be off as the errors of measured cells last: an RMS of N
 independent samples has a relative standard deviation of one over the root of 2 N."""
 LEAST_SHARE = 0.8
-"""Of the time that the declared model takes: one that runs empty later than that does so with its voltage all but at its
-limit. On development records of `aesi bench real` without their temperature, models that ran empty at 85 and 90 % of
-it left 7.1 and 5.0 mV of the last part (declared 22.9), those at 68 and 3 % 152 and 94 (what was named alone 78)."""
+"""Of the time that the declared model takes: one that runs empty later than that does so with its voltage all but at
+its limit. On development records of `aesi bench real` without their temperature, models that ran empty at 85 and 90 %
+of it left 7.1 and 5.0 mV of the last part (declared 22.9), those at 68 and 3 % 152 and 94 (what was named alone 78)."""
 STEP_S = 10.0
 """Between rows of a full discharge or charge."""
 

@@ -201,8 +201,8 @@ def _borne_out(one: Option) -> bool:
 def _named(path: Path, tight: Path, archive: Archive) -> list[Option]:
     """What was named with the own parameters as declared, and with these as far off as they may be.
 
-    On a drive of the HG2 at 0 degC without its temperature, a development record of `aesi bench real`, the two leave 23.0
-    and 8.2 mV of the last part, the declared model 97.5, the own parameters alone 67.6; on one of the Panasonic at
+    On a drive of the HG2 at 0 degC without its temperature, a development record of `aesi bench real`, the two leave
+    23.0 and 8.2 mV of the last part, the declared model 97.5, the own parameters alone 67.6; on one of the Panasonic at
     10 degC 8.1, 5.0, 22.9 and 7.1; on one at -10 degC 42.8 and 82.1, of which the first is written.
     """
     named = [Option.of(path.problem, path.blocks, path.chosen)]

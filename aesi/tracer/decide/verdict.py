@@ -48,7 +48,8 @@ class Verdict:
     """What may be said.
 
     effects : ids in the order in which they were added.  confidence_sets : all that the data do not tell from a member
-    of `effects`, with which each begins; the better ones first.  structured_v, tolerance_v : what is left on unseen data beyond noise, and how much may be.
+    of `effects`, with which each begins; the better ones first.  structured_v, tolerance_v : what is left on unseen
+    data beyond noise, and how much may be.
     margin : standard deviations behind the confidence, see `decide.confidence`: of an answer with names those by which
     the closest rival lags, or those of the weakest name's gain; of one without, the distance from the tolerance.
     """
