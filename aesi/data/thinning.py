@@ -147,18 +147,22 @@ def condensed(
     rows = np.diff(np.append(starts, n)).astype(float)
     if len(starts) == n:
         return data, rows
-
-    def averaged(column: Array) -> Array:
-        return np.add.reduceat(column, starts) / rows
-
-    time = averaged(t)
+    time = means_of_rows(t, rows)
     charge = np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(t))])
     current = np.diff(np.interp(time, t, charge)) / np.diff(time)
     thin = replace(
         data,
         time_s=time,
         current_a=np.concatenate([data.current_a[:1], current]),
-        voltage_v=averaged(data.voltage_v),
-        temperature_degc=None if data.temperature_degc is None else averaged(data.temperature_degc),
+        voltage_v=means_of_rows(data.voltage_v, rows),
+        temperature_degc=None
+        if data.temperature_degc is None
+        else means_of_rows(data.temperature_degc, rows),
     )
     return thin, rows
+
+
+def means_of_rows(column: Array, rows: Array) -> Array:
+    """(m,) means of a column (n,) over as many successive rows each as `rows` (m,) says."""
+    starts = np.concatenate([[0], np.cumsum(rows[:-1])]).astype(int)
+    return np.add.reduceat(column, starts) / rows

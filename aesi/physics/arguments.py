@@ -52,12 +52,12 @@ def check_soc(soc0: Any) -> None:
     """Raises InputError for a state of charge that is no share of the capacity."""
     if soc0 is None:
         return
-    if (
-        isinstance(soc0, str) or not -FARTHEST_SOC <= soc0 <= 1.0 + FARTHEST_SOC
-    ):  # this way round, NaN fails too
+    given = np.asarray(soc0)
+    number = given.ndim == 0 and given.dtype.kind in "iuf"
+    if not (number and -FARTHEST_SOC <= given <= 1.0 + FARTHEST_SOC):  # this way round, NaN fails too
         raise InputError(
             f"soc0 = {soc0!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
-            "so 90 % is 0.9."
+            "as one number, so 90 % is 0.9."
         )
 
 
@@ -84,4 +84,4 @@ def _activation(effect: object) -> str:
 
 
 def _a(value: object) -> str:
-    return f"the text {value!r}" if isinstance(value, str) else f"of type {type(value).__name__}"
+    return f"the text {value!r}" if isinstance(value, str) else f"an object of type {type(value).__name__}"

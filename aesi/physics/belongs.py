@@ -142,7 +142,10 @@ def _cause(ratio: float, record: Measurement) -> str:
             "the cell file is another cell's, or the current is written without its sign (--state COLUMN names the "
             "column that says which way it flows)"
         )
-    return "the cell file is another cell's, or the current is that of several cells in parallel"
+    return (
+        "the cell file is another cell's, the current is that of several cells in parallel, or its sign is the other "
+        "one (discharge is positive here)"
+    )
 
 
 def _charge_ah(record: Measurement) -> Array:

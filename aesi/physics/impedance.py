@@ -26,7 +26,7 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array, ComplexArray
-from aesi.physics.arguments import check_choice, check_temperature
+from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
 from aesi.physics.effect import ActiveEffect, Record, Trace
@@ -36,6 +36,7 @@ from aesi.physics.espm.plain import rate_factor, shifted_ocp, stack_of
 from aesi.physics.espm.tables import solid_diffusion
 from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, model_with
+from aesi.records.checked import numbers
 
 SLOPE_STEP = 1e-4
 """Of stoichiometry: tables of potentials have steps of 1.2e-4."""
@@ -57,14 +58,17 @@ def impedance(
     frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows.  effects, model : as in
     `simulate`.
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
-    Raises DataError for frequencies or a state that have none, InputError for what is no cell's temperature.
+    Raises DataError for frequencies or a state that have none, InputError for what is no Cell, no effect, no state of
+    charge or no temperature of a cell.
     """
-    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=float))
+    check_cell(cell)
+    check_soc(soc)
+    frequency = np.atleast_1d(numbers(frequency_hz, "frequency_hz"))
     if frequency.ndim != 1 or not (
         np.isfinite(frequency).all() and (frequency > 0.0).all() and len(frequency)
     ):
         raise DataError("frequency_hz has to be one row of positive numbers, at least one.")
-    active = tuple(effects)
+    active = checked_effects(effects)
     check_temperature(temperature_degc)
     kelvin = _shifted(active, temperature_degc + ZERO_CELSIUS_K)
     check_choice("model", model, ModelName)

@@ -161,10 +161,16 @@ class _Start:
 
     def _full(self, true_v: float, how: str, rest_v: float | None) -> InitialState:
         inside, sd = self.open_circuit.soc_at(true_v), self.open_circuit.full_sd(true_v)
+        above_v = true_v - self.cell.upper_voltage_v
+        near = f"within {1e3 * CHARGED_V:.0f} mV of"
+        doubt = ""
+        if above_v > CHARGED_V:
+            near = f"{1e3 * above_v:.0f} mV above"
+            doubt = "; check the voltage's sensor, and the cell file, which may be another cell's"
         words = (
-            f"{self.record.name} {how}, within {1e3 * CHARGED_V:.0f} mV of the upper cut-off "
+            f"{self.record.name} {how}, {near} the upper cut-off "
             f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge 1 +/- {sd:.4f} "
-            f"(by the open-circuit voltage {inside:.4f})."
+            f"(by the open-circuit voltage {inside:.4f}){doubt}."
         )
         return InitialState(
             self._declared(1.0),

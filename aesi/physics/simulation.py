@@ -26,6 +26,7 @@ from aesi.physics.effect import ActiveEffect, Record, Trace
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
+from aesi.records.checked import check_increasing, check_row, numbers
 
 ModelName = Literal["espm", "dfn"]
 MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
@@ -197,27 +198,22 @@ def _voltage_effects(
     return voltage
 
 
-def _checked_record(time_s: Array, current_a: Array) -> tuple[Array, Array]:
-    time = np.ascontiguousarray(time_s, dtype=float)
-    current = np.ascontiguousarray(current_a, dtype=float)
+def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
+    time, current = numbers(time_s, "time_s"), numbers(current_a, "current_a")
     if time.ndim != 1 or time.shape != current.shape or len(time) == 0:
         raise DataError(
             f"time_s and current_a have shapes {time.shape} and {current.shape}; give two equal rows."
         )
-    if not (np.isfinite(time).all() and np.isfinite(current).all()):
-        raise DataError("time_s or current_a holds a value that is not finite; drop or fill it first.")
-    if len(time) > 1 and not (np.diff(time) > 0).all():
-        row = int(np.flatnonzero(np.diff(time) <= 0)[0]) + 1
-        raise DataError(
-            f"time_s does not increase at row {row} ({time[row]:g} s); sort or drop duplicate stamps."
-        )
-    return time, current
+    check_row(time, "time_s")
+    check_row(current, "current_a")
+    check_increasing(time, "time_s")
+    return np.ascontiguousarray(time), np.ascontiguousarray(current)
 
 
 def _kelvin(temperature_degc: Array | float | None, time: Array) -> Array | None:
     if temperature_degc is None:
         return None
-    kelvin = np.asarray(temperature_degc, dtype=float) + ZERO_CELSIUS_K
+    kelvin = numbers(temperature_degc, "temperature_degc") + ZERO_CELSIUS_K
     if kelvin.shape not in ((), time.shape) or not np.isfinite(kelvin).all():
         raise DataError(f"temperature_degc has to be one value or {len(time)} finite ones.")
     check_temperature(temperature_degc)

@@ -7,11 +7,15 @@ from datetime import date
 from os import PathLike
 from pathlib import Path
 
+import numpy as np
+
 from aesi.calibration import Calibration
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, read
+from aesi.errors import DataError, InputError
 from aesi.physics import ModelName
+from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.belongs import check_belongs
 from aesi.pipeline.calibrate import check_records
 from aesi.pipeline.discovery.cases import MOST_ROWS
@@ -24,6 +28,8 @@ from aesi.tracer.discovery import Progress
 FileOrRecord = str | PathLike[str] | Measurement
 Data = FileOrRecord | Sequence[FileOrRecord]
 """Files, or what `aesi.read_measurement` gave; one, or several."""
+MOST_HOLDOUT, MOST_EFFECTS = 0.9, 10
+"""As `--holdout` and `--max-effects` have them."""
 
 
 def discover(
@@ -36,7 +42,7 @@ def discover(
     max_effects: int = 3,
     seed: int = 0,
     hold: Hold | None = None,
-    effect_files: Sequence[str | PathLike[str]] = (),
+    effect_files: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
     model: ModelName | None = None,
     soh: float | None = None,
     good: Data = (),
@@ -58,15 +64,18 @@ def discover(
 
     Raises AesiError, one sentence, for what cannot be read, decided or be of this cell.
     """
+    _check_asked(soc0, holdout, max_effects, seed)
+    folder = None if out is None else _folder(out)
     given, parts = declared_model(cell).with_soh(soh), [_listed(part) for part in (data, tests, good)]
     rows = MOST_ROWS // max(1, sum(len(part) for part in parts))
     measurements, judged, known = (tuple(_read(one, rows, hold) for one in part) for part in parts)
     check_belongs(given.cell, [*measurements, *judged, *known])
-    files = tuple(Path(file) for file in effect_files)
+    named = [effect_files] if isinstance(effect_files, str | PathLike) else effect_files
+    files = tuple(Path(file) for file in named)
     case = Case(given, measurements, judged, soc0, holdout, max_effects, seed, files, model=model, good=known)
-    finding = Finding(case, run_case(case, None if out is None else Path(out), progress))
-    if out is not None:
-        finding.save(Path(out))
+    finding = Finding(case, run_case(case, folder, progress))
+    if folder is not None:
+        finding.save(folder)
     return finding
 
 
@@ -89,6 +98,7 @@ def calibrate(
     model : that is fitted, "espm" or "dfn"; None takes that of a saved model, else "espm".
     Raises AesiError, one sentence, for what cannot be used.
     """
+    check_soc(soc0)
     given = declared_model(cell)
     declared, physics = given.cell, model or given.model
     measurements = [_read(one, None, hold) for one in _listed(data)]
@@ -105,11 +115,53 @@ def calibrate(
     )
 
 
+def _check_asked(soc0: float | None, holdout: float, max_effects: int, seed: int) -> None:
+    """Raises InputError for a number that no search can be run with."""
+    check_soc(soc0)
+    if not 0.0 <= holdout <= MOST_HOLDOUT:
+        raise InputError(
+            f"holdout = {holdout!r} is not a share of the record, from 0 to {MOST_HOLDOUT:g}, to be kept back; 30 % "
+            "is 0.3."
+        )
+    for name, value, most in (("max_effects", max_effects, MOST_EFFECTS), ("seed", seed, np.inf)):
+        if not isinstance(value, int | np.integer) or not 0 <= value <= most:
+            upper = f" up to {most:g}" if np.isfinite(most) else ""
+            raise InputError(f"{name} = {value!r} is not a whole number from 0{upper}.")
+
+
+def _folder(out: str | PathLike[str]) -> Path:
+    """The folder that is written to, made where it is missing: what takes minutes can be kept then."""
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"out = {str(out)!r} cannot be a folder: {error.strerror or error}.") from None
+    return folder
+
+
 def _listed(records: Data) -> list[FileOrRecord]:
-    single = isinstance(records, str | PathLike | Measurement)
-    return [records] if single else list(records)  # type: ignore[list-item, arg-type]
+    several = isinstance(records, Sequence) and not isinstance(records, str)
+    listed = list(records) if several else [records]  # type: ignore[arg-type]
+    for one in listed:
+        if not isinstance(one, str | PathLike | Measurement):
+            raise InputError(
+                f"an object of type {type(one).__name__} is no record; give a file, what aesi.read_measurement gave, "
+                "or aesi.Measurement(time_s, current_a, voltage_v), or a list of these."
+            )
+    return listed  # type: ignore[return-value]
 
 
 def _read(record: FileOrRecord, rows: int | None, hold: Hold | None) -> Measurement:
+    if hold is not None:
+        check_choice("hold", hold, Hold)
     found = record if isinstance(record, Measurement) else read(Path(record), Reading(), max_rows=rows)
+    if len(found) < 2:
+        raise DataError(f"{found.name} has too few rows ({len(found)}); a record needs at least two.")
+    unknown = np.isnan(found.voltage_v)
+    if unknown.any():
+        row = int(np.argmax(unknown))
+        raise DataError(
+            f"{found.name}: voltage_v is nan in row {row} ({found.time_s[row]:g} s); drop the row, or give the parts "
+            "before and after it as records of their own."
+        )
     return found if hold is None else found.held(hold)

@@ -22,7 +22,7 @@ def check_distinct(fitted: Sequence[Measurement], tests: Sequence[Measurement] =
         if record.digest in seen:
             raise DataError(
                 f"{_both(seen[record.digest], record.name)} among the data and the tests; what is fitted cannot "
-                "judge: name another test, or none, and the last share of the data is kept back."
+                "judge: name another test."
             )
 
 

@@ -14,7 +14,7 @@ from aesi.constants import MV_PER_V
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading
 from aesi.errors import DataError, InputError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
 from aesi.physics.effects import activated
@@ -148,16 +148,16 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
         (window, f"a voltage outside the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"),
     ):
         if np.any(rows):
-            said.append(f"{record.name}: {100 * np.mean(rows):.2g} % of the rows have {words}.")
+            said.append(f"{record.name}: {_percent(rows)} of the rows have {words}.")
     return said
 
 
 def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> list[str]:
     said = []
     if corrected:
-        share = 100 * float(np.mean(prediction.outside))
         said.append(
-            f"{record.name}: {share:.2g} % of the rows lie outside the range the correction was trained on."
+            f"{record.name}: {_percent(prediction.outside)} of the rows lie outside the range the correction was "
+            "trained on."
         )
     else:
         said.append(
@@ -172,6 +172,11 @@ def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> li
             f"measured voltage; it is {width:.1f} mV wide in the mean."
         )
     return said
+
+
+def _percent(rows: BoolArray) -> str:
+    share = 100.0 * float(np.mean(rows))
+    return f"{share:.2g} %" if share < 99.5 else "100 %"
 
 
 def warmed(cell: Cell, effects: tuple[ActiveEffect, ...]) -> tuple[ActiveEffect, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.over_time import extent, over_time
+from aesi.records.checked import check_increasing, check_row, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -46,11 +47,15 @@ def digest(*arrays: Array | None) -> str:
     return sha.hexdigest()[:16]
 
 
+def _rows(column: Array) -> str:
+    return f"{len(column)} rows" if column.ndim == 1 else f"the shape {column.shape}"
+
+
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """One continuous test of one cell.
+    """One continuous test of one cell; what is given as lists or pandas columns is kept as arrays of floats.
 
-    time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V.
+    time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V (NaN where it is unknown).
     temperature_degc : (n,) degC, or None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
     hold : how the current runs between rows, where it was declared; else `assumed_hold` tells.
@@ -66,11 +71,20 @@ class Measurement:
     hold: Hold | None = None
 
     def __post_init__(self) -> None:
-        n = len(self.time_s)
-        for label in ("current_a", "voltage_v", "temperature_degc"):
-            column = getattr(self, label)
-            if column is not None and len(column) != n:
-                raise DataError(f"{self.name}: {label} has {len(column)} rows, time_s has {n}.")
+        """Raises DataError, naming column and row, for columns that are no rows of numbers, or of different lengths."""
+        columns = {
+            label: numbers(getattr(self, label), f"{self.name}: {label}")
+            for label in ("time_s", "current_a", "voltage_v", "temperature_degc")
+            if getattr(self, label) is not None
+        }
+        time = columns["time_s"]
+        for label, column in columns.items():
+            if label != "voltage_v":  # which may be unknown
+                check_row(column, f"{self.name}: {label}")
+            if column.shape != time.shape:
+                raise DataError(f"{self.name}: {label} has {_rows(column)}, time_s has {_rows(time)}.")
+            object.__setattr__(self, label, column)
+        check_increasing(time, f"{self.name}: time_s")
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -253,7 +253,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, .
     ]
     notes = [*known, *(note for record in (*records, *tested) for note in record.notes)]
     notes += [note for path in evidence.paths.values() for note in path.notes]
-    notes += evidence.limits
+    notes += [*evidence.verdict.alike_too, *evidence.limits]
     if evidence.fault is not None:
         notes.append(f"not adopted: {evidence.fault}.")
     return tuple(dict.fromkeys(notes))

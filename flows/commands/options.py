@@ -237,7 +237,7 @@ def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:
 
 def say_reading(paths: Iterable[Path]) -> None:
     """The first line of a long command, before the libraries load."""
-    typer.echo(f"Reading {', '.join(path.name for path in paths)} ...", err=True)
+    typer.echo(f"Reading {', '.join(path.name or str(path) for path in paths)} ...", err=True)
 
 
 def say_notes(notes: Iterable[str]) -> None:

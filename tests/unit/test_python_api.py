@@ -3,10 +3,11 @@
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import aesi
-from aesi.errors import InputError
+from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Spectrum
 
@@ -137,10 +138,20 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ({"effects": "series_resistance"}, r"effects=\[CATALOGUE\['series_resistance'\].activate\(\)\]"),
         ({"effects": ["series_resistance"]}, r"give CATALOGUE\['series_resistance'\].activate\(\)"),
         ({"effects": [CATALOGUE["double_layer"]]}, r"give CATALOGUE\['double_layer'\].activate\(\)"),
-        ({"effects": 3}, "effects is of type int; give a list"),
+        ({"effects": 3}, "effects is an object of type int; give a list"),
         ({"soc0": 90}, "soc0 = 90 is not a state of charge; .* so 90 % is 0.9"),
         ({"soc0": float("nan")}, "soc0 = nan is not a state of charge"),
         ({"soc0": "full"}, "soc0 = 'full' is not a state of charge"),
+        ({"soc0": np.array([0.8])}, r"soc0 = array\(\[0.8\]\) is not a state of charge"),
+        (
+            {"time_s": pd.date_range("2024", periods=len(TIME), freq="s")},
+            "time_s holds dates or durations; give",
+        ),
+        ({"current_a": ["rest"] * len(TIME)}, "current_a holds 'rest', which is not a number"),
+        ({"current_a": 1j * TIME}, "current_a holds complex numbers"),
+        ({"current_a": np.full(len(TIME), np.nan)}, "current_a is nan in row 0"),
+        ({"time_s": TIME[::-1]}, r"time_s does not increase at row 1 \(1798 s\)"),
+        ({"time_s": 3.0}, r"time_s and current_a have shapes \(\) and \(1800,\)"),
     ],
 )
 def test_what_cannot_be_meant_is_said_in_one_sentence(cell, current, changes, sentence):
@@ -148,3 +159,71 @@ def test_what_cannot_be_meant_is_said_in_one_sentence(cell, current, changes, se
     with pytest.raises(InputError, match=sentence) as caught:
         aesi.simulate(**given)
     assert "\n" not in str(caught.value)
+
+
+def test_lists_and_columns_of_a_table_are_arrays_of_floats():
+    table = pd.DataFrame({"t": [0, 1, 3], "i": [1, 1, 2], "v": [3.9, 3.8, 3.7]}, index=[7, 8, 9])
+    for given in ((table.t, table.i, table.v), tuple(table[name].tolist() for name in "tiv")):
+        made = aesi.Measurement(*given)
+        assert [column.dtype for column in (made.time_s, made.current_a, made.voltage_v)] == [float] * 3
+        assert made.between(1.0, 4.0).voltage_v.tolist() == [3.8, 3.7]
+
+
+@pytest.mark.parametrize(
+    ("columns", "sentence"),
+    [
+        (([0.0, 1.0], [1.0, 1.0], [3.9]), "m: voltage_v has 1 rows, time_s has 2 rows"),
+        (([[0.0], [1.0]], [1.0, 1.0], [3.9, 3.9]), r"m: time_s has the shape \(2, 1\); give one row"),
+        (([1.0, 0.0], [1.0, 1.0], [3.9, 3.9]), r"m: time_s does not increase at row 1 \(0 s\)"),
+        (([0.0, 1.0], [1.0, np.nan], [3.9, 3.9]), "m: current_a is nan in row 1"),
+        (([0.0, 1.0], [1.0, 1.0], [3.9, 3.9], [25.0, np.nan]), "m: temperature_degc is nan in row 1"),
+    ],
+)
+def test_columns_that_are_no_measurement_are_refused(columns, sentence):
+    with pytest.raises(DataError, match=sentence):
+        aesi.Measurement(*columns, name="m")
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"holdout": 30}, "holdout = 30 is not a share of the record, .* 30 % is 0.3"),
+        ({"holdout": -0.1}, "holdout = -0.1 is not a share"),
+        ({"max_effects": -1}, "max_effects = -1 is not a whole number from 0 up to 10"),
+        ({"max_effects": 1.5}, "max_effects = 1.5 is not a whole number"),
+        ({"seed": "a"}, "seed = 'a' is not a whole number from 0"),
+        ({"soc0": 90}, "soc0 = 90 is not a state of charge"),
+        ({"hold": "zoh"}, "hold = 'zoh' is not known"),
+        ({"data": None}, "an object of type NoneType is no record; give a file"),
+        ({"data": pd.DataFrame({"time_s": [0.0]})}, "an object of type DataFrame is no record"),
+        ({"data": [TIME, TIME]}, "an object of type ndarray is no record"),
+        ({"data": aesi.Measurement([], [], [])}, r"too few rows \(0\)"),
+        (
+            {"data": aesi.Measurement([0.0, 1.0], [1.0, 1.0], [3.9, np.nan])},
+            r"voltage_v is nan in row 1 \(1 s\)",
+        ),
+        ({"effect_files": "mine.py"}, "there is no effect file .*mine.py"),
+        ({"out": __file__}, "cannot be a folder"),
+    ],
+)
+def test_a_discovery_says_what_cannot_be_meant_before_it_searches(cell, record, changes, sentence):
+    with pytest.raises(InputError, match=sentence) as caught:
+        aesi.discover(**({"cell": cell, "data": record} | changes))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_prediction_takes_one_temperature_for_all_rows(cell, current):
+    model = aesi.HybridModel(cell)
+    one, many = (model.predict(TIME, current, SOC0, temperature_degc=t) for t in (10.0, [10.0] * len(TIME)))
+    np.testing.assert_array_equal(one.voltage_v, many.voltage_v)
+
+
+def test_an_impedance_says_what_cannot_be_meant(cell):
+    for changes, sentence in (
+        ({"soc": 50}, "soc0 = 50 is not a state of charge"),
+        ({"soc": [0.5, 0.6]}, "is not a state of charge"),
+        ({"effects": "double_layer"}, "effects is the text 'double_layer'"),
+        ({"frequency_hz": "1 kHz"}, "frequency_hz holds '1 kHz', which is not a number"),
+    ):
+        with pytest.raises(InputError, match=sentence):
+            aesi.impedance(**({"cell": cell, "frequency_hz": [1.0], "soc": 0.5} | changes))

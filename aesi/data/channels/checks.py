@@ -56,7 +56,7 @@ def check_finite(columns: Columns, context: Context) -> None:
     also = " or leave the column out (--column temperature_degc=)" if quantity == "temperature_degc" else ""
     count = int(np.sum(~np.isfinite(columns[quantity])))
     raise DataError(
-        f"{context.at(quantity, row)} {what} ({count} such cells): remove or correct these rows{also}."
+        f"{context.at(quantity, row)} {what} (cells like it: {count}): remove or correct these rows{also}."
     )
 
 
@@ -70,7 +70,7 @@ def check_time(time_s: Array, context: Context) -> None:
     if here == before:
         count = int(np.sum(step == 0))
         raise DataError(
-            f"{context.at('time_s', row)}: the stamp {here:.10g} s is there twice ({count} such rows): "
+            f"{context.at('time_s', row)}: the stamp {here:.10g} s is there twice (rows like it: {count}): "
             "keep one row of each, or choose: --duplicates first, or last."
         )
     raise DataError(
@@ -93,8 +93,8 @@ def check_ranges(columns: Columns, context: Context) -> None:
     if np.any(bad):
         row = int(np.argmax(bad))
         raise DataError(
-            f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (0 to "
-            f"{HIGHEST_VOLTAGE_V:g} V; {int(np.sum(bad))} such rows): check the column and its unit."
+            f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (above 0 "
+            f"and at most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): check the column and its unit."
         )
     large = np.abs(current) > HIGHEST_CURRENT_A
     if np.any(large):

@@ -1,9 +1,8 @@
 """Which column of a file is which quantity, in what unit and with what sign.
 
 Four conventions are known: names given by the user, this project's names, the makers' (`readers.formats`), and the
-battery data format (BDF).
-BDF: https://github.com/battery-data-alliance/battery-data-format, table of required quantities; its
-current is positive on charge.
+battery data format (BDF), https://github.com/battery-data-alliance/battery-data-format, table of required quantities,
+whose current is positive on charge.
 """
 
 from __future__ import annotations
@@ -156,7 +155,7 @@ class _Finder:
         )
 
     def check(self) -> None:
-        """Every column is one quantity's, and a temperature that is not used is told of."""
+        """Every column is one quantity's, and a voltage or a temperature that is not used is told of."""
         seen: dict[int, str] = {}
         for quantity, place in self.position.items():
             if place in seen and not {quantity, seen[place]} & set(SELECTORS):
@@ -164,12 +163,13 @@ class _Finder:
                     f"{self._file}: column {self._table.header[place]!r} cannot be both {seen[place]} and {quantity}."
                 )
             seen[place] = quantity
-        if "temperature_degc" not in self.position and "temperature_degc" not in self.given:
-            name = headers.nearest("temperature_degc", self._table.header, doubtful=True)
+        leave = {"voltage_v": "", "temperature_degc": ", --column temperature_degc= leaves it out"}
+        for quantity in sorted(leave.keys() - self.position.keys() - self.given.keys()):
+            name = headers.nearest(quantity, self._table.header, doubtful=quantity not in REQUIRED)
             if name is not None:
                 self.notes.append(
-                    f"Column {name!r} looks like a temperature and is not used; "
-                    f"{headers.of_column('temperature_degc', name)} takes it, --column temperature_degc= leaves it out."
+                    f"Column {name!r} looks like a {quantity.partition('_')[0]} and is not used; "
+                    f"{headers.of_column(quantity, name)} takes it{leave[quantity]}."
                 )
 
     def mapped(self) -> Mapped:

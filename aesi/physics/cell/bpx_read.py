@@ -8,6 +8,7 @@ from typing import Any
 
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
+from aesi.physics.cell.bpx_values import check_values
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,
@@ -23,7 +24,6 @@ from aesi.physics.cell.parts import (
     Electrode,
     Electrolyte,
     Separator,
-    require_positive,
 )
 from aesi.physics.cell.relations import Constant, Relation, relation
 
@@ -75,7 +75,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
     )
-    _check_values(cell, where)
+    check_values(cell, where)
     return cell
 
 
@@ -136,36 +136,4 @@ def _electrolyte(fields: Fields, initial: Fields, what: str) -> Electrolyte:
         diffusivity=relation(fields["Diffusivity [m2.s-1]"], f"{what}, Diffusivity [m2.s-1]"),
         conductivity_ea_j_mol=float(fields.get("Conductivity activation energy [J.mol-1]") or 0.0),
         diffusivity_ea_j_mol=float(fields.get("Diffusivity activation energy [J.mol-1]") or 0.0),
-    )
-
-
-def _check_values(cell: CellParameters, where: str) -> None:
-    for label, electrode in (("Negative electrode", cell.negative), ("Positive electrode", cell.positive)):
-        require_positive(
-            f"{where}: {label}",
-            thickness_m=electrode.thickness_m,
-            particle_radius_m=electrode.particle_radius_m,
-            area_per_volume_1_m=electrode.area_per_volume_1_m,
-            porosity=electrode.porosity,
-            transport_efficiency=electrode.transport_efficiency,
-            conductivity_s_m=electrode.conductivity_s_m,
-            c_max_mol_m3=electrode.c_max_mol_m3,
-            rate_constant=electrode.rate_constant,
-        )
-        if not 0.0 <= electrode.theta_min < electrode.theta_max <= 1.0:
-            raise CellError(
-                f"{where}: {label}: stoichiometry limits [{electrode.theta_min:g}, {electrode.theta_max:g}] "
-                "have to satisfy 0 <= minimum < maximum <= 1."
-            )
-    require_positive(
-        where,
-        electrode_area_m2=cell.electrode_area_m2,
-        electrode_pairs=cell.electrode_pairs,
-        nominal_capacity_ah=cell.nominal_capacity_ah,
-        separator_thickness_m=cell.separator.thickness_m,
-        separator_porosity=cell.separator.porosity,
-        separator_transport_efficiency=cell.separator.transport_efficiency,
-        electrolyte_concentration_mol_m3=cell.electrolyte.c0_mol_m3,
-        reference_temperature_k=cell.reference_temperature_k,
-        initial_temperature_k=cell.initial_temperature_k,
     )

@@ -39,7 +39,7 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
         return copy.deepcopy(dict(source)), "BPX data"
     path = Path(source)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise CellError(f"cannot read the cell file {path}: {error.strerror or error}.") from None
     except UnicodeDecodeError as error:

@@ -51,7 +51,8 @@ def compile_expression(text: str) -> Node:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         if isinstance(error, CellError):
             raise
-        raise CellError(f"cannot read the expression {_short(text)!r}: {error}.") from None
+        why = error.msg if isinstance(error, SyntaxError) else error
+        raise CellError(f"cannot read the expression {_short(text)!r}: {why}.") from None
 
 
 def _node(node: ast.expr, text: str) -> Node:

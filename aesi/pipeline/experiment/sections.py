@@ -158,6 +158,13 @@ class LibraryConfig(Section):
     feedback: bool = False
     fade: bool = True
 
+    @field_validator("p_c", "d")
+    @classmethod
+    def _ordered(cls, value: tuple[int, int]) -> tuple[int, int]:
+        if value[0] > value[1]:
+            raise ValueError(f"the range [{value[0]}, {value[1]}] is empty; give low <= high")
+        return value
+
     @field_validator("inputs")
     @classmethod
     def _with_the_current(cls, value: tuple[str, ...] | None) -> tuple[str, ...] | None:

@@ -23,6 +23,7 @@ from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
+from aesi.records.checked import numbers
 from aesi.sparse import SparseModel
 
 
@@ -59,7 +60,7 @@ class HybridModel:
         current_a: Array,
         soc0: float | None = None,
         voltage_v: Array | None = None,
-        temperature_degc: Array | None = None,
+        temperature_degc: Array | float | None = None,
         error0_v: float = 0.0,
     ) -> Prediction:
         """Voltage under a current, with its band.
@@ -67,14 +68,13 @@ class HybridModel:
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
         sample predicted from those before it; None: free run, from the voltage error `error0_v` at the start.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
-        the model's own.
+        the model's own.  temperature_degc : as in `simulate`.
 
         Raises DataError where the record cannot be simulated or soc0 is unknown.
         """
-        measured = np.full(len(time_s), np.nan) if voltage_v is None else np.asarray(voltage_v, dtype=float)
-        record = Measurement(
-            np.asarray(time_s, float), np.asarray(current_a, float), measured, temperature_degc, "the record"
-        )
+        measured = np.full(np.shape(time_s), np.nan) if voltage_v is None else numbers(voltage_v, "voltage_v")
+        warm = _each_row(temperature_degc, np.shape(time_s))
+        record = Measurement(time_s, current_a, measured, warm, "the record")
         if voltage_v is not None and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
             raise DataError(
@@ -209,3 +209,10 @@ class HybridModel:
             soc=physics.soc,
             outside=onto(prediction.outside.astype(float)) > 0,
         )
+
+
+def _each_row(temperature_degc: Array | float | None, rows: tuple[int, ...]) -> Array | None:
+    if temperature_degc is None:
+        return None
+    given = numbers(temperature_degc, "temperature_degc")
+    return given if given.ndim else np.full(rows, given)

@@ -170,6 +170,12 @@ class Problem:
         error_functions = np.stack(
             [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
         )
+        longest = max(stop - start for start, stop in spans)
+        if options.block is not None and options.block >= longest:
+            raise DataError(
+                f"a bootstrap block of {options.block} rows is no shorter than the longest training record "
+                f"({longest} rows), so that resamples are alike; lower search.block, or leave it out."
+            )
         block = options.block or default_block(n)
         cut = left_out_pieces(spans, options.fold, options.cuts)
         soc = np.concatenate([record.soc[:-1] for record in train])

@@ -29,14 +29,14 @@ RANGES = 3
 class Blocks:
     """starts : (b + 1,) first rows of the blocks, and the number of rows.  record : (b,) number of each block's record.
 
-    folds : partition -> list of sets of blocks that are left out in turn.  counted : (n,) rows by which an error on
-    unseen data is told, None for all.
+    folds : partition -> list of sets of blocks that are left out in turn.  compared : (n,) True for the rows by which
+    an error on unseen data is told, see `InverseProblem.compared`.
     """
 
     starts: IntArray
     record: IntArray
     folds: dict[str, tuple[tuple[int, ...], ...]]
-    counted: BoolArray | None = None
+    compared: BoolArray
 
     def __len__(self) -> int:
         return len(self.record)
@@ -78,7 +78,7 @@ def blocks_of(problem: InverseProblem) -> Blocks:
     for name, size in (("rate", rate), ("charge", charge)):
         folds[name] = _ranges(size)
     folds["end"] = (tuple(b for b in range(len(record)) if b >= round(SEEN_SHARE * len(record))),)
-    return Blocks(bounds, np.array(record), folds, problem.compared if problem.has_good else None)
+    return Blocks(bounds, np.array(record), folds, problem.compared)
 
 
 def _slices(bounds: IntArray) -> list[slice]:

@@ -104,7 +104,7 @@ class InverseProblem:
         if self.trust not in MEASURED_CELL:
             return record.soc0_sd
         least = BESIDE_SOC0_SD if self.trust == "beside" else 0.0
-        return max(record.soc0_sd, record.soc0_doubt, least)
+        return max(record.soc0_sd, record.start.doubt, least)
 
     def _spread(self, effect: Effect, p: Parameter) -> float | None:
         """Standard deviation of an own parameter at this trust, None where nothing is open."""

@@ -1,9 +1,8 @@
 """Measured records made ready for fits: noise, initial state of charge, the part that may be looked at.
 
-Fits run on a thinned copy: averages over symmetric windows, of current and voltage alike, so that charge and the
-linear part of the response are kept; of tests at steady currents with pulses and rests, and of records with uneven
-times, rows that are dense after each step. What thinning does to the voltage of the declared model is taken off the
-measured one, so that the rest of the response is kept too. Reported errors are always those of the record as measured.
+Fits run on a thinned copy (`thinned.py`). What thinning does to the voltage of the declared model is taken off the
+measured one, so that what it does not keep by itself is kept too. Reported errors are always those of the record as
+measured.
 """
 
 from __future__ import annotations
@@ -13,23 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.data.thinning import Spacing, averaged_over, condensed
-from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
-from aesi.physics.initial_state import Basis, initial_state
-from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
-from aesi.tracer.case.fit_simulation import fit_simulation
+from aesi.physics.initial_state import InitialState, initial_state
+from aesi.records import Hold, Measurement, hold_sentence
+from aesi.tracer.case.thinned import ThinnedRecord, lost_v, thinned_record, thinned_together
 
-THIN_STEP_S = 1.0
-"""Fits see at most one sample a second: nothing in the catalogue is faster than that and yet
-above the noise."""
-FIT_SAMPLES = 12_000
-"""Of all records together: above it windows are doubled, since the time of a fit grows with its rows."""
-STEADY_SAMPLES = 600
-"""Rows that a record of steady currents is spread over."""
-STEADY_SPACING = Spacing(first_s=0.5, growth=0.25)
 THINNED_SHARE = 0.5
 """Of what thinning does to the declared model, what it may do to another one: with kinetics 1.4 times as fast 0.38 to
 0.48 of it are left on eight drives of blind cases at 10 Hz (seeds 13 and 18)."""
@@ -44,27 +33,22 @@ class PreparedRecord:
     """One measurement as the tracer uses it.
 
     data : as measured.  thin : what fits run on, fit and held-out part.  n_fit : rows of `thin` that fits may see.
-    fit_until_s : the time where the fit part of `data` ends (inf for all).  soc0, soc0_sd : initial state of charge
-    and what it is uncertain by.  seen_rows : rows at the start that only lead to what is judged.
-    soc0_doubt : how far the voltage's own reading is from a state of charge that was given.
-    good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
+    fit_until_s : the time where the fit part of `data` ends (inf for all).  start : the state at the first row.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
     the white noise in each row of `thin`.  noise_full_v : of that in `data`.
+    seen_rows : rows of `data` at the start that only lead to what is judged.
+    good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
     """
 
     data: Measurement
     thin: Measurement
     n_fit: int
     fit_until_s: float
-    soc0: float
-    soc0_sd: float
+    start: InitialState
     hold: Hold
     thin_hold: Hold
     white_v: Array
     noise_full_v: float
-    rest_voltage_v: float | None = None
-    basis: Basis = "rest"
-    soc0_doubt: float = 0.0
     seen_rows: int = 0
     notes: tuple[str, ...] = ()
     good: bool = False
@@ -75,9 +59,14 @@ class PreparedRecord:
         return self.data.name
 
     @property
-    def soc0_given(self) -> bool:
-        """True where the user said at which state of charge the record starts."""
-        return self.basis == "given"
+    def soc0(self) -> float:
+        """State of charge at the first row."""
+        return self.start.soc
+
+    @property
+    def soc0_sd(self) -> float:
+        """What it is uncertain by, standard deviation."""
+        return self.start.sd
 
     @property
     def noise_v(self) -> float:
@@ -122,7 +111,6 @@ def prepare(
     data: Measurement,
     soc0: float | None,
     holdout: float,
-    step_s: float = THIN_STEP_S,
     *,
     given: Sequence[ActiveEffect] = (),
     shared: bool = False,
@@ -133,73 +121,52 @@ def prepare(
     model has.  shared : True where `soc0` was given for several records.
     Raises DataError where the record is too short or its initial state cannot be known.
     """
-    hold: Hold = data.hold or assumed_hold(data.time_s)
+    return _prepared(cell, thinned_record(cell, data), soc0, holdout, given, shared)
+
+
+def _prepared(
+    cell: Cell,
+    record: ThinnedRecord,
+    soc0: float | None,
+    holdout: float,
+    given: Sequence[ActiveEffect],
+    shared: bool,
+) -> PreparedRecord:
+    data = record.whole
+    start = initial_state(cell, data, soc0, record.hold, given, shared=shared)
+    lost = lost_v(cell, record, start.soc, given)
+    thin = replace(record.thin, voltage_v=record.thin.voltage_v - lost)
     duration = float(data.time_s[-1] - data.time_s[0])
-    thin, rows = _thinned(cell, data, step_s)
-    thin_hold: Hold = hold if thin is data else "linear" if rows is None else "backward"
     until = data.time_s[0] + (1.0 - holdout) * duration if holdout > 0 else np.inf
     n_fit = int(np.searchsorted(thin.time_s, until))
-    start = initial_state(cell, data, soc0, hold, given, shared=shared)
-    lost_v = _lost_v(cell, data, thin, step_s, start.soc, given, hold, thin_hold)
-    thin = replace(thin, voltage_v=thin.voltage_v - lost_v)
-    notes = () if start.basis == "given" and not start.contradicted else (start.sentence,)
-    notes = (*notes, hold_sentence(data.name, hold, data.hold is not None), *_temperature_noted(data))
     noise_full = noise_floor_v(data.voltage_v, data.current_a)
-    if rows is None:
-        averaged = noise_floor_v(thin.voltage_v[:n_fit], thin.current_a[:n_fit])
-        # Averages have no more of it than rows: what a drive that never rests moves them by is not noise.
-        noise = min(averaged, noise_full)
-        white = np.full(len(thin), noise)
-    else:  # what lies between rows that far apart is no noise
-        white = np.maximum(noise_full / np.sqrt(rows), SMALLEST_NOISE_V)
-    white = np.hypot(white, THINNED_SHARE * lost_v)
+    white = _white_v(record, thin.take(slice(0, n_fit)), noise_full)
+    said = () if start.basis == "given" and not start.contradicted else (start.sentence,)
     return PreparedRecord(
-        data,
-        thin,
-        n_fit,
-        until,
-        start.soc,
-        start.sd,
-        hold,
-        thin_hold,
-        white,
-        noise_full,
-        start.rest_voltage_v,
-        start.basis,
-        start.doubt,
-        notes=notes,
+        data=data,
+        thin=thin,
+        n_fit=n_fit,
+        fit_until_s=until,
+        start=start,
+        hold=record.hold,
+        thin_hold=record.thin_hold,
+        white_v=np.hypot(white, THINNED_SHARE * lost),
+        noise_full_v=noise_full,
+        notes=(
+            *said,
+            hold_sentence(data.name, record.hold, data.hold is not None),
+            *_temperature_noted(data),
+        ),
     )
 
 
-def _thinned(cell: Cell, data: Measurement, step_s: float) -> tuple[Measurement, Array | None]:
-    """The record as fits see it, and how many rows each of its rows stands for; None for a drive."""
-    longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_SAMPLES
-    steady = condensed(data, cell.nominal_capacity_ah, longest_s, STEADY_SPACING)
-    return (averaged_over(data, step_s), None) if steady is None else steady
-
-
-def _lost_v(
-    cell: Cell,
-    data: Measurement,
-    thin: Measurement,
-    step_s: float,
-    soc0: float,
-    given: Sequence[ActiveEffect],
-    hold: Hold,
-    thin_hold: Hold,
-) -> Array:
-    """(n_thin,) V: the thinned voltage of the declared model less that of the thinned record; nought where it cannot be
-    simulated. Kinetics are no linear function of the current, and averages over a step of it are those of neither
-    side."""
-    if len(thin) == len(data):
-        return np.zeros(len(thin))
-    try:
-        whole = fit_simulation(cell, data, soc0, given, hold).voltage_v
-        reduced = fit_simulation(cell, thin, soc0, given, thin_hold).voltage_v
-    except AesiError:
-        return np.zeros(len(thin))
-    lost = _thinned(cell, replace(data, voltage_v=whole), step_s)[0].voltage_v - reduced
-    return np.asarray(np.where(np.isfinite(lost), lost, 0.0))
+def _white_v(record: ThinnedRecord, seen: Measurement, noise_full_v: float) -> Array:
+    """(n_thin,) V: white noise of the rows of `thin`, told from those that fits see."""
+    if record.rows is not None:  # what lies between rows that far apart is no noise
+        return np.maximum(noise_full_v / np.sqrt(record.rows), SMALLEST_NOISE_V)
+    # Averages have no more of it than rows: what a drive that never rests moves them by is not noise.
+    noise = min(noise_floor_v(seen.voltage_v, seen.current_a), noise_full_v)
+    return np.full(len(record.thin), noise)
 
 
 def _temperature_noted(data: Measurement) -> tuple[str, ...]:
@@ -261,12 +228,12 @@ def prepare_all(
 
     good : those that are known to be good, which stand last. They are fitted whole, and start where their voltage says.
     """
-    step = THIN_STEP_S
-    every = (*measurements, *good)
-    while step <= 30.0 and sum(len(_thinned(cell, m, step)[0]) for m in every) > FIT_SAMPLES:
-        step *= 2.0
+    rows = thinned_together(cell, (*measurements, *good))
     shared = len(measurements) > 1
     return (
-        *(prepare(cell, m, soc0, holdout, step, given=given, shared=shared) for m in measurements),
-        *(replace(prepare(cell, m, None, 0.0, step, given=given), good=True) for m in good),
+        *(_prepared(cell, one, soc0, holdout, given, shared) for one in rows[: len(measurements)]),
+        *(
+            replace(_prepared(cell, one, None, 0.0, given, False), good=True)
+            for one in rows[len(measurements) :]
+        ),
     )

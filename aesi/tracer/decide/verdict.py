@@ -21,7 +21,7 @@ from aesi.tracer.search.plausible import ALIKE_NATS
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
-"""Names that a group of look-alikes holds at most."""
+"""Names that a group of look-alikes shows at most; the others are told in a note."""
 MOST_SDS = 50.0
 """Where nothing comes close."""
 
@@ -47,20 +47,36 @@ class Thresholds:
 class Verdict:
     """What may be said.
 
-    effects : ids in the order in which they were added.  groups : look-alikes, each group begins with a member of
-    `effects`.  structured_v, tolerance_v : what is left on unseen data beyond noise, and how much may be.
+    effects : ids in the order in which they were added.  confidence_sets : all that the data do not tell from a member
+    of `effects`, with which each begins; the better ones first.  structured_v, tolerance_v : what is left on unseen
+    data beyond noise, and how much may be.
     margin : standard deviations behind the confidence, see `decide.confidence`: of an answer with names those by which
     the closest rival lags, or those of the weakest name's gain; of one without, the distance from the tolerance.
     """
 
     word: Word
     effects: tuple[str, ...]
-    groups: tuple[tuple[str, ...], ...]
+    confidence_sets: tuple[tuple[str, ...], ...]
     confidence: float
     structured_v: float
     tolerance_v: float
     reason: str
     margin: float = 0.0
+
+    @property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """The look-alikes that are shown: the best of each confidence set."""
+        return tuple(one[:GROUP_SIZE] for one in self.confidence_sets)
+
+    @property
+    def alike_too(self) -> tuple[str, ...]:
+        """A sentence about each confidence set that has more members than are shown."""
+        return tuple(
+            f"the data do not tell {one[0]} from {', '.join(one[1:])}: {len(one)} effects explain them about as well, "
+            f"of which the first {GROUP_SIZE} are shown as look-alikes."
+            for one in self.confidence_sets
+            if len(one) > GROUP_SIZE
+        )
 
 
 def beyond(rmse_v: float, noise_v: float) -> float:
@@ -130,7 +146,7 @@ def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
     return replace(
         verdict,
         effects=path.chosen.hypothesis,
-        groups=groups,
+        confidence_sets=groups,
         margin=margin,
         structured_v=left,
         reason=reason,
@@ -152,7 +168,7 @@ def lag(better: Explanation, other: Explanation) -> tuple[float, float]:
 def look_alikes(
     path: Path, thresholds: Thresholds, allowed_v: float
 ) -> tuple[tuple[tuple[str, ...], ...], float]:
-    """Groups of effects that these data do not tell apart (a model confidence set, Hansen, Lunde & Nason, Econometrica
+    """Sets of effects that these data do not tell apart (a model confidence set, Hansen, Lunde & Nason, Econometrica
     79 (2011) 453, over paired block differences), and how many standard deviations the closest other one lags.
 
     allowed_v : what a right hypothesis may leave on unseen data beyond the noise.
@@ -173,7 +189,7 @@ def look_alikes(
                 margin = min(margin, nats / max(deviation, thresholds.alike_nats))
         alike.sort()
         if alike:
-            groups.append((name, *(other for _, other in alike[: GROUP_SIZE - 1])))
+            groups.append((name, *(other for _, other in alike)))
     return tuple(groups), float(min(margin, _weakest_sds(path, tried), MOST_SDS))
 
 

@@ -46,23 +46,26 @@ def carries_best(options: Sequence[Option]) -> Option:
 
 
 def written(
-    declared: Option, recalibrated: Sequence[Option], named: Option | None
+    declared: Option, recalibrated: Sequence[Option], named: Sequence[Option] = ()
 ) -> tuple[ModelState, str | None]:
     """Which model carries best, or what was named, or the declared one, where that does as well; and why what was named
     is not what is written.
 
     It may do harm in no range of charge, and has to run over the declared range.  recalibrated : with own parameters
-    open, some of them with effects that stand in for what the cell lacks.
+    open, some of them with effects that stand in for what the cell lacks.  named : what was named, with the own
+    parameters as declared, then with these open.
     """
     own = [one for one in recalibrated if _fault(one, declared, (*ORDINARY_C, *FAST_C)) is None]
-    fault = None if named is None else _fault(named, declared, ORDINARY_C)
-    preferred = [declared] if named is None or fault is not None else [named, declared]
+    faults = [_fault(one, declared, ORDINARY_C) for one in named]
+    sound = [one for one, fault in zip(named, faults, strict=True) if fault is None]
+    preferred = [*sound, declared]
     options = [*preferred, *own]
     as_good = [one for one in preferred if worst_ratio(one, options) <= AS_GOOD]
     best = as_good[0] if as_good else carries_best(options)
-    if named is None or best is named:
+    if not named or any(best is one for one in sound):
         return best.state, None
-    names = " + ".join(named.state.hypothesis)
+    names = " + ".join(named[0].state.hypothesis)
+    fault = faults[0] if not sound else None
     return best.state, f"{names}: {fault or LESS_ELSEWHERE}; {_instead(best, declared)}"
 
 

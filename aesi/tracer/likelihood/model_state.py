@@ -49,12 +49,13 @@ class ModelState:
         effects, run = self.effects(record.good), self.problem.run
         if self.values is not None and index is not None:
             return run(data, self.values[STATE_OF_CHARGE][str(index)], effects, hold)
-        if self.values is not None and record.basis == "full charge":
+        if self.values is not None and record.start.basis == "full charge":
             return run(data, self._full(record.soc0), effects, hold)
-        if self.values is None or record.soc0_given or record.rest_voltage_v is None:
+        rest_v = record.start.rest_voltage_v  # None where the state of charge was given
+        if self.values is None or rest_v is None:
             return run(data, record.soc0, effects, hold)
         try:
-            return run(data, None, effects, hold, record.rest_voltage_v)
+            return run(data, None, effects, hold, rest_v)
         except AesiError:
             return run(data, record.soc0, effects, hold)
 
@@ -62,7 +63,7 @@ class ModelState:
         """State of charge that counts as full: the mean fitted start of the records that begin fully charged."""
         assert self.values is not None
         known = self.values[STATE_OF_CHARGE]
-        full = [known[str(i)] for i, r in enumerate(self.problem.records) if r.basis == "full charge"]
+        full = [known[str(i)] for i, r in enumerate(self.problem.records) if r.start.basis == "full charge"]
         return sum(full) / len(full) if full else otherwise
 
     def settled(self) -> tuple[Cell, tuple[ActiveEffect, ...], float]:

@@ -11,6 +11,10 @@ from aesi.records import Run
 
 MEMORIES_S = (10.0, 60.0, 300.0, 1800.0)
 """Low-passes of the current that stand for slow states."""
+TURNS_S = (120.0, 900.0)
+"""Low-passes of the sign of the current that stand for hysteresis."""
+REST_SHARE = 0.02
+"""Of the current's RMS: less has no sign."""
 FOLDS = 5
 """Every fifth block is left out in turn."""
 BLOCKS_PER_FOLD = 5
@@ -30,14 +34,15 @@ def features(run: Run) -> dict[str, Array]:
     z = 2.0 * (soc - soc.min()) / max(np.ptp(soc), 1e-6) - 1.0
     slow = [_filtered(t, i, tau) for tau in MEMORIES_S]
     heat = _filtered(t, i**2, MEMORIES_S[-1])
-    turn = [_filtered(t, np.sign(i) * (np.abs(i) > 0.02), tau) for tau in (120.0, 900.0)]
+    sign = np.sign(i) * (np.abs(i) > REST_SHARE)
+    turn = [_filtered(t, sign, tau) for tau in TURNS_S]
     throughput = np.concatenate([[0.0], np.cumsum(np.abs(current[1:]) * np.diff(t))])
     throughput /= throughput[-1] + 1e-12
     electrolyte = run.series["c_e0"] - run.series["c_eL"]
     surface = [run.series[n] for n in ("c_sn", "c_sp")]
     return {
         "current": np.column_stack([i, np.tanh(i / SATURATION), i * z, i * z**2]),
-        "sign of current": np.column_stack([np.sign(i) * (np.abs(i) > 0.02)]),
+        "sign of current": np.column_stack([sign]),
         "state of charge": np.polynomial.chebyshev.chebvander(z, 6)[:, 1:],
         "electrolyte": np.column_stack([electrolyte, electrolyte * z]),
         "particle surfaces": np.column_stack(surface),
@@ -50,11 +55,13 @@ def features(run: Run) -> dict[str, Array]:
 
 
 def _filtered(time_s: Array, signal: Array, tau_s: float) -> Array:
-    from scipy.signal import lfilter
-
-    gap = float(np.median(np.diff(time_s)))
-    keep = float(np.exp(-gap / tau_s))
-    return lfilter([1.0 - keep], [1.0, -keep], signal)
+    """First-order low-pass of a signal that holds since the row before, from nought; rows may be uneven, as those of
+    thinned records of steady currents are."""
+    kept = np.exp(-np.diff(time_s) / tau_s)
+    out = np.zeros(len(signal))
+    for row, (share, value) in enumerate(zip(kept.tolist(), signal[1:].tolist(), strict=True), start=1):
+        out[row] = share * out[row - 1] + (1.0 - share) * value
+    return out
 
 
 def explain(runs: Sequence[Run], residuals: Sequence[Array]) -> dict[str, float]:

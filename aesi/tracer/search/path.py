@@ -72,8 +72,7 @@ Report = Callable[[InverseProblem, Explanation, float], None]
 
 def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
     """Root mean square of the residual on blocks that were left out, V."""
-    left = held_out_residual(blocks, one)
-    return float(np.sqrt(np.mean((left if blocks.counted is None else left[blocks.counted]) ** 2)))
+    return float(np.sqrt(np.mean(held_out_residual(blocks, one)[blocks.compared] ** 2)))
 
 
 def lowers_error(before_v: float, after_v: float) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aesi.data import read_measurement
+from aesi.data.current import read_current
 from aesi.data.readers.text import TextTable
 from aesi.errors import DataError
 
@@ -270,6 +271,16 @@ def test_a_temperature_under_another_header_is_told_of(tmp_path, name):
     found = read_measurement(written(tmp_path, f"{HEADER},{name}\n{rows}"))
     assert found.temperature_degc is None
     assert any(f"{name!r} looks like a temperature and is not used" in note for note in found.notes)
+
+
+def test_a_voltage_that_a_simulation_does_not_need_is_told_of(tmp_path):
+    rows = "".join(f"{t},{i},{1e3 * v}\n" for t, i, v in zip(TIME, CURRENT, VOLTAGE, strict=True))
+    found = read_current(written(tmp_path, f"time_s,current_a,Voltage [mV]\n{rows}"))
+    assert found.voltage_v is None
+    option = '--column voltage_v="Voltage [mV]" --unit voltage_v=mV takes it.'
+    assert any(
+        "'Voltage [mV]' looks like a voltage and is not used" in n and n.endswith(option) for n in found.notes
+    )
 
 
 def test_a_room_in_fahrenheit_is_doubted(tmp_path):

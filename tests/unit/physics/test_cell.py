@@ -141,6 +141,55 @@ def test_a_negative_thickness_is_refused(content):
     assert "separator_thickness_m" in fault(content)
 
 
+@pytest.mark.parametrize(
+    ("section", "changes", "sentence"),
+    [
+        (
+            "Negative electrode",
+            {"Diffusivity [m2.s-1]": -1e-14},
+            "diffusivity is -1e-14 at a stoichiometry of",
+        ),
+        (
+            "Negative electrode",
+            {"Diffusivity [m2.s-1]": "1e-14 * (0.5 - x)"},
+            "diffusivity is -.* positive number",
+        ),
+        (
+            "Positive electrode",
+            {"OCP [V]": "4.0 + log(x - 0.5)"},
+            "potential is not finite at a stoichiometry",
+        ),
+        ("Positive electrode", {"Porosity": 33.5}, "porosity = 33.5 has to be a share below 1; 30 % is 0.3"),
+        ("Electrolyte", {"Conductivity [S.m-1]": "1.0 - x"}, "conductivity is -999 at 1000 mol/m3"),
+        (
+            "Cell",
+            {"Lower voltage cut-off [V]": 4.2, "Upper voltage cut-off [V]": 2.5},
+            r"the lower cut-off \(4.2 V\) has to be above 0 and below the upper one \(2.5 V\)",
+        ),
+        (
+            "Cell",
+            {"Reference temperature [K]": 25.0},
+            "reference_temperature_k = 25 K .* 25 degC is 298.15 K",
+        ),
+        (
+            "Cell",
+            {"Nominal cell capacity [A.h]": 5000.0},
+            "the nominal capacity is 5000 A.h, but the negative electrode holds 5.153 A.h",
+        ),
+    ],
+)
+def test_values_that_no_cell_has_are_refused(content, section, changes, sentence):
+    content["Parameterisation"][section] |= changes
+    with pytest.raises(CellError, match=sentence):
+        Cell.from_bpx(content)
+
+
+def test_a_file_with_a_byte_order_mark_is_read(content, tmp_path):
+    path = tmp_path / "cell.json"
+    path.write_text(json.dumps(content), encoding="utf-8-sig")
+    assert Cell.from_bpx(path) == Cell.from_bpx(content)
+
+
 def test_text_instead_of_a_number_is_refused(content):
     content["Parameterisation"]["Cell"]["Nominal cell capacity [A.h]"] = "five"
     assert "Nominal cell capacity" in fault(content)

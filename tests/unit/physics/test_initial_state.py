@@ -56,6 +56,12 @@ def test_a_full_charge_that_relaxed_is_state_of_charge_one(below_mv):
     assert found.sd >= 0.49 * by_voltage  # the table of potentials is coarse
 
 
+def test_a_rest_above_the_upper_cut_off_is_said_to_be_above_it():
+    said = initial_state(LG_M50, resting(LG_M50.upper_voltage_v + 0.05)).sentence
+    assert "rests at 4.250 V, 50 mV above the upper cut-off (4.2 V): a full charge" in said
+    assert said.endswith("check the voltage's sensor, and the cell file, which may be another cell's.")
+
+
 def _ocv() -> tuple[np.ndarray, np.ndarray]:
     soc = np.linspace(0.0, 1.0, 2001)
     return LG_M50.rest_voltage_v(soc), soc

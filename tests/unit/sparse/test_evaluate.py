@@ -233,6 +233,13 @@ def test_a_library_larger_than_the_data_is_refused():
         Problem.build(Split((make_record(100),), (), ()), Options(p_c=5, d=5))
 
 
+def test_a_block_as_long_as_the_records_is_refused():
+    with pytest.raises(
+        DataError, match=r"a bootstrap block of 500 rows .* longest training record \(99 rows\)"
+    ):
+        Problem.build(Split((make_record(100),), (), ()), Options(p_c=1, d=1, block=500))
+
+
 def test_no_records_is_refused():
     with pytest.raises(DataError, match="no training records"):
         Problem.build(Split((), (), ()))

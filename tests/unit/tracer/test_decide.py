@@ -101,9 +101,13 @@ def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
 
 def test_data_that_order_nothing_give_look_alikes(path):
     lenient = replace(path, steps=tuple(replace(step, admission_nats=-1e6) for step in path.steps))
-    (group,) = judged(lenient, Thresholds(alike_sds=1e6, solver_v=0.1)).groups
+    verdict = judged(lenient, Thresholds(alike_sds=1e6, solver_v=0.1))
+    (group,), (every,), (told,) = verdict.groups, verdict.confidence_sets, verdict.alike_too
     assert group[0] == "ocv_hysteresis"
     assert len(group) == 3
+    assert every[:3] == group
+    assert all(name in told for name in every[3:])
+    assert len(every) > 3
 
 
 def test_what_is_named_beside_unknown_is_what_the_search_on_a_measured_cell_left(path):
@@ -149,12 +153,14 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert worst_ratio(cold, [cold, declared, both]) == pytest.approx(1.6)
     assert carries_best([declared, cold, both]) is both
     assert carries_best([declared, option(1.0, np.inf)]) is declared
-    assert written(declared, [cold, both], None)[0] is both.state
-    state, why = written(declared, [both], cold)
+    assert written(declared, [cold, both])[0] is both.state
+    state, why = written(declared, [both], [cold])
     assert state is both.state
     assert "another model leaves less on records left out" in str(why)
     named = option(5.2, 38.5)  # within 5 % of the best on either
-    assert written(declared, [option(5.4, 38.0)], named) == (named.state, None)
+    assert written(declared, [option(5.4, 38.0)], [named]) == (named.state, None)
+    refined = option(4.0, 20.0)  # what was named, with the own parameters open
+    assert written(declared, [option(5.4, 38.0)], [named, refined]) == (refined.state, None)
 
 
 def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to_be_no_finding(path):
@@ -163,13 +169,13 @@ def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to
         return Option(ModelState(path.problem, hypothesis=effects), LeftOut(left_v, left_v))
 
     declared, plain, more = option(20.0), option(15.0), option(9.0, "series_resistance")
-    assert written(declared, [plain, more], None)[0] is more.state
-    assert written(declared, [plain, option(16.0, "series_resistance")], None)[0] is plain.state
+    assert written(declared, [plain, more])[0] is more.state
+    assert written(declared, [plain, option(16.0, "series_resistance")])[0] is plain.state
     (said,) = stand_ins(more.state, ())
     assert "series_resistance" in said
     assert "is not shown" in said
     assert stand_ins(more.state, ("series_resistance",)) == stand_ins(plain.state, ()) == ()
-    _, why = written(declared, [more], option(19.9, "ocv_hysteresis"))
+    _, why = written(declared, [more], [option(19.9, "ocv_hysteresis")])
     assert "recalibrated model with series_resistance, which leaves 9.0 mV there" in str(why)
 
 
@@ -182,11 +188,12 @@ def test_what_does_harm_in_a_range_of_charge_is_not_written(path):
     chance = option(18.0, 10.0, 36.0)  # by a fifth an RMS of some seven independent samples may be off
     harmful = option(12.0, 17.0, 2.0)
     may_err = option(18.0, 16.0, 20.0)  # models of measured cells err by 13 mV at most
-    assert written(declared, [harmful], None)[0] is declared.state
-    assert written(declared, [option(21.5, 9.0, 29.0)], None)[0] is declared.state  # as good
-    assert written(declared, [harmful, may_err], None)[0] is may_err.state
-    assert written(declared, [chance], None)[0] is chance.state
-    assert "worse than the declared model in a range of charge" in str(written(declared, [], harmful)[1])
+    assert written(declared, [harmful])[0] is declared.state
+    assert written(declared, [option(21.5, 9.0, 29.0)])[0] is declared.state  # as good
+    assert written(declared, [harmful, may_err])[0] is may_err.state
+    assert written(declared, [chance])[0] is chance.state
+    assert "worse than the declared model in a range of charge" in str(written(declared, [], [harmful])[1])
+    assert written(declared, [], [harmful, may_err]) == (may_err.state, None)
 
 
 def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refused(path):
@@ -199,6 +206,16 @@ def test_a_model_that_runs_out_of_salt_where_the_declared_one_does_not_is_refuse
     assert fault(0.5) is None
     assert "a full discharge at 2C runs out of lithium or of salt" in fault(0.2)
     assert "before it reaches its voltage limit" in fault(0.2)
+
+
+@pytest.mark.parametrize(("share", "at_fault"), [(0.79, True), (0.81, False)])
+def test_running_empty_at_the_end_of_a_discharge_is_no_fault(path, monkeypatch, share, at_fault):
+    def end(state, rate, temperature):
+        return (1000.0 * share, "runs empty") if state.values else (1000.0, None)
+
+    monkeypatch.setattr("aesi.tracer.decide.carry_over._end", end)
+    moved = ModelState(path.problem, {"soc0": {"0": 0.9}})
+    assert range_fault(moved) == ("runs empty" if at_fault else None)
 
 
 def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):

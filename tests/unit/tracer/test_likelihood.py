@@ -13,7 +13,8 @@ TIME = np.cumsum(RNG.uniform(0.5, 20.0, N))
 STARTS = np.array([0, 15, 30, 45, N])
 AMPLITUDE = RNG.uniform(0.5, 2.0, N)
 WHITE = RNG.uniform(0.3, 0.6, N)
-BLOCKS = Blocks(STARTS, np.zeros(4, dtype=int), {"block": ((0,), (1,), (2,), (3,)), "rate": ((0, 1), (2, 3))})
+FOLDS = {"block": ((0,), (1,), (2,), (3,)), "rate": ((0, 1), (2, 3))}
+BLOCKS = Blocks(STARTS, np.zeros(4, dtype=int), FOLDS, np.ones(N, dtype=bool))
 
 
 def covariance():

@@ -84,7 +84,7 @@ def explained(names, total, rmse_v, word="found"):
     score = SimpleNamespace(total=total, evidence=total, shifts={"block": np.zeros((1, 0))})
     point = SimpleNamespace(residual_v=np.full(n, rmse_v), jacobian_v=np.zeros((n, 0)))
     chosen = SimpleNamespace(hypothesis=names, score=score, point=point)
-    blocks = SimpleNamespace(of_row=np.zeros(n, dtype=int), counted=None)
+    blocks = SimpleNamespace(of_row=np.zeros(n, dtype=int), compared=np.ones(n, dtype=bool))
     problem = SimpleNamespace(competing=lambda: range(20))
     path = SimpleNamespace(chosen=chosen, blocks=blocks, problem=problem)
     return SimpleNamespace(path=path, verdict=SimpleNamespace(word=word))

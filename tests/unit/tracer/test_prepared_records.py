@@ -22,8 +22,8 @@ def test_rows_that_stand_for_many_carry_less_noise(cell, make):
 def test_a_given_state_of_charge_is_taken_and_a_rest_is_read(cell, make):
     data = make()
     given, read = prepare(cell, data, 0.9, 0.0), prepare(cell, data, None, 0.0)
-    assert (given.basis, given.soc0) == ("given", 0.9)
-    assert read.basis == "rest"
+    assert (given.start.basis, given.soc0) == ("given", 0.9)
+    assert read.start.basis == "rest"
     assert abs(read.soc0 - 0.9) < 3 * read.soc0_sd
     assert any("state of charge" in note for note in read.notes)
 

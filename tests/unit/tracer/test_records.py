@@ -10,6 +10,7 @@ from aesi.physics import simulate
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
 from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test
+from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
 
 
@@ -78,10 +79,31 @@ def test_pulses_logged_unevenly_keep_their_charge_and_their_height(cell):
     charge = np.cumsum(thin.current_a[1:] * np.diff(thin.time_s))
     assert charge[-1] == pytest.approx(8 * 600.0)
     assert set(np.round(thin.current_a, 9)) == {0.0, 60.0}
-    check_record(cell, replace(record, soc0=0.02))  # straight lines would take out three times as much
+    check_record(
+        cell, replace(record, start=replace(record.start, soc=0.02))
+    )  # straight lines would take out three times as much
     on = thin.time_s[thin.current_a > 0]
     assert np.count_nonzero(on < 1.05) >= 4, "rows are dense after a step"
     assert on[0] == pytest.approx(0.1)
+
+
+def test_another_voltage_is_thinned_as_the_records_own(cell, rng):
+    even = np.arange(0.0, 300.0, 0.1)
+    drive = measured(cell, even, rng.normal(0.0, 5.0, len(even)))
+    pulsed = measured(cell, *pulses(60.0))
+    slow = measured(cell, np.arange(300.0), rng.normal(0.0, 5.0, 300))
+    for data, kept in ((drive, 0.2), (pulsed, 0.4), (slow, 1.0)):
+        data = replace(data, voltage_v=3.8 + 0.1 * rng.normal(size=len(data)))
+        found = thinned_record(cell, data)
+        assert len(found.thin) <= kept * len(data)
+        np.testing.assert_array_equal(found.averaged(data.voltage_v), found.thin.voltage_v)
+
+
+def test_records_that_are_too_many_rows_together_are_thinned_further(cell, rng):
+    time = np.arange(7000.0)
+    drives = [measured(cell, time, rng.normal(0.0, 5.0, len(time))) for _ in range(2)]
+    assert [len(r.thin) for r in thinned_together(cell, drives[:1])] == [7000]
+    assert [len(r.thin) for r in thinned_together(cell, drives)] == [3500, 3500]
 
 
 def test_a_long_discharge_needs_few_rows(cell):

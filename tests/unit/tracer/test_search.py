@@ -92,7 +92,7 @@ def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
     assert lost[0].sd > CATALOGUE["lithium_inventory_loss"].parameters["loss"].spread.loose  # cells age
 
 
-BLOCKS = SimpleNamespace(of_row=np.zeros(100, dtype=int), counted=None)
+BLOCKS = SimpleNamespace(of_row=np.zeros(100, dtype=int), compared=np.ones(100, dtype=bool))
 
 
 def left(residual_v, total):

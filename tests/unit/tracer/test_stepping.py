@@ -7,8 +7,8 @@ from aesi.data.thinning import condensed
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
-from aesi.tracer.case.records import STEADY_SPACING
 from aesi.tracer.case.stepping import STEPS_A_SAMPLE, stepping
+from aesi.tracer.case.thinned import STEADY_SPACING
 
 
 @pytest.fixture

@@ -1,0 +1,57 @@
+"""What a caller gives as rows of numbers, checked where it enters: an array, or one sentence on what it is instead."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+
+
+def numbers(values: object, name: str) -> Array:
+    """Any sequence of numbers as a float64 array of its shape.
+
+    name : how the sentence calls it.
+    Raises DataError for what conversion would refuse without saying which (text), or take for other numbers (dates,
+    whose unit is the library's own; complex ones).
+    """
+    kind = np.asarray(values).dtype.kind
+    if kind in "mM":
+        raise DataError(
+            f"{name} holds dates or durations; give numbers, as (dates - dates[0]).total_seconds() does."
+        )
+    if kind == "c":
+        raise DataError(f"{name} holds complex numbers; give real ones.")
+    try:
+        return np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise DataError(f"{name} holds {_first_other(values)!r}, which is not a number.") from None
+
+
+def check_row(values: Array, name: str) -> None:
+    """Raises DataError for what is no row, and for the first value of it that is not finite."""
+    if values.ndim != 1:
+        raise DataError(f"{name} has the shape {values.shape}; give one row of numbers.")
+    wrong = ~np.isfinite(values)
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise DataError(f"{name} is {values[row]:g} in row {row}; drop or fill what is not finite first.")
+
+
+def check_increasing(time_s: Array, name: str) -> None:
+    """Raises DataError for the first stamp that is not after the one before it."""
+    still = np.diff(time_s) <= 0.0
+    if still.any():
+        row = int(np.argmax(still)) + 1
+        raise DataError(
+            f"{name} does not increase at row {row} ({time_s[row]:g} s); sort or drop duplicate stamps."
+        )
+
+
+def _first_other(values: object) -> object:
+    for value in np.asarray(values, dtype=object).ravel():
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            return value
+    return values
