@@ -14,7 +14,7 @@ from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
-from aesi.pipeline.report.sizes import finding_line
+from aesi.pipeline.report.words.sizes import finding_line
 
 ROW = "row.json"
 
