@@ -5,6 +5,7 @@ Commands live in `flows.commands`; each imports what it needs when it runs, so t
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from typing import NoReturn
@@ -63,7 +64,7 @@ def main() -> NoReturn:
     except MemoryError:
         _fail("out of memory; use fewer library terms, a larger dt_s or fewer workers.", 1)
     except OSError as error:
-        _fail(f"{error.filename or 'a file'}: {error.strerror or error}.", 1)
+        _fail(_os_sentence(error), 1)
     except SystemExit as error:
         if error.code == INTERRUPTED:
             tell_interrupted()
@@ -77,6 +78,10 @@ def main() -> NoReturn:
     raise SystemExit(0)
 
 
+LISTS = ("--data", "--test", "--good")
+"""Options that take several files."""
+
+
 def repeated(arguments: list[str]) -> list[str]:
     """`--data A B C` as `--data A --data B --data C`, for the two commands that take lists of files."""
     if not arguments or arguments[0] not in ("discover", "calibrate"):
@@ -86,10 +91,21 @@ def repeated(arguments: list[str]) -> list[str]:
     for argument in arguments:
         if argument.startswith("-"):
             option = argument
-        elif option in ("--data", "--test") and result[-1] != option:
+        elif option in LISTS and result[-1] != option:
             result.append(option)
         result.append(argument)
     return result
+
+
+def _os_sentence(error: OSError) -> str:
+    """What the system refused; of the workspace, where else it can be."""
+    place = error.filename or "a file"
+    words = f"{place}: {error.strerror or error}"
+    if str(place).startswith(str(environment.workspace())) and error.errno in (errno.EACCES, errno.EROFS):
+        words += (
+            "; runs and their tracking are kept in the current folder, or in the one that AESI_HOME names"
+        )
+    return f"{words}."
 
 
 def _first_line(error: Exception) -> str:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from datetime import date
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from aesi.calibration.ageing import Ageing
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import Model
 from aesi.calibration.parameters import free_parameters, with_interfaces
@@ -53,6 +55,8 @@ def calibrate(
     evaluations: int = EVALUATIONS,
     physics: ModelName = "espm",
     same_cell: bool = False,
+    dates: Mapping[str, date] | None = None,
+    as_of: date | None = None,
 ) -> Calibration:
     """Capacities, stoichiometry windows, potential, diffusion, kinetics, electrolyte and contacts, with temperature.
 
@@ -61,10 +65,12 @@ def calibrate(
     same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
     charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
     of a full discharge.
+    dates : days of the records, by name: what is of another day may be of another age.  as_of : of the file's state,
+    the last with a load without it.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
-    model, notes = problem(cell, records, soc0, temperatures_degc or {}, physics, same_cell)
+    model, notes = problem(cell, records, soc0, temperatures_degc or {}, physics, same_cell, dates, as_of)
     x = descended(model, evaluations)
     jacobian, errors = model.jacobian(x), model.errors(x)
     weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
@@ -99,6 +105,8 @@ def problem(
     temperatures_degc: Mapping[str, float],
     physics: ModelName = "espm",
     same_cell: bool = False,
+    dates: Mapping[str, date] | None = None,
+    as_of: date | None = None,
 ) -> tuple[Model, tuple[str, ...]]:
     """What is fitted, and sentences on how it was set up."""
     if not records:
@@ -112,17 +120,18 @@ def problem(
     kept = [one_branch(start, data) for data in records]
     placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
     start, typical = with_activation(start)
-    ready = prepared(start, placed, soc0, physics)
+    ready = prepared(start, placed, soc0, physics, same_cell)
     for one in ready:
         check_charge(start, one)
     span = _span_k(start, ready)
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
     start = with_interfaces(start)
+    ageing = Ageing.of(ready, dates or {}, as_of)
     model = Model(
-        start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), zero, physics
+        start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), zero, ageing, physics
     )
-    taken = tuple(sentence for r in ready for sentence in (r.start.sentence, hold_told(r)))
+    taken = (*(s for r in ready for s in (r.start.sentence, hold_told(r))), *ageing.sentences)
     return model, (*notes, *zero.sentences, *(n for _, more in kept for n in more), *told, *typical, *taken)
 
 

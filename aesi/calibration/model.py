@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.calibration.ageing import Ageing
 from aesi.calibration.parameters import Free, moved
 from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.records.zero import Zero
@@ -39,15 +40,6 @@ OUTLIER_V = 0.015
 ERROR_V, so that what a model usually misses counts by its square, and the end of a discharge, where potentials fall by
 hundreds of millivolts, does not decide the rest. With half of it the same command leaves 1.10 mV of the fitted and 12.5
 of the unseen drive, with twice 1.10 and 12.4."""
-SLOW_SD, LOADED_SD = 0.03, 0.002
-"""Of the logarithm of the capacity of a record's cell over the file's. Slow records are there for the potentials, and a
-cell ages between its tests: a convention, of the size of what is found, 3 % of the LG 18650HG2 within a week. Records
-with a load are what a file is simulated for, in the one state that it has. Theirs is what a charge is measured to, by
-the zero of a cycler that whole cycles tell to 0.2 %: more is believed where a record says it loudly. With 3 % for all,
-a calibrated LG 18650HG2 as it is misses its fitted 1C discharge and drive by 119 and 4.9 mV, and the 1C discharge of
-two days later, fitted to nothing, by 10.3; with these by 17.6, 8.7 and 14.1."""
-MOST_AGE = 0.3
-"""Of the same: no record is further from the file."""
 TELL_SILICON = 2
 """Slow discharges at the least that tell lost silicon from lost material: of one, the potentials take either."""
 STEP = 0.02
@@ -91,6 +83,11 @@ class WorkingVector:
         """Of a record's active material."""
         return self.own(record)[1]
 
+    @property
+    def ages(self) -> list[int]:
+        """Of all records' active material."""
+        return [self.age(i) for i in range(self.records)]
+
 
 class Model:
     """Residuals of prepared records under a working vector, each coordinate a standard normal deviate a priori."""
@@ -102,19 +99,19 @@ class Model:
         free: tuple[Free, ...],
         shapes: Shapes,
         zero: Zero,
+        ageing: Ageing,
         physics: ModelName = "espm",
     ) -> None:
         self.physics = physics
         self.cell, self.records, self.free, self.shapes, self.zero = cell, records, free, shapes, zero
+        self.ageing = ageing
         silicon = sum(r.slow for r in records) >= TELL_SILICON
         self.layout = WorkingVector(len(free), shapes.size, len(records), silicon)
         self.edge = silicon_edge(cell.negative)
         self.weights = [r.trusted.astype(float) / (ERROR_V * REPEATS**0.5) for r in records]
         bounds = [f.bounds for f in free] + [(-4.0, 4.0)] * (self.layout.size - len(free))
         self.low, self.high = np.array(bounds).T
-        ages = [self.layout.age(i) for i in range(len(records))]
-        self.high[ages] = [MOST_AGE / self.age_sd(i) for i in range(len(records))]
-        self.low[ages] = -self.high[ages]
+        self.low[self.layout.ages], self.high[self.layout.ages] = -np.inf, np.inf
         self.simulations = 0
 
     def cell_at(self, x: Array) -> Cell:
@@ -124,11 +121,7 @@ class Model:
 
     def material(self, index: int, x: Array) -> float:
         """Share of its active material that the cell of a record has."""
-        return float(np.exp(self.age_sd(index) * x[self.layout.age(index)]))
-
-    def age_sd(self, index: int) -> float:
-        """Of the logarithm of a record's share of active material."""
-        return SLOW_SD if self.records[index].slow else LOADED_SD
+        return self.ageing.share(index, x[self.layout.ages])
 
     def silicon(self, index: int, x: Array) -> float:
         """Share of its silicon that the cell of a record has: slow ones tell it."""
@@ -205,8 +198,11 @@ class Model:
             )
             for j in self.layout.own(i):
                 there = x.copy()
-                there[j] += 10.0 * STEP
-                blocks[i][:, j] = (self.run(i, cell, there)[0] - runs[i][0]) / (10.0 * STEP)
+                there[j] += STEP
+                blocks[i][:, j] = (self.run(i, cell, there)[0] - runs[i][0]) / STEP
+            # Records of one course of ageing are moved by one another's coordinates, too.
+            root = self.ageing.root[i]
+            blocks[i][:, self.layout.ages] = blocks[i][:, [self.layout.age(i)]] * root / root[i]
         parts = []
         for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
             lenient = w * leniency(record.rows.voltage_v - run[0])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from datetime import date
 from os import PathLike
 from pathlib import Path
 
@@ -84,13 +85,16 @@ def calibrate(
     *,
     soc0: float | None = None,
     temperatures_degc: Mapping[str, float] | None = None,
+    dates: Mapping[str, date] | None = None,
+    as_of: date | None = None,
     hold: Hold | None = None,
     model: ModelName | None = None,
 ) -> Calibration:
     """Fit the parameters that a cell's file declares to measurements; the fitted cell is `.cell` of what comes back.
 
     cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
-    temperatures_degc : of records without a temperature column, by name.
+    temperatures_degc : of records without a temperature column, by name.  dates : days of the records, by name; those
+    of other days may be of another age.  as_of : day of the file's state; None takes the last with a load.
     model : that is fitted, "espm" or "dfn"; None takes that of a saved model, else "espm".
     Raises AesiError, one sentence, for what cannot be used.
     """
@@ -100,7 +104,15 @@ def calibrate(
     measurements = [_read(one, None, hold) for one in _listed(data)]
     check_records(measurements, temperatures_degc)
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    return fit_cell(declared, measurements, soc0=soc0, temperatures_degc=temperatures_degc, physics=physics)
+    return fit_cell(
+        declared,
+        measurements,
+        soc0=soc0,
+        temperatures_degc=temperatures_degc,
+        physics=physics,
+        dates=dates,
+        as_of=as_of,
+    )
 
 
 def _check_asked(soc0: float | None, holdout: float, max_effects: int, seed: int) -> None:

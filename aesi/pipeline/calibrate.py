@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -35,13 +36,16 @@ NAMED_OPEN = 3
 class Request:
     """What a calibration is asked for beside its records: see `aesi.calibration.calibrate`.
 
-    temperatures_degc : by record name.  impedance : spectra to hold the result against.  posterior : steps of each
-    walker, 0 for none.  title : name of the cell that is written.  model : that is fitted, "espm" or "dfn"; None takes
-    that of a saved model, else "espm".  same_cell : the file is of this very cell, see there.
+    temperatures_degc, dates : by record name.  as_of : day of the file's state.  impedance : spectra to hold the result
+    against.  posterior : steps of each walker, 0 for none.  title : name of the cell that is written.  model : that is
+    fitted, "espm" or "dfn"; None takes that of a saved model, else "espm".  same_cell : the file is of this very cell,
+    see there.
     """
 
     soc0: float | None = None
     temperatures_degc: Mapping[str, float] | None = None
+    dates: Mapping[str, date] | None = None
+    as_of: date | None = None
     impedance: tuple[Spectrum, ...] = ()
     posterior: int = 0
     seed: int = 0
@@ -69,6 +73,8 @@ def calibrate_files(
         temperatures_degc=asked.temperatures_degc,
         physics=model,
         same_cell=asked.same_cell,
+        dates=asked.dates,
+        as_of=asked.as_of,
     )
     name = declared.name if asked.title is None else asked.title
     described = replace(found.cell, name=name, description=_made_from(found), fitted_with=found.model.physics)

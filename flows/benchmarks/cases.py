@@ -55,7 +55,8 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
         rows.sort(key=lambda row: str(row["case"]))
         last = {"seed": cases.seed, **cases.summary(rows)}
         tracker.metrics({k: v for k, v in last.items() if isinstance(v, float)})
-        tracker.json("confusion.json", last["confusion"])
+        if "confusion" in last:
+            tracker.json("confusion.json", last["confusion"])
         tracker.json("summary.json", last)
     except BaseException:
         tracker.end("FAILED", wait_s=5)

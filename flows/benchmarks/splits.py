@@ -1,24 +1,28 @@
 """`aesi bench splits`: does the hybrid survive another drive? One line a split, and a last one that sums up.
 
-The splits are those of `aesi.bench.hybrid.splits`; each runs the stages of `aesi run` in this process, untracked.
+The splits are those of `aesi.bench.hybrid.splits`; each runs the stages of `aesi run` and is a nested run of the
+experiment `splits`.
 """
 
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, against, chosen_splits, judged
+from aesi.bench import CaseRow
+from aesi.bench.hybrid.split_figures import summary, table
+from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
+from aesi.bench.limit import Stopwatch
 from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
-from aesi.pipeline.experiment.physics_models import RECALIBRATED
+from flows.benchmarks.cases import Cases, judged_once, tracked
+from flows.benchmarks.page import write_between
 
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
 """A look at every split in hours; `whole` runs them at the settings of an experiment."""
@@ -27,6 +31,32 @@ BLOCK_S = 100.0
 CHEAP = ("conformal.method=split", "conformal.compare=[]", "conformal.horizons_s=[60.0]")
 """Intervals one step ahead are not judged here."""
 QUICK_MODELS = ("ESPM", "ESPM, one resistor", "ESPM recalibrated", "AESI I", "AESI II")
+
+
+SHOWN = ("split", "cell", "seed", "development", "error")
+TRACKED = ("mser_pct", "coverage_pct", "winkler_mv")
+"""Figures of each model that are metrics of its run."""
+BEGIN, END = "<!-- table of aesi bench splits -->", "<!-- end of splits -->"
+
+
+@dataclass(frozen=True)
+class SplitRun:
+    """One split with one seed, and what is laid over the file of its experiment."""
+
+    split: SplitCase
+    seed: int
+    folder: str
+    overrides: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        """Of the case."""
+        return f"{self.split.name}, seed {self.seed}"
+
+    @property
+    def config(self) -> ExperimentConfig:
+        """The experiment."""
+        return read_experiment(Path(self.folder) / self.split.experiment, self.overrides)
 
 
 def run(
@@ -42,34 +72,38 @@ def run(
     dt_s: float | None = None,
     models: Sequence[str] = QUICK_MODELS,
     overrides: Sequence[str] = (),
+    workers: int = 1,
+    address: str | None = None,
+    write: str | None = None,
+    keep: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """One dict a split and seed, and a last one with `summary`: true.
 
     experiments : folder of the experiment files.  whole : every split, three seeds, candidates, resamples and step as
     the files have them; otherwise five splits of a cell, one seed, few candidates and rows of 1 s.
     cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : laid over all files.
+    workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two marks becomes
+    the table.  keep : a folder for what each split gave; one that is in it is not run again, so that an interrupted run
+    goes on. It is of one state of the code: empty it after a change.
     """
     asked = {"a_cell": a_cell, "seeds": seeds, "candidates": candidates, "resamples": resamples, "dt_s": dt_s}
     standing = {"seeds": 3} if whole else QUICK
     settings: dict[str, Any] = {**standing, **{k: v for k, v in asked.items() if v is not None}}
+    runs = [
+        SplitRun(split, seed, experiments, (*_laid(split, seed, settings, models), *overrides))
+        for split in chosen_splits(cells, settings.get("a_cell"), only, development)
+        for seed in range(int(settings["seeds"]))
+    ]
     rows = []
-    for case in chosen_splits(cells, settings.get("a_cell"), only, development):
-        for seed in range(int(settings["seeds"])):
-            config = _config(Path(experiments), case, seed, settings, models, overrides)
-            row = _row(case, seed, config)
-            rows.append(row)
-            yield row
-    yield summary(rows)
+    judge = partial(judged_once, judge=_row, keep=keep)
+    for row in tracked(Cases("splits", 0, runs, judge, summary, SHOWN), workers, address):
+        rows.append(row)
+        yield row
+    if write is not None:
+        write_between(write, BEGIN, END, table(rows[:-1]))
 
 
-def _config(
-    folder: Path,
-    case: SplitCase,
-    seed: int,
-    settings: Mapping[str, Any],
-    models: Sequence[str],
-    overrides: Sequence[str],
-) -> ExperimentConfig:
+def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Sequence[str]) -> tuple[str, ...]:
     laid = [*case.overrides, f"seed={seed}", f"models={json.dumps(list(models))}"]
     laid += [
         f"search.{key}={settings[key]}"
@@ -78,24 +112,25 @@ def _config(
     ]
     if settings.get("dt_s") is not None:
         laid += [f"data.dt_s={settings['dt_s']}", f"search.block={round(BLOCK_S / settings['dt_s'])}"]
-    laid += CHEAP
-    return read_experiment(folder / case.experiment, [*laid, *overrides])
+    return (*laid, *CHEAP)
 
 
-def _row(case: SplitCase, seed: int, config: ExperimentConfig) -> dict[str, Any]:
+def _row(run: SplitRun) -> CaseRow:
     """A split that fails says why; it counts as nothing gained over the declared model."""
-    started = time.process_time()
-    head: dict[str, Any] = {
-        "case": case.name,
+    spent = Stopwatch()
+    case = run.split
+    head = {
+        "case": run.name,
+        "split": case.name,
         "cell": case.cell,
-        "seed": seed,
+        "seed": run.seed,
         "development": case.development,
     }
     try:
-        figures = _judged(case, config)
+        figures = _judged(case, run.config)
     except AesiError as error:
         figures = {"error": str(error)}
-    return head | figures | {"cpu_s": round(time.process_time() - started, 1)}
+    return head | figures | spent.row
 
 
 def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float], Sequence[Fitted]]:
@@ -131,71 +166,12 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
 def _judged(case: SplitCase, config: ExperimentConfig) -> dict[str, Any]:
     loaded, validation, fitted = search_and_fit(config)
     home = [series for series in loaded.split.test if series.name not in case.abroad]
-    figures: dict[str, Any] = {
-        "validation_mser_pct": validation,
-        "models": judged(fitted, home),
+    models = judged(fitted, home)
+    figures: dict[str, Any] = {"validation_mser_pct": validation, "models": models}
+    figures |= {
+        f"{name}/{key}": models[name][key] for name in models for key in TRACKED if key in models[name]
     }
     for series in loaded.split.test:
         if series.name in case.abroad:
             figures.setdefault("abroad", {})[series.name] = judged(fitted, [series])
     return figures
-
-
-def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Means and worst cases by cell, of all splits and of those that judge alone.
-
-    best_in_hindsight : of whichever model errs least on each split, the recalibrated one among them: what a choice that
-    knew the test could have taken off, and no choice from training drives can count on."""
-    return {
-        "summary": True,
-        "splits": len(rows),
-        "failed": sum("error" in row for row in rows),
-        "all": {cell: _of(mine) for cell, mine in _by_cell(rows).items()},
-        "judging": {
-            cell: _of(mine) for cell, mine in _by_cell([r for r in rows if not r["development"]]).items()
-        },
-    }
-
-
-def _by_cell(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
-    good = [row for row in rows if "error" not in row]
-    by_cell = {cell: [row for row in good if row["cell"] == cell] for cell in EXPERIMENTS}
-    return {cell: mine for cell, mine in by_cell.items() if mine} | ({"every cell": good} if good else {})
-
-
-def _of(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    out: dict[str, Any] = {"splits": len(rows)}
-    every = [(row["models"], row.get("abroad", {})) for row in rows]
-    for name in rows[0]["models"]:
-        mine = [models[name] for models, _ in every if name in models]
-        out[name] = _spread("mser_pct", [m["mser_pct"] for m in mine])
-        recalibrated = [
-            against(test[name], test[RECALIBRATED])
-            for models, abroad in every
-            for test in (models, *abroad.values())
-            if RECALIBRATED in test
-        ]
-        if recalibrated:
-            out[name] |= _spread("mser_recalibrated_pct", recalibrated)
-        if all("coverage_pct" in m for m in mine):
-            counts = np.array([m["rows"] for m in mine], dtype=float)
-            out[name] |= {
-                "coverage_pct": float(counts @ [m["coverage_pct"] for m in mine] / counts.sum()),
-                "worst_drive_coverage_pct": min(m["worst_drive_coverage_pct"] for m in mine),
-                "winkler_mv": float(counts @ [m["winkler_mv"] for m in mine] / counts.sum()),
-            }
-    best = [
-        max(against(test[name], test[RECALIBRATED]) for name in test)
-        for test, _ in every
-        if RECALIBRATED in test
-    ]
-    if best:
-        out["best_in_hindsight"] = _spread("mser_recalibrated_pct", best)
-    if "AESI I" in rows[0]["models"]:
-        gaps = [abs(r["validation_mser_pct"]["AESI I"] - r["models"]["AESI I"]["mser_pct"]) for r in rows]
-        out["validation_minus_test"] = {"median": float(np.median(gaps)), "worst": max(gaps)}
-    return out
-
-
-def _spread(name: str, values: Sequence[float]) -> dict[str, float]:
-    return {f"{name}_mean": float(np.mean(values)), f"{name}_worst": min(values)}

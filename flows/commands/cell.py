@@ -97,6 +97,19 @@ def calibrate(
             "--temperature", help="FILE=DEGC, of a record without a temperature column; repeatable."
         ),
     ] = None,
+    dates: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--date",
+            help="FILE=YYYY-MM-DD, the day of a record: those of other days may be of another age; repeatable.",
+        ),
+    ] = None,
+    as_of: Annotated[
+        str | None,
+        typer.Option(
+            help="YYYY-MM-DD, the day of the state that the file is in; without it the last with a load."
+        ),
+    ] = None,
     hold: options.HoldOption = None,
     until: Annotated[
         list[str] | None,
@@ -125,6 +138,8 @@ def calibrate(
     request = Request(
         soc0=soc0,
         temperatures_degc=options.by_file("--temperature", temperature),
+        dates=options.dates(dates),
+        as_of=options.day("--as-of", as_of),
         impedance=options.spectra(impedance),
         posterior=posterior,
         seed=seed,

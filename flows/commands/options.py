@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable
+from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
@@ -14,6 +15,8 @@ from aesi.errors import InputError
 if TYPE_CHECKING:
     from aesi.data.reading import Reading
     from aesi.records import Hold, Measurement, Spectrum
+
+Value = TypeVar("Value")
 
 CellOption = Annotated[
     Path, typer.Option("--cell", help="BPX file, or a model folder that `discover` wrote.")
@@ -194,15 +197,34 @@ def record_name(path: str | Path) -> str:
 
 def by_file(option: str, pairs: list[str] | None) -> dict[str, float]:
     """`FILE=NUMBER` pairs as numbers by record."""
+    return _by_file(option, pairs, float, "NUMBER")
+
+
+def dates(pairs: list[str] | None) -> dict[str, date]:
+    """`--date FILE=YYYY-MM-DD` pairs as days by record."""
+    return _by_file("--date", pairs, date.fromisoformat, "YYYY-MM-DD")
+
+
+def day(option: str, text: str | None) -> date | None:
+    """A day that an option gives."""
+    try:
+        return None if text is None else date.fromisoformat(text)
+    except ValueError:
+        raise InputError(f"{option} {text}: has to read YYYY-MM-DD.") from None
+
+
+def _by_file(
+    option: str, pairs: list[str] | None, read: Callable[[str], Value], form: str
+) -> dict[str, Value]:
     out = {}
     for pair in pairs or []:
         file, equals, text = pair.rpartition("=")
         try:
-            out[record_name(file)] = float(text)
+            out[record_name(file)] = read(text)
         except ValueError:
             equals = ""
         if not equals or not file:
-            raise InputError(f"{option} {pair}: has to read FILE=NUMBER.")
+            raise InputError(f"{option} {pair}: has to read FILE={form}.")
     return out
 
 
@@ -215,7 +237,7 @@ def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:
 
 def say_reading(paths: Iterable[Path]) -> None:
     """The first line of a long command, before the libraries load."""
-    typer.echo(f"Reading {', '.join(path.name for path in paths)} ...", err=True)
+    typer.echo(f"Reading {', '.join(path.name or str(path) for path in paths)} ...", err=True)
 
 
 def say_notes(notes: Iterable[str]) -> None:

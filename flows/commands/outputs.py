@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -14,7 +15,9 @@ def check_file(out: Path, inputs: Iterable[Path] = ()) -> None:
         raise InputError(f"--out {out} is a folder; name the file to write.")
     if any(out.exists() and given.exists() and out.samefile(given) for given in inputs):
         raise InputError(f"--out {out} is a file that is read, and would be lost; give another name.")
-    _check_parents(out)
+    if out.exists() and not os.access(out, os.W_OK):
+        raise InputError(f"--out {out} is there and may not be written over; give another name.")
+    _check_place(out.parent)
 
 
 def check_folder(out: Path) -> None:
@@ -22,12 +25,15 @@ def check_folder(out: Path) -> None:
     replaced."""
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; name a folder.")
-    _check_parents(out)
+    _check_place(out)
 
 
-def _check_parents(out: Path) -> None:
-    for parent in out.parents:
-        if parent.exists():
-            if not parent.is_dir():
-                raise InputError(f"--out {out}: {parent} is a file, not a folder.")
+def _check_place(folder: Path) -> None:
+    """The folder, or the first above it that is there, is one that may be written to."""
+    for place in (folder, *folder.parents):
+        if place.exists():
+            if not place.is_dir():
+                raise InputError(f"--out: {place} is a file, not a folder; name another place.")
+            if not os.access(place, os.W_OK | os.X_OK):
+                raise InputError(f"--out: the folder {place} may not be written to; name another place.")
             return

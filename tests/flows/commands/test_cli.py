@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 import sys
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from aesi.errors import InputError
 from flows import cli
+from flows.commands.options import dates, day
 
 
 def test_version(call):
@@ -108,6 +111,33 @@ def test_what_cannot_be_written_is_told_before_anything_is_computed(
     assert (tmp_path / "file").read_text() == "kept"
 
 
+@pytest.mark.parametrize("made", ["closed/out.json", "closed", "there.json"])
+def test_a_place_that_may_not_be_written_to_is_told_before_anything_is_computed(
+    call, cell, current, tmp_path, monkeypatch, made
+):
+    (tmp_path / "closed").mkdir()
+    (tmp_path / "there.json").write_text("kept")
+    closed = {tmp_path / "closed", tmp_path / "there.json"}
+    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and Path(path) in closed))
+    command = "discover" if made == "closed" else "calibrate"
+    code, _, err = call(command, "--cell", cell, "--data", current, "--out", tmp_path / made)
+    assert code == 2
+    assert "may not be written" in err
+    assert err.startswith("aesi: ")
+    assert (tmp_path / "there.json").read_text() == "kept"
+
+
+def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path):
+    def refused(*_):
+        raise PermissionError(13, "Permission denied", str(tmp_path / ".aesi"))
+
+    monkeypatch.setenv("AESI_HOME", str(tmp_path))
+    monkeypatch.setattr("aesi.physics.effects.known_effects", refused)
+    code, _, err = call("effects", "self_heating")
+    assert code == 1
+    assert err.endswith("or in the one that AESI_HOME names.\n")
+
+
 def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
     code, _, err = call(
         "impedance",
@@ -117,6 +147,15 @@ def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
     assert code == 2
     assert "in kelvin? 298.15 K is 25 degC" in err
     assert not (tmp_path / "z.csv").exists()
+
+
+def test_days_of_records_are_read_by_record():
+    assert dates(["folder/pulses.csv.gz=2017-03-11"]) == {"pulses": date(2017, 3, 11)}
+    with pytest.raises(InputError, match="has to read FILE=YYYY-MM-DD"):
+        dates(["pulses.csv=yesterday"])
+    assert day("--as-of", "2017-03-11") == date(2017, 3, 11)
+    with pytest.raises(InputError, match="has to read YYYY-MM-DD"):
+        day("--as-of", "yesterday")
 
 
 def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):
@@ -205,6 +244,8 @@ def test_lists_of_files_may_follow_one_option():
     assert cli.repeated(given) == [
         *["calibrate", "--data", "a", "--data", "b", "--out", "x", "--test=c", "--test", "d", "--test", "e"]
     ]
+    good = ["discover", "--good", "a", "b"]
+    assert cli.repeated(good) == ["discover", "--good", "a", "--good", "b"]
     assert cli.repeated(["run", "--data", "a", "b"]) == ["run", "--data", "a", "b"]
 
 

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import yaml
 
+from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, against, all_splits, chosen_splits, judged
 from aesi.errors import InputError
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.records import ErrorSeries
 from aesi.sparse.yardsticks import Bare
-from flows.benchmarks.splits import summary
 
 EXPERIMENT_FILES = Path(__file__).resolve().parents[3] / "experiments"
 
@@ -80,3 +80,51 @@ def test_both_reductions_are_of_the_squared_error():
     row = {"cell": "nmc", "development": True, "models": figures}
     best = summary([row])["all"]["nmc"]["best_in_hindsight"]
     assert best == {"mser_recalibrated_pct_mean": 0.0, "mser_recalibrated_pct_worst": 0.0}
+
+
+def row(split: str, cell: str, seed: int, mser_pct: float) -> dict:
+    """Of a split whose recalibrated model leaves 10 mV, and whose correction takes as much off as it says."""
+
+    def figures(mser_pct: float) -> dict:
+        rmse_mv = 20.0 * np.sqrt(1.0 - mser_pct / 100.0)
+        bands = {
+            "coverage_pct": 90.0 + seed,
+            "worst_drive_coverage_pct": 80.0,
+            "winkler_mv": 40.0,
+            "rows": 100,
+        }
+        return {"rmse_mv": rmse_mv, "mser_pct": mser_pct, **bands}
+
+    models = {"ESPM": figures(0.0), "ESPM recalibrated": figures(75.0)}
+    models |= {name: figures(mser_pct) for name in ("AESI I", "AESI II")}
+    abroad = {"10degC_us06": models} if cell == "hg2" else {}
+    head = {"case": f"{split}, seed {seed}", "split": split, "cell": cell, "seed": seed, "development": False}
+    return head | {"models": models, "abroad": abroad, "validation_mser_pct": {"AESI I": 70.0}}
+
+
+def test_the_table_has_each_split_by_its_mean_over_the_seeds_and_the_worst_split():
+    rows = [row("nmc 1+2", "nmc", seed, value) for seed, value in enumerate((80.0, 90.0))]
+    rows += [row("nmc 1+3", "nmc", seed, 60.0) for seed in range(2)] + [row("hg2 without x", "hg2", 0, 80.0)]
+    rows += [
+        {
+            "case": "m50t 1, seed 0",
+            "split": "m50t 1",
+            "cell": "m50t",
+            "development": False,
+            "error": "no data",
+        }
+    ]
+    lines = table(rows)
+    nmc = next(line for line in lines if line.startswith("| NMC pouch"))
+    assert (
+        "| 2 | 2 | 75.0 / 75.0 | 72.5 / 60.0 | -10.0 / -60.0 | 12.5 / 15.0 | 90.5 / 80.0 | 40.0 / 40.0 |"
+        in nmc
+    )
+    assert any(
+        line.startswith("| LG HG2, 10degC_us06 | 1 | 1 | 75.0 / 75.0 | 80.0 / 80.0 |") for line in lines
+    )
+    assert any(
+        line.startswith("    | nmc 1+2 | the others | 75.0 | 85.0 | 85.0 | 40.0 | 70.0 |") for line in lines
+    )
+    assert "m50t 1, seed 0 failed: no data" in lines
+    assert summary(rows)["failed"] == 1

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from aesi.calibration.ageing import LOADED_SD, SLOW_SD
 from aesi.calibration.fit import problem
-from aesi.calibration.model import LOADED_SD, SLOW_SD
 from aesi.calibration.parameters import with_interfaces
 from aesi.calibration.rewind import capacities, rewound
 from aesi.physics import simulate

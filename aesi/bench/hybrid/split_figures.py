@@ -1,0 +1,200 @@
+"""What splits sum up to: means and worst cases by cell, and the table of the docs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from aesi.bench import CaseRow
+from aesi.bench.hybrid.splits import EXPERIMENTS, against
+from aesi.pipeline.experiment.physics_models import RECALIBRATED
+
+BEST = "AESI I"
+"""The model that the docs tell of."""
+TITLES = {
+    "nmc": "NMC pouch, parts of a drive",
+    "m50t": "LG M50T, half of the UDDS",
+    "panasonic": "Panasonic, 25 °C",
+    "hg2": "LG HG2, 25 °C",
+}
+
+
+def summary(rows: Sequence[CaseRow]) -> dict[str, Any]:
+    """Means and worst cases by cell, of all splits and of those that judge alone.
+
+    best_in_hindsight : of whichever model errs least on each split, the recalibrated one among them: what a choice that
+    knew the test could have taken off, and no choice from training drives can count on."""
+    return {
+        "summary": True,
+        "splits": len(rows),
+        "failed": sum("error" in row for row in rows),
+        "all": {cell: _of(mine) for cell, mine in _by_cell(rows).items()},
+        "judging": {
+            cell: _of(mine) for cell, mine in _by_cell([r for r in rows if not r["development"]]).items()
+        },
+    }
+
+
+def _by_cell(rows: Sequence[CaseRow]) -> dict[str, list[CaseRow]]:
+    good = [row for row in rows if "error" not in row]
+    by_cell = {cell: [row for row in good if row["cell"] == cell] for cell in EXPERIMENTS}
+    return {cell: mine for cell, mine in by_cell.items() if mine} | ({"every cell": good} if good else {})
+
+
+def _of(rows: Sequence[CaseRow]) -> dict[str, Any]:
+    out: dict[str, Any] = {"splits": len(rows)}
+    every = [(row["models"], row.get("abroad", {})) for row in rows]
+    for name in rows[0]["models"]:
+        mine = [models[name] for models, _ in every if name in models]
+        out[name] = _spread("mser_pct", [m["mser_pct"] for m in mine])
+        recalibrated = [
+            against(test[name], test[RECALIBRATED])
+            for models, abroad in every
+            for test in (models, *abroad.values())
+            if RECALIBRATED in test
+        ]
+        if recalibrated:
+            out[name] |= _spread("mser_recalibrated_pct", recalibrated)
+        if all("coverage_pct" in m for m in mine):
+            counts = np.array([m["rows"] for m in mine], dtype=float)
+            out[name] |= {
+                "coverage_pct": float(counts @ [m["coverage_pct"] for m in mine] / counts.sum()),
+                "worst_drive_coverage_pct": min(m["worst_drive_coverage_pct"] for m in mine),
+                "winkler_mv": float(counts @ [m["winkler_mv"] for m in mine] / counts.sum()),
+            }
+    best = [
+        max(against(test[name], test[RECALIBRATED]) for name in test)
+        for test, _ in every
+        if RECALIBRATED in test
+    ]
+    if best:
+        out["best_in_hindsight"] = _spread("mser_recalibrated_pct", best)
+    if BEST in rows[0]["models"]:
+        gaps = [abs(r["validation_mser_pct"][BEST] - r["models"][BEST]["mser_pct"]) for r in rows]
+        out["validation_minus_test"] = {"median": float(np.median(gaps)), "worst": max(gaps)}
+    return out
+
+
+def _spread(name: str, values: Sequence[float]) -> dict[str, float]:
+    return {f"{name}_mean": float(np.mean(values)), f"{name}_worst": min(values)}
+
+
+HEAD = [
+    "| cell | splits | seeds | recalibrated, % | AESI I, % | against recalibrated, % | validation off, points "
+    "| covered by AESI I, % | Winkler, recalibrated / AESI I, mV |",
+    "|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+]
+EACH = [
+    "| without, or trained on | tested on | recalibrated, % | AESI I, % | AESI II, % | AESI I against recalibrated, % "
+    "| validation, % | covered by AESI I, % | worst drive, % | Winkler, recalibrated / AESI I, mV |",
+    "|---|---|---:|---:|---:|---:|---:|---:|---:|---:|",
+]
+
+
+def table(rows: Sequence[CaseRow]) -> list[str]:
+    """Lines of Markdown: a cell and a temperature a line, mean / worst split, each split by its mean over the seeds;
+    and folded away each split."""
+    good = [row for row in rows if "error" not in row]
+    lines, each = list(HEAD), list(EACH)
+    for cell, title in TITLES.items():
+        splits = [_over_seeds(mine) for mine in _by("split", [r for r in good if r["cell"] == cell])]
+        lines += _summed(title, splits)
+        for split in splits:
+            each += _told(split)
+    failed = [f"{row['case']} failed: {row['error']}" for row in rows if "error" in row]
+    return [*lines, "", *failed, '??? note "Each split"', "", *(f"    {line}" for line in each)]
+
+
+def _by(key: str, rows: Sequence[CaseRow]) -> Iterator[list[CaseRow]]:
+    for name in dict.fromkeys(row[key] for row in rows):
+        yield [row for row in rows if row[key] == name]
+
+
+def _over_seeds(rows: Sequence[CaseRow]) -> dict[str, Any]:
+    """`home` and what was tested `abroad`: model -> means of its figures, with `against` the recalibrated one."""
+    first = rows[0]
+    told = [row["validation_mser_pct"].get(BEST) for row in rows]
+    return {
+        "split": first["split"],
+        "seeds": len(rows),
+        "alone": first["cell"] in ("hg2", "panasonic"),
+        "home": _mean([row["models"] for row in rows]),
+        "abroad": {n: _mean([row["abroad"][n] for row in rows]) for n in first.get("abroad", {})},
+        "validation": float(np.mean(told)),
+        "off": float(
+            np.mean([abs(v - r["models"][BEST]["mser_pct"]) for v, r in zip(told, rows, strict=True)])
+        ),
+    }
+
+
+FIGURES = ("mser_pct", "coverage_pct", "worst_drive_coverage_pct", "winkler_mv", "rows")
+
+
+def _mean(models: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, float]]:
+    out = {
+        name: {
+            key: float(np.mean([m[name][key] for m in models])) for key in FIGURES if key in models[0][name]
+        }
+        for name in models[0]
+    }
+    for name, figures in out.items():
+        figures["against"] = float(np.mean([against(m[name], m[RECALIBRATED]) for m in models]))
+    return out
+
+
+def _summed(title: str, splits: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    if not splits:
+        return
+    off = [split["off"] for split in splits]
+    yield _line(title, splits, [s["home"] for s in splits], f"{np.median(off):.1f} / {max(off):.1f}")
+    for name in splits[0]["abroad"]:
+        yield _line(f"{title.split(',')[0]}, {name}", splits, [s["abroad"][name] for s in splits], "")
+
+
+def _line(
+    title: str, splits: Sequence[Mapping[str, Any]], models: Sequence[Mapping[str, Any]], off: str
+) -> str:
+    def spread(name: str, key: str) -> str:
+        values = [m[name][key] for m in models]
+        return f"{np.mean(values):.1f} / {min(values):.1f}"
+
+    def pooled(name: str, key: str) -> float:
+        return float(np.average([m[name][key] for m in models], weights=[m[name]["rows"] for m in models]))
+
+    worst = min(m[BEST]["worst_drive_coverage_pct"] for m in models)
+    cells = (
+        title,
+        str(len(splits)),
+        str(splits[0]["seeds"]),
+        spread(RECALIBRATED, "mser_pct"),
+        spread(BEST, "mser_pct"),
+        spread(BEST, "against"),
+        off,
+        f"{pooled(BEST, 'coverage_pct'):.1f} / {worst:.1f}",
+        f"{pooled(RECALIBRATED, 'winkler_mv'):.1f} / {pooled(BEST, 'winkler_mv'):.1f}",
+    )
+    return f"| {' | '.join(cells)} |"
+
+
+def _told(split: Mapping[str, Any]) -> Iterator[str]:
+    where = "that drive" if split["alone"] else "the others"
+    yield _of_one(split["split"], where, split["home"], f"{split['validation']:.1f}")
+    for name, models in split["abroad"].items():
+        yield _of_one("", name, models, "")
+
+
+def _of_one(split: str, where: str, models: Mapping[str, Any], validation: str) -> str:
+    best, physics = models[BEST], models[RECALIBRATED]
+    figures = (physics["mser_pct"], best["mser_pct"], models["AESI II"]["mser_pct"], best["against"])
+    cells = (
+        split,
+        where,
+        *(f"{value:.1f}" for value in figures),
+        validation,
+        f"{best['coverage_pct']:.1f}",
+        f"{best['worst_drive_coverage_pct']:.1f}",
+        f"{physics['winkler_mv']:.1f} / {best['winkler_mv']:.1f}",
+    )
+    return f"| {' | '.join(cells)} |"
