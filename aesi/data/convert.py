@@ -31,17 +31,15 @@ def convert_file(
     Raises DataError where it cannot be used as a measurement, or `out` cannot be written.
     """
     record = read(path, reading or Reading(), max_rows=None)
-    columns: dict[str, Array] = {
-        "time_s": record.time_s,
-        "current_a": record.current_a,
-        "voltage_v": record.voltage_v,
-    }
-    if record.temperature_degc is not None:
-        columns["temperature_degc"] = record.temperature_degc
+    table = record.to_frame()
     if layout == "bdf":
-        columns["current_a"] = 0.0 - record.current_a
-        columns = {BDF_NAMES[name]: columns[name] for name in BDF_NAMES if name in columns}
-    _write(out, columns)
+        table["current_a"] = 0.0 - record.current_a
+        table = table[[name for name in BDF_NAMES if name in table]].rename(columns=BDF_NAMES)
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        table.to_csv(out, index=False, float_format="%.10g")
+    except OSError as error:
+        raise DataError(f"{out} cannot be written: {error.strerror or error}.") from None
     return record
 
 
@@ -63,13 +61,3 @@ def record_lines(record: Measurement) -> list[str]:
 
 def _range(values: Array, unit: str) -> str:
     return f"{np.min(values):.4g} to {np.max(values):.4g} {unit}"
-
-
-def _write(out: Path, columns: dict[str, Array]) -> None:
-    import pandas as pd
-
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        pd.DataFrame(columns).to_csv(out, index=False, float_format="%.10g")
-    except OSError as error:
-        raise DataError(f"{out} cannot be written: {error.strerror or error}.") from None

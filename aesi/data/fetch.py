@@ -9,11 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from aesi.data.read import Sign, read_measurement
 from aesi.errors import DataAway, DataError
-from aesi.records import Measurement
 
 TIMEOUT_S = 30
 """Of a server that does not answer."""
@@ -49,7 +46,8 @@ def fetch(remote: Remote, folder: Path) -> Path:
             if remote.columns is None:
                 shutil.copyfile(raw, ready)
             else:
-                _write(read_measurement(raw, remote.columns, remote.sign, max_rows=None), ready)
+                record = read_measurement(raw, remote.columns, remote.sign, max_rows=None)
+                record.to_frame().to_csv(ready, index=False, float_format="%.10g")
             os.replace(ready, target)
     except DataError:
         raise
@@ -85,14 +83,3 @@ def _download(remote: Remote, folder: Path) -> Path:
             f"{remote.name} cannot be fetched from {remote.url} ({type(error).__name__}): connect to the network "
             "and try again, or set AESI_DATA to a folder that holds the data set.",
         ) from None
-
-
-def _write(measurement: Measurement, path: Path) -> None:
-    names = ["time_s", "current_a", "voltage_v"]
-    columns = [measurement.time_s, measurement.current_a, measurement.voltage_v]
-    if measurement.temperature_degc is not None:
-        names.append("temperature_degc")
-        columns.append(measurement.temperature_degc)
-    np.savetxt(
-        path, np.column_stack(columns), fmt="%.10g", delimiter=",", header=",".join(names), comments=""
-    )

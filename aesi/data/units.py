@@ -11,18 +11,26 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
+from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
+SECONDS_PER_MINUTE, SECONDS_PER_DAY = 60.0, 24.0 * SECONDS_PER_HOUR
 SI = {"time_s": "s", "current_a": "A", "voltage_v": "V", "temperature_degc": "degC"}
 FACTORS: dict[str, dict[str, float]] = {
-    "time_s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0, "h": SECONDS_PER_HOUR, "d": 86400.0},
+    "time_s": {
+        "s": 1.0,
+        "ms": 1e-3,
+        "us": 1e-6,
+        "min": SECONDS_PER_MINUTE,
+        "h": SECONDS_PER_HOUR,
+        "d": SECONDS_PER_DAY,
+    },
     "current_a": {"A": 1.0, "mA": 1e-3, "uA": 1e-6, "kA": 1e3},
     "voltage_v": {"V": 1.0, "mV": 1e-3, "uV": 1e-6},
     "temperature_degc": {"degC": 1.0, "K": 1.0, "degF": 5.0 / 9.0},
 }
-OFFSETS = {"K": -273.15, "degF": -32.0}
+OFFSETS = {"K": -ZERO_CELSIUS_K, "degF": -32.0}
 """Added before the factor."""
 CLOCK = "h:m:s"
 DATE = "date"
@@ -97,9 +105,9 @@ def clock_to_s(cells: Sequence[str]) -> Array:
         if found:
             days, hours, minutes, rest = found.groups()
             seconds[row] = (
-                86400.0 * int(days or 0)
+                SECONDS_PER_DAY * int(days or 0)
                 + SECONDS_PER_HOUR * int(hours)
-                + 60.0 * int(minutes)
+                + SECONDS_PER_MINUTE * int(minutes)
                 + float(rest.replace(",", "."))
             )
     return seconds

@@ -21,6 +21,8 @@ from aesi.errors import SimulationError
 from aesi.numerics.typing import Array, IntArray
 from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
+from aesi.physics.arguments import check_choice
+from aesi.records.checked import numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -89,9 +91,10 @@ def cross_check(
 
     time_s : (n,) s, rising.  current_a : (n,) A, discharge positive, a straight line between rows.
     soc0 : state of charge at the first row.
-    Raises SimulationError where PyBaMM ends early or loses charge.
+    Raises SimulationError where PyBaMM ends early or loses charge, InputError as `simulate` and for another model.
     """
-    time, current = np.asarray(time_s, dtype=float), np.asarray(current_a, dtype=float)
+    check_choice("model", model, PybammModel)
+    time, current = numbers(time_s, "time_s"), numbers(current_a, "current_a")
     ours = simulate(cell, time, current, soc0=soc0, model=OURS[model]).voltage_v
     bends = _bends(time, current)
     run = pybamm_run(cell.to_bpx(), cell, time[bends], current[bends], time, soc0, FINE_MESH, model)

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import lapack
 
-from aesi.errors import ParameterError
+from aesi.errors import DataError, ParameterError
 from aesi.numerics.typing import Array, IntArray
 
 
@@ -36,7 +36,17 @@ class STRidge:
             )
 
     def fit(self, theta: Array, y: Array, weights: Array | None = None) -> Array:
-        """Coefficients (m,) of the weighted problem; theta (n, m), y (n,), weights (n,) >= 0."""
+        """Coefficients (m,) of the weighted problem; theta (n, m), y (n,), weights (n,) >= 0.
+
+        Raises DataError for other shapes, and for a value that is not finite.
+        """
+        theta, y = np.asarray(theta, dtype=float), np.asarray(y, dtype=float)
+        if theta.ndim != 2 or y.shape != theta.shape[:1] or not len(y):
+            raise DataError(
+                f"theta and y have shapes {theta.shape} and {y.shape}; give (n, m) and (n,), n at least 1."
+            )
+        if not (np.isfinite(theta).all() and np.isfinite(y).all()):
+            raise DataError("theta or y holds a value that is not finite; drop such rows first.")
         augmented = np.column_stack([theta, y])
         if weights is not None:
             augmented *= np.sqrt(weights)[:, None]

@@ -67,7 +67,7 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
 
 def _page(content: dict[str, Any], out: Path, tracker: Tracker | None) -> str:
     """The finding as Prefect shows it: verdict, errors, and where the rest is."""
-    from aesi.pipeline.report.words import reason_finding
+    from aesi.pipeline.report.words.discoveries import reason_finding
 
     states = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding"}
     lines = [f"# {content['verdict']}: {', '.join(content['effects']) or 'nothing to add'}", ""]
@@ -155,9 +155,9 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
     """What came of it."""
     if tracker is None:
         return
-    from aesi.pipeline.report.moved import moved_summary
-    from aesi.pipeline.report.sizes import finding_line
-    from aesi.pipeline.report.words import reason_finding
+    from aesi.pipeline.report.words.discoveries import reason_finding
+    from aesi.pipeline.report.words.moved import moved_summary
+    from aesi.pipeline.report.words.sizes import finding_line
     from flows.tracking.view import NOTE
 
     tracker.parameters(
@@ -189,9 +189,9 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
-    from aesi.pipeline.report.moved import moved_findings
-    from aesi.pipeline.report.sizes import finding_line
-    from aesi.pipeline.report.words import name_confidence, reason_finding
+    from aesi.pipeline.report.words.discoveries import name_confidence, reason_finding
+    from aesi.pipeline.report.words.moved import moved_findings
+    from aesi.pipeline.report.words.sizes import finding_line
 
     console.say(finding_line(content) + name_confidence(content))
     for warning in content["warnings"]:
@@ -211,7 +211,7 @@ def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: P
 
 def _errors_of(content: dict[str, Any], part: str) -> str:
     """The errors of one part; that of `after` only where it is more than a refit."""
-    from aesi.pipeline.report.words import states_of
+    from aesi.pipeline.report.words.discoveries import states_of
 
     return ", ".join(
         f"{content[state][part]['rmse_mv']:.2f} mV {words}" for state, words in states_of(content).items()

@@ -117,6 +117,18 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert {path.name for path in folder.iterdir()} == {"discovery.json", "report.html", "model"}
 
 
+def test_every_key_of_a_discovery_is_explained(cell, record, monkeypatch):
+    monkeypatch.setattr(
+        "aesi.pipeline.discovery.discover.known_effects",
+        lambda files: {"series_resistance": CATALOGUE["series_resistance"]},
+    )
+    content = aesi.discover(cell, record, soc0=SOC0).content
+    page = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "files.md").read_text()
+    listed = page[page.index("key of `discovery.json`") :]
+    keys = [*content, *content["candidates"][0]]
+    assert [key for key in keys if f"`{key}`" not in listed and f"`{key}[]`" not in listed] == []
+
+
 def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
     monkeypatch.setattr(
         "aesi.pipeline.discovery.discover.known_effects",

@@ -14,7 +14,7 @@ from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
-from aesi.pipeline.report.sizes import finding_line
+from aesi.pipeline.report.words.sizes import finding_line
 
 ROW = "row.json"
 
@@ -47,24 +47,15 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
             return known
         row = _row(job, folder, settings)
     except AesiError as error:
-        return {
-            "name": job.name,
-            "specimen": job.specimen,
-            "at": job.at,
-            "status": "failed",
-            "reason": str(error),
-        }
+        return _about(job, "failed") | {"reason": str(error)}
     except OSError as error:
-        reason = f"{error.filename or 'a file'}: {error.strerror or error}"
-        return {
-            "name": job.name,
-            "specimen": job.specimen,
-            "at": job.at,
-            "status": "failed",
-            "reason": reason,
-        }
+        return _about(job, "failed") | {"reason": f"{error.filename or 'a file'}: {error.strerror or error}"}
     (folder / ROW).write_text(json.dumps({"key": key, "row": row}, indent=1) + "\n", encoding="utf-8")
     return row
+
+
+def _about(job: Job, status: str) -> dict[str, Any]:
+    return {"name": job.name, "specimen": job.specimen, "at": job.at, "status": status}
 
 
 def _known(folder: Path, key: str) -> dict[str, Any] | None:
@@ -89,11 +80,7 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         soh=job.soh,
     )
     content = write_discovery(folder, case, run_case(case, folder))
-    row: dict[str, Any] = {
-        "name": job.name,
-        "specimen": job.specimen,
-        "at": job.at,
-        "status": "done",
+    row = _about(job, "done") | {
         "verdict": content["verdict"],
         "effects": ", ".join(content["effects"]),
         "finding": finding_line(content),

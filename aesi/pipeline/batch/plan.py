@@ -60,6 +60,11 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise InputError(f"{source}: two rows are named {twice!r}; names tell the folders of results apart.")
+    outside = next((name for name in names if Path(name).name != name or name.startswith(".")), None)
+    if outside is not None:
+        raise InputError(
+            f"{source}: {outside!r} names a folder of results; give a name without slashes that starts with no dot."
+        )
     if not jobs:
         raise InputError(f"{source} holds no cell: one subfolder each with its records, or a table of them.")
     return tuple(job if job.soh is not None else replace(job, soh=soh) for job in jobs)
@@ -67,7 +72,7 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
 
 def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
     jobs = []
-    for each in sorted(path for path in folder.iterdir() if path.is_dir()):
+    for each in sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith(".")):
         data = tuple(sorted(p for p in each.iterdir() if p.suffix.lower() in RECORDS))
         if data:
             jobs.append(Job(each.name, _cell_in(each, cell), data))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from aesi.data.read import read
 from aesi.data.virtual import DEFAULT_MIX
-from aesi.errors import ConfigError
+from aesi.errors import ConfigError, did_you_mean
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
@@ -46,6 +46,26 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     for role in ("train", "valid"):
         check_distinct([records[name][0] for name in roles[role]], test)
     return Sources(records, roles)
+
+
+def check_there(config: ExperimentConfig) -> None:
+    """Raises ConfigError for a file of one's own that the experiment names and that is not there, with the nearest:
+    what can be known before anything is started."""
+    named = {} if config.cell.bpx == "catalogue" or config.fallback else {"cell": config.cell.bpx}
+    if config.data.kind == "files":
+        listed = (
+            (config.data.record,)
+            if config.data.record
+            else tuple(n for r in ROLES for n in getattr(config.data, r))
+        )
+        named |= {f"data: {name}": name for name in listed}
+    for what, name in named.items():
+        path = config.path(name)
+        if not path.exists():
+            beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
+            raise ConfigError(
+                f"{config.name}: {what}: there is no file {path}{did_you_mean(path.name, beside)}"
+            )
 
 
 def discovery_records(

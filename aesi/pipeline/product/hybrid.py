@@ -140,6 +140,11 @@ class HybridModel:
         """The record at the correction's step, or itself where that is nothing to do."""
         if self.correction is None or is_even(record.time_s, self.dt_s):
             return record
+        if len(record) > 1 and record.time_s[-1] - record.time_s[0] < self.dt_s:
+            raise DataError(
+                f"{record.name} lasts {record.time_s[-1] - record.time_s[0]:g} s, and the correction steps by "
+                f"{self.dt_s:g} s; give a longer one."
+            )
         return to_even(record, self.dt_s)
 
     def _series(self, record: Measurement, soc0: float) -> ErrorSeries:

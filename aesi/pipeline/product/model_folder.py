@@ -25,8 +25,16 @@ ARRAY_KEY = "array:"
 
 
 def write_model(folder: Path, head: Mapping[str, Any], parts: Mapping[str, Any]) -> None:
-    """Write the parts (JSON values and numpy arrays, nested) and the head to a folder, made where missing."""
-    folder.mkdir(parents=True, exist_ok=True)
+    """Write the parts (JSON values and numpy arrays, nested) and the head to a folder, made where missing.
+
+    Raises InputError where it is a file, or below one.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError):
+        raise InputError(
+            f"{folder} cannot be a folder: a file of that name is there; name another."
+        ) from None
     arrays: dict[str, Array] = {}
     for name, content in parts.items():
         _write_json(part_file(folder, name), _without_arrays(content, name, arrays))
@@ -39,7 +47,9 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
     Raises InputError naming the file that is missing or not as it was written.
     """
-    head = _read_json(folder / HEAD, "a model folder is written by `aesi run` or `aesi discover`")
+    head = _read_json(
+        folder / HEAD, f"a model folder is written by `aesi run` or `aesi discover`{_below(folder)}"
+    )
     schema = head.get("schema") if isinstance(head, dict) else None
     if schema != SCHEMA:
         raise InputError(f"{folder / HEAD} has schema {schema!r}; this version reads {SCHEMA!r}.")
@@ -50,6 +60,13 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         }
     except (KeyError, TypeError) as error:
         raise InputError(f"{folder} is not a whole model: {error} is missing; save it again.") from None
+
+
+def _below(folder: Path) -> str:
+    """The newest model in a folder of runs, as a question, where somebody named that instead."""
+    heads = [head for pattern in ("model", "*/model") for head in folder.glob(f"{pattern}/{HEAD}")]
+    newest = max(heads, key=lambda head: head.stat().st_mtime, default=None)
+    return "." if newest is None else f"; did you mean {newest.parent}?"
 
 
 def part_file(folder: Path, name: str) -> Path:
@@ -84,13 +101,13 @@ def _write_json(path: Path, content: Any) -> None:
     path.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
 
 
-def _read_json(path: Path, hint: str = "save the model again") -> Any:
+def _read_json(path: Path, hint: str = "save the model again.") -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
-        raise InputError(f"{path} does not exist; {hint}.") from None
+        raise InputError(f"{path} does not exist; {hint}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read ({error}); {hint}.") from None
+        raise InputError(f"{path} cannot be read ({error}); {hint}") from None
 
 
 def _read_arrays(path: Path) -> dict[str, Array]:

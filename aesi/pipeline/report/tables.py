@@ -23,12 +23,14 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 
+from aesi.conformal.scores import MIN_BIN_SAMPLES
 from aesi.constants import MV_PER_V
 from aesi.pipeline.report.table_formats import ABSENT, Table, to_csv, to_latex, to_markdown
 from aesi.pipeline.report.views import Row
 
 TableFormat = Literal["md", "tex", "csv"]
 OWN_METHOD = "as in Table 2"
+WORST_BIN = f"Worst bin: the lowest coverage in a (current, SOC) bin of more than {MIN_BIN_SAMPLES} samples."
 
 
 def free_run_table(models: Sequence[Row]) -> Table:
@@ -46,8 +48,8 @@ def free_run_table(models: Sequence[Row]) -> Table:
     physics = next((row["name"] for row in models if row["name"] in ("ESPM", "DFN")), "physics")
     caption = (
         f"Table 1. Mean squared error reduction (MSER) of the voltage against the declared {physics}, and on the test "
-        f"set against the {physics} recalibrated on the training set. Regime: free run, the error estimate feeds back "
-        "on itself and no measured voltage is used after the first sample."
+        f"set against the {physics} recalibrated on the training set. Regime: free run, no measured voltage "
+        "is used after the first sample."
     )
     if any(row.get("validation_mser_pct") is not None for row in models):
         caption += " Drives that chose nothing: each training drive by physics and a model that never saw it."
@@ -58,8 +60,8 @@ def interval_table(models: Sequence[Row]) -> Table:
     """Table 2: prediction intervals one step ahead."""
     caption = (
         "Table 2. Prediction intervals on the test set. Regime: one step ahead, the measured voltage of the "
-        "step before is given. Worst bin: the lowest coverage in any (current, SOC) bin. Low minutes: minute-long "
-        "windows with under 70 % coverage. Winkler score: width plus the penalty for misses; lower is better."
+        f"step before is given. {WORST_BIN} Low minutes: minute-long windows with under 70 % coverage. Winkler score: "
+        "width plus the penalty for misses; lower is better."
     )
     rows = _having(models, "intervals")
     return _table("intervals", caption + _brackets(models), _interval_columns("intervals"), rows)
@@ -92,10 +94,10 @@ def free_run_band_table(models: Sequence[Row]) -> Table:
     ]
     caption = (
         "Prediction bands on the test set. Regime: the measured voltage is given once, the stated time before "
-        "the sample that is predicted, and not again; whole drive: a free run from the first sample. Worst bin: the "
-        "lowest coverage in any (current, SOC) bin. Inside: of the samples within the trained range of inputs; outside "
-        "of it the band is wider by how far the model would go on, which is not calibrated. Pieces: how many "
-        "calibrated the band, and the lowest coverage among them when each is left out; one drive may scatter as far."
+        f"the sample that is predicted, and not again; whole drive: a free run from the first sample. {WORST_BIN} "
+        "Inside: of the samples within the trained range of inputs; outside of it the band is wider by how far the "
+        "model would go on, which is not calibrated. Pieces: how many calibrated the band, and the lowest coverage "
+        "among them when each is left out; one drive may scatter as far."
     )
     columns = [
         *_interval_columns("bands"),

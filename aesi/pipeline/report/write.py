@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from aesi.pipeline.report import sections, tables, words
+from aesi.pipeline.report import sections, tables
 from aesi.pipeline.report.figures import paper_figures, predicted_models
-from aesi.pipeline.report.moved import moved_findings, moved_value, parameter_words
 from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.plots import hypotheses, maps, records
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, Row, RunView
+from aesi.pipeline.report.words import discoveries, runs
+from aesi.pipeline.report.words.moved import moved_findings, moved_value, parameter_words
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -36,15 +37,15 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         view=view,
         chosen=chosen,
         physics=view.model(view.physics) or {"name": view.physics},
-        finding=words.run_finding(view),
+        finding=runs.run_finding(view),
         sentences=[
             sentence
             for sentence in (
-                words.corrected_finding(view),
-                words.others_finding(view),
-                words.persistence_finding(chosen),
-                words.interval_finding(chosen),
-                words.outside_finding(chosen),
+                runs.corrected_finding(view),
+                runs.others_finding(view),
+                runs.persistence_finding(chosen),
+                runs.interval_finding(chosen),
+                runs.outside_finding(chosen),
             )
             if sentence
         ],
@@ -63,20 +64,20 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         title=f"{view.title}: what the model of {view.cell} lacks",
         view=view,
         discovery=view.discovery,
-        states=words.states_of(view.discovery),
-        finding=words.discovery_finding(view),
+        states=discoveries.states_of(view.discovery),
+        finding=discoveries.discovery_finding(view),
         sentences=[
             sentence
             for sentence in (
-                words.look_alike_finding(view),
-                words.discovery_consequence(view),
+                discoveries.look_alike_finding(view),
+                discoveries.discovery_consequence(view),
                 *moved_findings(view.discovery),
-                words.reason_finding(view.discovery),
-                words.span_finding(view),
+                discoveries.reason_finding(view.discovery),
+                discoveries.span_finding(view),
             )
             if sentence
         ],
-        rest=words.rest_finding(view.discovery),
+        rest=discoveries.rest_finding(view.discovery),
         moved=_moved_rows(view.discovery),
         candidates=[
             row | {"title": hypotheses.hypothesis_title(row, view.titles)}
@@ -89,7 +90,7 @@ def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:
     """A row a declared parameter: what it is, and where the refit and, with a finding, the fit with it put it."""
     own = discovery.get("own_parameters", {})
     rows: dict[str, dict[str, str]] = {}
-    for state in words.states_of(discovery):
+    for state in discoveries.states_of(discovery):
         for row in own.get(state, ()):
             where = f"{moved_value(row)}{', at its limit' if row['at_limit'] else ''}"
             rows.setdefault(parameter_words(row), {})[state] = f"{where} ({row['deviations']:+.1f})"
@@ -99,7 +100,7 @@ def _moved_rows(discovery: Mapping[str, Any]) -> list[Row]:
 def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
     """All figures of a discovery, by name."""
     figures: dict[str, Figure] = {}
-    states = words.states_of(view.discovery)
+    states = discoveries.states_of(view.discovery)
     tested = view.of("test") or view.of("fit")
     for part in ("test", "fit"):
         if view.of(part):

@@ -87,6 +87,10 @@ class Library:
         """
         if not 0 <= p_c <= MAX_ORDER or d < 0:
             raise InputError(f"p_c = {p_c} must lie in 0 to {MAX_ORDER}, and d = {d} must not be negative.")
+        if isinstance(inputs, str):
+            raise InputError(
+                f"the inputs are the text {inputs!r}; give their names as a list, as in [{inputs!r}]."
+            )
         names = (ERROR, *inputs)
         if len(set(names)) != len(names):
             raise InputError(f"the inputs {', '.join(inputs)} repeat a name, or use {ERROR!r} itself.")

@@ -96,9 +96,19 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
     scale = np.log if log else float
     reach = max(scale(high) - scale(centre), scale(centre) - scale(low))
     return FreeParameter(
-        effect, name, p.unit, low, high, log, centre, _expected(p, capacity_ah) or float(reach) / 2.0, False,
-        p.neutral is not None, p.default, p.low_is_limit,
-    )  # fmt: skip
+        owner=effect,
+        name=name,
+        unit=p.unit,
+        low=low,
+        high=high,
+        log=log,
+        centre=centre,
+        sd=_expected(p, capacity_ah) or float(reach) / 2.0,  # the ends of its range are two deviations off
+        own=False,
+        amplitude=p.neutral is not None,
+        typical=p.default,
+        low_is_limit=p.low_is_limit,
+    )
 
 
 def _expected(p: Parameter, capacity_ah: float) -> float | None:
@@ -121,13 +131,25 @@ def own(effect: str, name: str, p: Parameter, sd: float) -> FreeParameter:
     reach = FURTHEST_SDS * sd
     low, high = (centre * np.exp(-reach), centre * np.exp(reach)) if log else (centre - reach, centre + reach)
     low, high = max(float(low), p.bounds[0]), min(float(high), p.bounds[1])
-    return FreeParameter(effect, name, p.unit, low, high, log, centre, sd, True)
+    return FreeParameter(
+        owner=effect, name=name, unit=p.unit, low=low, high=high, log=log, centre=centre, sd=sd, own=True
+    )
 
 
 def state_of_charge(record: int, soc0: float, sd: float) -> FreeParameter:
     """Initial state of charge of a record, known to `sd`."""
-    reach = FURTHEST_SDS * sd
-    return FreeParameter(STATE_OF_CHARGE, str(record), "1", soc0 - reach, soc0 + reach, False, soc0, sd, True)
+    low, high = soc0 - FURTHEST_SDS * sd, soc0 + FURTHEST_SDS * sd
+    return FreeParameter(
+        owner=STATE_OF_CHARGE,
+        name=str(record),
+        unit="1",
+        low=low,
+        high=high,
+        log=False,
+        centre=soc0,
+        sd=sd,
+        own=True,
+    )
 
 
 def values_of(free: Sequence[FreeParameter], x: Array) -> dict[str, dict[str, float]]:

@@ -29,6 +29,7 @@ def test_a_folder_is_one_cell_a_subfolder(tmp_path):
     own = touched(tmp_path / "b" / "b.bpx.json")
     touched(tmp_path / "b" / "1.mpt")
     touched(tmp_path / "notes" / "readme.md")
+    touched(tmp_path / ".aesi" / "kept.csv")
     jobs = read_plan(tmp_path, CELL)
     assert [(job.name, job.cell, len(job.data)) for job in jobs] == [("a", CELL, 2), ("b", own, 1)]
     with pytest.raises(InputError, match="--cell"):
@@ -68,6 +69,8 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
         ("name,data\na,s.csv\na,s.csv\n", "named 'a'"),
         ("name,data,at\na,s.csv,old\n", "is no number"),
         ("name,data\n,s.csv\n", "have to be given"),
+        ("name,data\n../a,s.csv\n", "without slashes"),
+        ("name,data\n..,s.csv\n", "starts with no dot"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_one_sentence(tmp_path, content, words):

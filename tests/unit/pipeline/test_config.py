@@ -1,5 +1,6 @@
 """Experiments: what passes, and the one sentence that what does not pass gets."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from aesi.errors import ConfigError
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment, read_experiment
 from aesi.pipeline.experiment.load import load
+from aesi.pipeline.experiment.sources import check_there
 
 ROOT = Path(__file__).resolve().parents[3]
 CONTENT = {"name": "x", "data": {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}}
@@ -165,3 +167,20 @@ def test_an_experiment_that_only_closes_the_loop_needs_no_roles():
     config = parse_experiment(content)
     with pytest.raises(ConfigError, match="for `aesi discover` alone"):
         load(config)
+
+
+def test_a_file_that_is_not_there_is_named_with_the_nearest(tmp_path):
+    (tmp_path / "train.csv").write_text("")
+    (tmp_path / "cell.bpx.json").write_text("")
+    data = {"kind": "files", "train": ["trian.csv"], "test": ["train.csv"]}
+    content = {"name": "own", "data": data, "cell": {"bpx": "cell.bpx.json"}}
+    path = tmp_path / "own.yaml"
+    for changes, words in (
+        ({}, "own: data: trian.csv: there is no file .*trian.csv; did you mean 'train.csv'"),
+        ({"cell": {"bpx": "sell.bpx.json"}}, "own: cell: there is no file .*did you mean 'cell.bpx.json'"),
+    ):
+        path.write_text(json.dumps(content | changes))
+        with pytest.raises(ConfigError, match=words):
+            check_there(read_experiment(path, []))
+    path.write_text(json.dumps(content | {"data": data | {"train": ["cell.bpx.json"]}}))
+    check_there(read_experiment(path, []))

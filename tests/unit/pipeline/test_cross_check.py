@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import aesi
-from aesi.errors import SimulationError
-from aesi.pipeline.cross_check import _bends
+from aesi.errors import InputError, SimulationError
+from aesi.pipeline.cross_check import _bends, cross_check
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
@@ -42,3 +42,8 @@ def test_the_current_is_told_where_it_bends():
     time = np.array([0.0, 1.0, 2.0, 4.0, 5.0, 6.0, 7.0])
     current = np.array([0.0, 1.0, 2.0, 4.0, 4.0, 4.0, 1.0])
     assert _bends(time, current).tolist() == [0, 3, 5, 6]
+
+
+def test_another_model_is_refused(cell):
+    with pytest.raises(InputError, match="model = 'dfn' is not known; give 'SPMe' or 'DFN'"):
+        cross_check(cell, [0.0, 1.0], [0.0, 1.0], 0.5, model="dfn")

@@ -139,3 +139,24 @@ def test_a_profile_alone_was_said_to_start_as_given(model, data, tmp_path):
     folder, said = model.save(tmp_path / "model"), []
     predict_file(folder, tmp_path / "profile.csv", tmp_path / "out.csv", say_notes=said.extend)
     assert f"profile starts at the saved model's state of charge of {SOC0:g}; --soc0 takes another." in said
+
+
+def test_a_folder_of_runs_is_asked_about_its_newest_model(model, tmp_path):
+    written = model.save(tmp_path / "runs" / "a" / "model")
+    for named in (tmp_path / "runs", tmp_path / "runs" / "a"):
+        with pytest.raises(InputError, match=f"does not exist; .*; did you mean {written}\\?"):
+            HybridModel.load(named)
+    with pytest.raises(InputError, match=r"written by `aesi run` or `aesi discover`\.$"):
+        HybridModel.load(tmp_path)
+
+
+def test_a_file_in_the_place_of_a_model_is_not_written_over(model, tmp_path):
+    (tmp_path / "there").write_text("kept")
+    for place in (tmp_path / "there", tmp_path / "there" / "below"):
+        with pytest.raises(InputError, match="a file of that name is there"):
+            model.save(place)
+
+
+def test_a_record_shorter_than_a_step_of_the_correction_is_refused(model):
+    with pytest.raises(DataError, match=r"lasts 0.5 s, and the correction steps by 1 s"):
+        model.predict([0.0, 0.25, 0.5], [0.0, 1.0, 1.0], SOC0)

@@ -1,7 +1,7 @@
 """What a refit moved, beside the verdict."""
 
-from aesi.pipeline.report.moved import moved_findings, moved_summary, parameter_words
-from aesi.pipeline.report.sizes import refit_does_as_well
+from aesi.pipeline.report.words.moved import moved_findings, moved_summary, parameter_words
+from aesi.pipeline.report.words.sizes import refit_does_as_well
 
 
 def row(parameter, value, deviations, at_limit=False, effect="solid_diffusivity"):

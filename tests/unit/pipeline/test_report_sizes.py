@@ -2,7 +2,7 @@
 
 import pytest
 
-from aesi.pipeline.report.sizes import finding_line, quantity, with_size
+from aesi.pipeline.report.words.sizes import finding_line, quantity, with_size
 
 
 def value(middle, low, high, unit):

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.pipeline.report import words
+from aesi.pipeline.report.words import discoveries, runs
 
 
 def test_a_gain_is_told_with_both_errors_and_the_regime(views):
-    text = words.run_finding(views.run_view(200))
+    text = runs.run_finding(views.run_view(200))
     assert "13.2 mV to 4.1 mV" in text
     assert "without any measured voltage" in text
 
@@ -17,7 +17,7 @@ def test_a_gain_is_told_with_both_errors_and_the_regime(views):
 def test_a_harmful_correction_is_called_harmful(views):
     view = views.run_view(200)
     worse = {"name": view.chosen, "free_run": {"test_mser_pct": -42.0, "test_rmse_mv": 15.7}}
-    text = words.run_finding(replace(view, models=(view.models[0], worse)))
+    text = runs.run_finding(replace(view, models=(view.models[0], worse)))
     assert "does not help" in text
     assert "13.2 mV to 15.7 mV" in text
 
@@ -26,15 +26,25 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     view = views.run_view(200)
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}
     learned = replace(view, models=(*view.models, row), corrected="ESPM recalibrated")
-    assert words.corrected_finding(learned) == (
+    assert runs.corrected_finding(learned) == (
         "The ESPM recalibrated alone errs by 3.9 mV there: the correction does not help beyond it."
     )
     better = replace(learned, models=(*view.models, {**row, "free_run": {"test_rmse_mv": 9.0}}))
-    assert "takes it to 4.1 mV" in words.corrected_finding(better)
-    assert words.corrected_finding(view) == ""
+    assert "takes it to 4.1 mV, 79.2 % less mean squared error than that" in runs.corrected_finding(better)
+    assert runs.corrected_finding(view) == ""
     figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
     refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))
-    assert "errs by 2.0 mV there: recalibrate it first" in words.corrected_finding(refit_does)
+    assert "errs by 2.0 mV there: recalibrate it first" in runs.corrected_finding(refit_does)
+
+
+def test_errors_that_are_told_apart_late_have_more_digits(views):
+    view = views.run_view(200)
+    row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 4.13}}
+    models = (view.models[0], {**view.models[1], "free_run": {"test_rmse_mv": 4.12}}, row)
+    assert runs.corrected_finding(replace(view, models=models, corrected="ESPM recalibrated")) == (
+        "The ESPM recalibrated alone errs by 4.13 mV there; the correction takes it to 4.12 mV, 0.5 % less mean "
+        "squared error than that."
+    )
 
 
 def test_other_corrections_that_do_better_are_told(views):
@@ -42,10 +52,10 @@ def test_other_corrections_that_do_better_are_told(views):
     names = {"ESPM + AESI I": 4.1, "ESPM + ridge": 3.9, "ESPM + constant": 3.2, "ESPM + boosting": 5.0}
     rows = [{"name": name, "free_run": {"test_rmse_mv": error}} for name, error in names.items()]
     physics = [{"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 1.0}}]
-    assert words.others_finding(replace(view, models=(view.models[0], *rows, *physics))) == (
+    assert runs.others_finding(replace(view, models=(view.models[0], *rows, *physics))) == (
         "2 of 3 other corrections learnt on the same records err less there, ESPM + constant least: 3.2 mV."
     )
-    assert words.others_finding(replace(view, models=(view.models[0], rows[0], rows[3]))) == ""
+    assert runs.others_finding(replace(view, models=(view.models[0], rows[0], rows[3]))) == ""
 
 
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
@@ -54,28 +64,28 @@ def test_a_model_that_diverged_has_no_figures_to_tell(views, figures):
     broken = replace(
         view, models=(view.models[0], {"name": view.chosen, "intervals": {"coverage_pct": None}, **figures})
     )
-    assert "could be evaluated" in words.run_finding(broken)
-    assert words.interval_finding(broken.models[1]) == ""
+    assert "could be evaluated" in runs.run_finding(broken)
+    assert runs.interval_finding(broken.models[1]) == ""
 
 
 def test_extrapolation_is_told_where_there_is_any():
-    assert "12.5 % of the test samples" in words.outside_finding({"free_run": {"outside_pct": 12.5}})
-    assert words.outside_finding({"free_run": {"outside_pct": 0.0}}) == ""
+    assert "12.5 % of the test samples" in runs.outside_finding({"free_run": {"outside_pct": 12.5}})
+    assert runs.outside_finding({"free_run": {"outside_pct": 0.0}}) == ""
 
 
 def test_choosing_no_correction_is_said_plainly(views):
-    text = words.run_finding(replace(views.run_view(200), chosen="ESPM"))
+    text = runs.run_finding(replace(views.run_view(200), chosen="ESPM"))
     assert text.startswith("No correction")
 
 
 def test_one_step_that_loses_to_persistence_is_said_to_lose():
-    assert "no better than" in words.persistence_finding(
+    assert "no better than" in runs.persistence_finding(
         {"one_step": {"test_rmse_mv": 4.5, "persistence_rmse_mv": 4.03}}
     )
-    assert ", better than" in words.persistence_finding(
+    assert ", better than" in runs.persistence_finding(
         {"one_step": {"test_rmse_mv": 3.5, "persistence_rmse_mv": 4.03}}
     )
-    assert words.persistence_finding({}) == ""
+    assert runs.persistence_finding({}) == ""
 
 
 @pytest.mark.parametrize(
@@ -87,7 +97,7 @@ def test_one_step_that_loses_to_persistence_is_said_to_lose():
     ],
 )
 def test_each_verdict_has_its_sentence(views, verdict, phrase):
-    text = words.discovery_finding(views.discovery_view(200, verdict=verdict))
+    text = discoveries.discovery_finding(views.discovery_view(200, verdict=verdict))
     assert phrase in text
     assert ("97 % confidence" in text) == (verdict == "found")  # it belongs to a name
 
@@ -103,13 +113,13 @@ def test_a_wrong_parameter_and_a_fault_are_not_called_missing_physics(views, eff
     view = views.discovery_view(200)
     rows = [{"effect": effect, "kind": kind, "score": 1.0}]
     found = replace(view, discovery={**view.discovery, "effects": [effect], "candidates": rows})
-    assert words.discovery_finding(found).startswith(phrase)
+    assert discoveries.discovery_finding(found).startswith(phrase)
 
 
 def test_the_cell_is_named_once(views):
     view = views.discovery_view(200)
     found = replace(view, discovery={**view.discovery, "effects": ["self_heating", "ambient_temperature"]})
-    text = words.discovery_finding(found)
+    text = discoveries.discovery_finding(found)
     assert "self-heating; its ambient temperature (1.25 mohm [1.10, 1.40]) is not as declared" in text
     assert text.count(view.cell) == 1
 
@@ -117,13 +127,13 @@ def test_the_cell_is_named_once(views):
 def test_a_partial_find_says_that_something_is_left(views):
     view = views.discovery_view(200, verdict="unknown")
     partial = replace(view, discovery={**view.discovery, "effects": ["self_heating"]})
-    text = words.discovery_finding(partial)
+    text = discoveries.discovery_finding(partial)
     assert "self-heating" in text
     assert "something real is left" in text
 
 
 def test_the_refit_stands_apart_from_the_finding(views):
-    text = words.discovery_consequence(views.discovery_view(200))
+    text = discoveries.discovery_consequence(views.discovery_view(200))
     assert [text.index(v) for v in ("9.4 mV", "6.2 mV", "1.1 mV")] == sorted(
         text.index(v) for v in ("9.4 mV", "6.2 mV", "1.1 mV")
     )
@@ -131,9 +141,9 @@ def test_the_refit_stands_apart_from_the_finding(views):
 
 def test_a_refit_that_does_as_well_is_said_to(views):
     view = views.discovery_view(200)
-    assert "refit" not in words.discovery_consequence(view).split(";")[1]
+    assert "refit" not in discoveries.discovery_consequence(view).split(";")[1]
     same = {**view.discovery, "recalibrated": {"test": {"rmse_mv": 1.1}}}
-    text = words.discovery_finding(replace(view, discovery=same))
+    text = discoveries.discovery_finding(replace(view, discovery=same))
     assert text.startswith("One of two explanations: the declared model")
     assert "a refit of them does as well" in text
 
@@ -150,49 +160,49 @@ def test_a_refit_that_does_as_well_is_said_to(views):
     ],
 )
 def test_the_verdict_says_what_it_rests_on(views, verdict, phrases):
-    text = words.reason_finding(views.discovery_view(200, verdict=verdict).discovery)
+    text = discoveries.reason_finding(views.discovery_view(200, verdict=verdict).discovery)
     assert [phrase for phrase in phrases if phrase not in text] == []
 
 
 def test_a_rest_that_several_hypotheses_explain_names_the_best(views):
     discovery = {**views.discovery_view(200, verdict="unknown").discovery, "structured_mv": 0.3}
-    assert words.reason_finding(discovery) == "Why: as the tracer words it."
+    assert discoveries.reason_finding(discovery) == "Why: as the tracer words it."
 
 
 def test_a_rest_that_follows_nothing_is_not_called_little(views):
     unknown = views.discovery_view(200, verdict="unknown").discovery
-    assert "follows none of the model's variables" in words.rest_finding(unknown)
-    assert "much structure" in words.rest_finding({**unknown, "explainable_mv": 0.9})
-    assert "little structure" in words.rest_finding(views.discovery_view(200).discovery)
+    assert "follows none of the model's variables" in discoveries.rest_finding(unknown)
+    assert "much structure" in discoveries.rest_finding({**unknown, "explainable_mv": 0.9})
+    assert "little structure" in discoveries.rest_finding(views.discovery_view(200).discovery)
 
 
 def test_no_verdict_is_called_certain():
     found = {"verdict": "found", "effects": ["self_heating"]}
-    assert words.name_confidence({**found, "confidence": 1.0}) == " (over 99 % confidence in this name)"
-    assert words.name_confidence({**found, "confidence": 0.97}) == " (97 % confidence in this name)"
-    assert words.name_confidence({"verdict": "unknown", "effects": [], "confidence": 0.99}) == ""
+    assert discoveries.name_confidence({**found, "confidence": 1.0}) == " (over 99 % confidence in this name)"
+    assert discoveries.name_confidence({**found, "confidence": 0.97}) == " (97 % confidence in this name)"
+    assert discoveries.name_confidence({"verdict": "unknown", "effects": [], "confidence": 0.99}) == ""
 
 
 def test_the_range_that_the_data_cover_is_told(views):
     view = views.discovery_view(3601)
     t = view.traces[0]
     soc, current_a = np.linspace(0.9, 0.2, 3601), np.linspace(-5.0, 12.5, 3601)
-    text = words.span_finding(replace(view, traces=(replace(t, soc=soc, current_a=current_a),)))
+    text = discoveries.span_finding(replace(view, traces=(replace(t, soc=soc, current_a=current_a),)))
     assert "span 1.0 h, 20 to 90 % state of charge" in text
     assert "from -5 to 12.5 A" in text
-    assert words.span_finding(replace(view, traces=())) == ""
+    assert discoveries.span_finding(replace(view, traces=())) == ""
 
 
 def test_look_alikes_stand_next_to_the_verdict(views):
-    text = words.look_alike_finding(views.discovery_view(200))
+    text = discoveries.look_alike_finding(views.discovery_view(200))
     assert text == "These data cannot tell self-heating from ambient temperature."
-    assert words.look_alike_finding(views.discovery_view(200, verdict="none")) == ""
+    assert discoveries.look_alike_finding(views.discovery_view(200, verdict="none")) == ""
 
 
 def test_lists_read_as_english():
-    assert words.listed(["a"]) == "a"
-    assert words.listed(["a", "b"]) == "a and b"
-    assert words.listed(["a", "b", "c"]) == "a, b and c"
+    assert discoveries.listed(["a"]) == "a"
+    assert discoveries.listed(["a", "b"]) == "a and b"
+    assert discoveries.listed(["a", "b", "c"]) == "a, b and c"
 
 
 @pytest.mark.parametrize(
@@ -206,6 +216,6 @@ def test_lists_read_as_english():
     ],
 )
 def test_an_error_is_said_to_be_with_the_finding_only_where_that_is_what_is_written(effects, written, after):
-    shown = words.states_of({"effects": effects, "written": written})
+    shown = discoveries.states_of({"effects": effects, "written": written})
     assert shown.get("after") == after
     assert list(shown)[:2] == ["before", "recalibrated"]

@@ -99,3 +99,8 @@ def test_terms_go_on_along_the_slope_of_each_function():
     single = [len(term.factors) < 2 for term in library.terms]
     np.testing.assert_allclose(gone[single], tangent[single], atol=1e-6)
     np.testing.assert_allclose(gone[library.names.index("T1(e)*T1(I)")], (at + on).prod(axis=1))
+
+
+def test_inputs_that_are_one_text_are_refused():
+    with pytest.raises(InputError, match=r"give their names as a list, as in \['c_sp'\]"):
+        Library.build("c_sp")

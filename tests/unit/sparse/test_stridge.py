@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from aesi.errors import ParameterError
+from aesi.errors import DataError, ParameterError
 from aesi.sparse import STRidge
 from aesi.sparse.stridge import triangle
 
@@ -53,3 +53,17 @@ def test_fewer_rows_than_terms_is_solved_by_the_ridge(rng):
 def test_inadmissible_settings_are_named(lambda1, lambda2, times):
     with pytest.raises(ParameterError, match="must not be negative"):
         STRidge(lambda1, lambda2, times)
+
+
+@pytest.mark.parametrize(
+    ("theta", "y", "words"),
+    [
+        (np.ones((4, 2)), np.ones(3), r"shapes \(4, 2\) and \(3,\)"),
+        (np.ones(4), np.ones(4), r"shapes \(4,\) and \(4,\)"),
+        (np.ones((0, 2)), np.ones(0), "n at least 1"),
+        (np.array([[1.0], [np.nan]]), np.ones(2), "not finite"),
+    ],
+)
+def test_what_no_problem_can_be_posed_with_is_refused(theta, y, words):
+    with pytest.raises(DataError, match=words):
+        STRidge(1e-3, 1e-2).fit(theta, y)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from aesi.pipeline.report.sizes import TELLING, rounded
 from aesi.pipeline.report.views import Row
-from aesi.pipeline.report.words import WITH_FINDING, states_of
+from aesi.pipeline.report.words.discoveries import WITH_FINDING, states_of
+from aesi.pipeline.report.words.sizes import TELLING, rounded
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""

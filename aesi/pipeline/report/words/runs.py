@@ -1,0 +1,138 @@
+"""The finding of an experiment's run in plain words, from the numbers alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.pipeline.report.views import Row, RunView
+
+NEARLY = 0.98
+"""A one-step error above this share of persistence's is called no better than it."""
+MOST_DIGITS = 3
+"""Behind the point, of an error in mV."""
+
+
+def run_finding(view: RunView) -> str:
+    """What the correction buys on the test records in free run, and what the one-step figure is worth."""
+    model, physics = view.model(view.chosen), view.model(view.physics)
+    before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (physics, model))
+    reduction = _figure(model, "free_run", "test_mser_pct")
+    if before is None or after is None or reduction is None:
+        return f"No model of the voltage error could be evaluated in free run on {view.cell}."
+    if view.chosen == view.physics:
+        return (
+            f"No correction of the voltage error was chosen: the {view.physics} alone errs by {before:.1f} "
+            "mV RMSE on the test records."
+        )
+    first, last = _told(before, after)
+    if reduction <= 0:
+        return (
+            "The data-driven correction does not help here: in free run on the test records the error "
+            f"grows from {first} mV to {last} mV. Use the {view.physics} alone."
+        )
+    return (
+        f"On test records that chose nothing, run without any measured voltage, {view.chosen} takes the "
+        f"voltage error from {first} mV to {last} mV RMSE: {reduction:.1f} % less mean squared "
+        f"error than the {view.physics} alone."
+    )
+
+
+def corrected_finding(view: RunView) -> str:
+    """What the correction brings beyond the physics that it was learned on, in words; where that is as declared, only
+    that a mere refit of its parameters would have done better."""
+    corrected, model = view.model(view.corrected), view.model(view.chosen)
+    before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (corrected, model))
+    if before is None or after is None:
+        return ""
+    if view.corrected in (view.physics, view.chosen):
+        beyond = _figure(model, "free_run", "test_mser_recalibrated_pct")
+        if view.corrected == view.chosen or beyond is None or beyond >= 0.0:
+            return ""
+        refitted = after / np.sqrt(1.0 - beyond / 100.0)
+        return (
+            f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
+            f"{refitted:.1f} mV there: recalibrate it first (cell.start: recalibrated)."
+        )
+    if after < before:
+        first, last = _told(before, after)
+        return (
+            f"The {view.corrected} alone errs by {first} mV there; the correction takes it to {last} mV, "
+            f"{100.0 * (1.0 - (after / before) ** 2):.1f} % less mean squared error than that."
+        )
+    return (
+        f"The {view.corrected} alone errs by {before:.1f} mV there: the correction does not help beyond it."
+    )
+
+
+def others_finding(view: RunView) -> str:
+    """Which other corrections do better on the test records, in words; '' where none does."""
+    ours = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    physics = (view.physics, view.corrected)
+    left = {
+        row["name"]: _figure(row, "free_run", "test_rmse_mv")
+        for row in view.models
+        if row["name"] != view.chosen and row["name"].startswith(tuple(f"{name} + " for name in physics))
+    }
+    better = {name: error for name, error in left.items() if error is not None and ours and error < ours}
+    if not better or ours is None:
+        return ""
+    best = min(better, key=lambda name: better[name])
+    verb = "errs" if len(better) == 1 else "err"
+    return (
+        f"{len(better)} of {len(left)} other corrections learnt on the same records {verb} less there, "
+        f"{best} least: {_told(better[best], ours)[0]} mV."
+    )
+
+
+def persistence_finding(model: Row) -> str:
+    """One step ahead against persistence, in words."""
+    ours, echo = (_figure(model, "one_step", key) for key in ("test_rmse_mv", "persistence_rmse_mv"))
+    if ours is None or echo is None:
+        return ""
+    verdict = "better than" if ours < NEARLY * echo else "no better than"
+    return (
+        f"One step ahead, with the measured voltage given, it errs by {ours:.2f} mV, {verdict} repeating "
+        f"the last error (persistence, {echo:.2f} mV): one-step figures flatter, the free run is the "
+        "figure that counts."
+    )
+
+
+def outside_finding(model: Row) -> str:
+    """How much of the test data the model was not trained for, in words."""
+    share = _figure(model, "free_run", "outside_pct")
+    if not share:
+        return ""
+    return (
+        f"{share:.1f} % of the test samples lie outside the range the correction was trained on; its inputs are "
+        "held at the edge there. Its bands in free run are wider there by what it would add if it went on beyond the "
+        "edge; no data has calibrated that."
+    )
+
+
+def interval_finding(model: Row) -> str:
+    """Coverage against the nominal level, in words."""
+    keys = ("nominal_pct", "coverage_pct", "average_width_v", "worst_bin_coverage_pct")
+    nominal, coverage, width, worst = (_figure(model, "intervals", key) for key in keys)
+    if nominal is None or coverage is None or width is None:
+        return ""
+    text = (
+        f"{nominal:.0f} % intervals one step ahead cover {coverage:.1f} % of the test samples with "
+        f"{1e3 * width:.2f} mV average width"
+    )
+    return text + ("." if worst is None else f"; {worst:.1f} % in the worst (current, SOC) bin.")
+
+
+def _told(first: float, other: float) -> tuple[str, str]:
+    """Two errors to a tenth, or to as many digits as tell them apart."""
+    for digits in range(1, MOST_DIGITS + 1):
+        if f"{first:.{digits}f}" != f"{other:.{digits}f}":
+            break
+    return f"{first:.{digits}f}", f"{other:.{digits}f}"
+
+
+def _figure(row: Row | None, group: str, key: str) -> float | None:
+    """A value of a row, None where the row, the group or the value is missing."""
+    if row is None:
+        return None
+    value: float | None = (row.get(group) or {}).get(key)
+    return value

@@ -1,0 +1,42 @@
+"""A record written for others and read back is the same record."""
+
+import numpy as np
+import pytest
+
+from aesi.data import read_measurement
+from aesi.data.convert import convert_file, record_lines
+from aesi.data.reading import Reading
+from aesi.errors import DataError
+
+
+@pytest.fixture
+def source(tmp_path):
+    time = np.arange(0.0, 120.0)
+    current = np.where((time > 10) & (time < 60), 2.0, np.where(time > 80, -1.0, 0.0))
+    table = np.column_stack([time, 1e3 * current, 3.9 - 0.03 * current, np.full(len(time), 24.5)])
+    path = tmp_path / "source.csv"
+    np.savetxt(path, table, delimiter=",", header="time_s,current_a,voltage_v,temperature_degc", comments="")
+    return path
+
+
+@pytest.mark.parametrize("layout", ["aesi", "bdf"])
+def test_a_conversion_and_back_changes_nothing(source, tmp_path, layout):
+    milli = Reading(units={"current_a": "mA"})
+    written = convert_file(source, tmp_path / "new" / "out.csv", milli, layout)
+    again = read_measurement(tmp_path / "new" / "out.csv")
+    np.testing.assert_allclose(again.to_frame(), written.to_frame(), rtol=1e-9)  # ten digits are written
+    assert again.current_a.max() == 2.0
+    header = (tmp_path / "new" / "out.csv").read_text().splitlines()[0]
+    assert header.startswith("time_s,current_a" if layout == "aesi" else "Test Time / s,Voltage / V")
+
+
+def test_what_a_record_holds_is_told_with_its_charge(source):
+    lines = record_lines(convert_file(source, source.with_name("out.csv")))
+    assert (
+        "27.22 Ah discharged, 10.83 Ah charged" in lines[1]
+    )  # 49 s of 2 kA and 39 s of 1 kA, in amperes as written
+
+
+def test_a_place_that_cannot_be_written_is_one_sentence(source):
+    with pytest.raises(DataError, match="cannot be written"):
+        convert_file(source, source / "below.csv")

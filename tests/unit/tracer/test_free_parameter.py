@@ -1,0 +1,79 @@
+"""Scalars that fits move: their coordinates, bounds and starts, and what acts on a record beside good ones."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aesi.parameters import Parameter
+from aesi.physics.effects import CATALOGUE
+from aesi.tracer.case.free_parameter import (
+    FURTHEST_SDS,
+    STATE_OF_CHARGE,
+    acting_on,
+    coordinates_of,
+    of_all_records,
+    of_effect,
+    own,
+    starts,
+    state_of_charge,
+    values_of,
+)
+
+FACTOR = Parameter(2.0, "1", bounds=(0.1, 10.0), source="test", log=True, neutral=1.0)
+OHM = Parameter(1e-3, "ohm", bounds=(0.0, 0.1), source="test", neutral=0.0)
+
+
+@given(st.floats(0.1, 10.0))
+def test_a_value_comes_back_from_its_coordinate(value):
+    for free in (*of_effect("effect", {"factor": FACTOR}, 5.0), own("effect", "factor", FACTOR, 0.2)):
+        inside = min(max(value, free.low), free.high)
+        assert free.value(free.coordinate(inside)) == pytest.approx(inside)
+
+
+def test_an_own_parameter_stays_within_its_spread_and_its_range():
+    narrow, wide = own("effect", "factor", FACTOR, 0.2), own("effect", "factor", FACTOR, 2.0)
+    assert narrow.bounds == pytest.approx((-FURTHEST_SDS, FURTHEST_SDS))
+    assert (wide.low, wide.high) == FACTOR.bounds
+    assert not any(narrow.on_bound(x) for x in narrow.bounds)
+
+
+def test_an_effect_ends_on_a_bound_but_not_on_its_neutral_point():
+    (ohm,) = of_effect("effect", {"resistance_ohm": OHM}, 5.0)
+    low, high = ohm.bounds
+    assert low == 0.0
+    assert (ohm.on_bound(low), ohm.on_bound(high)) == (False, True)
+
+
+def test_a_state_of_charge_is_known_to_its_deviation():
+    soc = state_of_charge(1, 0.8, 0.01)
+    assert soc.key == (STATE_OF_CHARGE, "1")
+    assert soc.value(1.0) == pytest.approx(0.81)
+    assert soc.value(99.0) == pytest.approx(0.8 + FURTHEST_SDS * 0.01)
+
+
+def test_values_and_coordinates_are_one_anothers_inverse():
+    free = [*of_effect("a", {"resistance_ohm": OHM}, 5.0), state_of_charge(0, 0.5, 0.02)]
+    known = {("a", "resistance_ohm"): 2e-3}
+    x = coordinates_of(free, known, elsewhere=1.0)
+    assert values_of(free, x) == {
+        "a": {"resistance_ohm": pytest.approx(2e-3)},
+        "soc0": {"0": pytest.approx(0.52)},
+    }
+
+
+def test_fits_start_a_third_of_the_way_to_what_is_typical():
+    (first,) = starts(of_effect("a", {"resistance_ohm": OHM}, 5.0))
+    (ohm,) = of_effect("a", {"resistance_ohm": OHM}, 5.0)
+    assert ohm.value(first[0]) == pytest.approx(OHM.default / 3.0)
+
+
+def test_what_is_under_test_acts_beside_what_all_records_share_and_not_on_good_ones():
+    name = "solid_diffusivity"
+    both = {
+        of_all_records(name): {"negative_factor": 2.0},
+        name: {"negative_factor": 1.5},
+        "soc0": {"0": 0.9},
+    }
+    assert acting_on(CATALOGUE, both, good=True) == {name: {"negative_factor": 2.0}}
+    assert acting_on(CATALOGUE, both, good=False) == {name: {"negative_factor": pytest.approx(3.0)}}
+    assert acting_on(CATALOGUE, {name: {"negative_factor": 1.5}}, good=True) == {}
