@@ -142,14 +142,14 @@ def discover(
         check_same_cell(problem, record, run.voltage_v)
     spent = _Spent(progress)
 
-    def search(one: InverseProblem, kept: Archive) -> Evidence:
+    def search(one: InverseProblem, kept: Archive, most: int) -> Evidence:
         look = gathered_beside if one.has_good else gathered
-        return look(one, max_effects, kept, Thresholds(), spent)
+        return look(one, most, kept, Thresholds(), spent)
 
     def kept(one: InverseProblem, beside: Archive | None) -> Archive:
         return Archive(archive, context_of(one), beside)
 
-    evidence, choice = with_model(problem, model, search, kept)
+    evidence, choice = with_model(problem, model, search, kept, max_effects)
     return _told(
         evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )

@@ -1,8 +1,8 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
-# Without arguments all three, into this folder. Each takes some minutes of one processor. The shipped file of the Panasonic
-# over temperatures is from before its pulses, which are of three months, were fitted in one state (docs/cells.md).
+# Without arguments all three, into this folder. Each takes some minutes of one processor. Dates are those in the names of
+# the published files (Panasonic) and their first time stamps (HG2).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -15,6 +15,8 @@ panasonic() {
     aesi calibrate --cell "$start" --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_hppc.csv.gz" "$p/10degC_hppc.csv.gz" "$p/0degC_hppc.csv.gz" \
         "$p/n10degC_hppc.csv.gz" --until n10degC_hppc=78611 \
+        --date 25degC_c20_ocv=2017-05-08 --date 25degC_hppc=2017-03-11 --date 10degC_hppc=2017-03-27 \
+        --date 0degC_hppc=2017-05-20 --date n10degC_hppc=2017-06-07 --as-of 2017-03-11 \
         --impedance "$p/25degC_eis.csv" --impedance "$p/10degC_eis.csv" \
         --out "$out/panasonic_ncr18650pf.bpx.json"
 }
@@ -27,7 +29,10 @@ panasonic_25degc() {
 hg2() {
     p=$data/lg_18650hg2
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
-        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" "$p/40degC_c20_ocv.csv" \
+        "$p/0degC_c20_ocv.csv" \
+        --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --date 25degC_mixed1=2018-10-29 \
+        --date 40degC_c20_ocv=2018-11-03 --date 0degC_c20_ocv=2018-11-27 --as-of 2018-10-29 \
         --out "$out/lg_18650hg2.bpx.json"
 }
 case $which in

@@ -18,8 +18,12 @@ from aesi.pipeline.experiment.config import read_experiment
 from flows.benchmarks.page import write_between
 from flows.benchmarks.splits import BLOCK_S, CHEAP, QUICK, search_and_fit
 
-EXPERIMENTS = {physics.NCR: "panasonic_ncr18650pf.yaml", physics.HG2: "lg_18650hg2.yaml"}
-"""Those whose experiment trains on whole records."""
+EXPERIMENTS = {
+    physics.NCR: "panasonic_ncr18650pf.yaml",
+    physics.HG2: "lg_18650hg2.yaml",
+    physics.NMC: "measured_nmc_drive.yaml",
+}
+"""One whose experiment trains on repeats of a record is trained on all of it here."""
 HYBRID = "AESI I"
 BEGIN, END = "<!-- table of aesi bench cells -->", "<!-- end -->"
 
@@ -56,14 +60,15 @@ def hybrids(experiments: Path, cell: str) -> Mapping[str, dict[str, Any]]:
     """Record -> `hybrid_mv` of the cell's hybrid, or `trained` where the record was used."""
     file = experiments / EXPERIMENTS[cell]
     data = read_experiment(file, ()).data
-    used = {*data.train, *data.valid}
+    used = {*data.train, *data.valid} or {data.record}
+    whole = () if data.train else ("data.repeats=null", "data.record=null", f"data.train=[{data.record}]")
     drives = [r.name for r in physics.RECORDS if r.data == cell and not r.fitted and r.name not in used]
     laid = [
-        f"data.test=[{', '.join(drives)}]", f"data.dt_s={QUICK['dt_s']}", f"search.block={round(BLOCK_S)}",
+        *whole, f"data.test=[{', '.join(drives)}]", f"data.dt_s={QUICK['dt_s']}", f"search.block={round(BLOCK_S)}",
         f"search.candidates={QUICK['candidates']}", f"search.resamples={QUICK['resamples']}",
         f'models=["ESPM", "{HYBRID}"]', *CHEAP,
     ]  # fmt: skip
-    out: dict[str, dict[str, Any]] = {name: {"trained": True} for name in used}
+    out: dict[str, dict[str, Any]] = {str(name): {"trained": True} for name in used}
     try:
         config = read_experiment(file, laid)
         loaded, _, fitted = search_and_fit(config)

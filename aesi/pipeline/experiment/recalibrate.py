@@ -2,8 +2,8 @@
 
     minimise  sum_r [ sum_k (V_k - V(x_r)_k)**2 dt / (s**2 T) + |(x_r - z) / d|**2 ] + |z / d|**2
 
-over the initial state of charge (one shift for all records), the contact resistance, factors of the solid
-diffusivities, of the reaction rates and of the electrolyte's conductivity and diffusivity, the balance of the
+over the initial state of charge (one shift for all records), the contact resistance, factors of films, of the
+solid diffusivities, of the reaction rates and of the electrolyte's conductivity and diffusivity, the balance of the
 electrodes, and the shape of their potentials over the state of charge. d_j is what a parametrisation leaves open that
 is to serve other drives as well (`deviations.KNOBS`), s what the model misses anyway, T the time over which it misses
 the same.

@@ -22,8 +22,12 @@ from aesi.tracer.decide.verdict import Thresholds, structured_v, tolerance_v
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.path import Path, lowers_error, unseen_rmse_v
 
-Search = Callable[[InverseProblem, Archive], Evidence]
-"""All that is searched and judged with one model of the cell."""
+Search = Callable[[InverseProblem, Archive, int], Evidence]
+"""All that is searched and judged with one model of the cell, with at most so many names."""
+FIRST_LOOK = 1
+"""Names that the single particle is tried with before the porous electrode, where the declared cell asks for that one:
+what it approximates, no names explain, and looking for two and three of them takes most of the time. They are looked
+for where one explains the data, where none could, or where the porous electrode needs names, too."""
 Kept = Callable[[InverseProblem, Archive | None], Archive]
 """The fits of a problem that are known already, beside those with the other model of the cell."""
 
@@ -39,10 +43,13 @@ class ModelChoice:
 
 
 def with_model(
-    problem: InverseProblem, wanted: ModelName | None, search: Search, kept: Kept
+    problem: InverseProblem, wanted: ModelName | None, search: Search, kept: Kept, max_effects: int
 ) -> tuple[Evidence, ModelChoice]:
     """The search with the model that the user named, or else with the one that the parameters of the cell were fitted
-    with, or else with the one that the records ask for."""
+    with, or else with the one that the records ask for.
+
+    max_effects : names that may be given.
+    """
     reduction = reduction_of(problem)
 
     def fine(name: ModelName) -> InverseProblem:
@@ -57,13 +64,20 @@ def with_model(
     if settled:
         one = fine("dfn" if settled == "dfn" else "espm")
         why = ", as asked" if wanted else ", with which the parameters of the cell were fitted"
-        return told(search(one, kept(one, None)), one.model, why)
+        return told(search(one, kept(one, None), max_effects), one.model, why)
     single = fine("espm")
     fits = kept(single, None)
-    first = search(single, fits)
     if problem.has_good:
-        return told(first, "espm", ", since the good records share what it approximates")
-    explained = first.verdict.word != "unknown" or _explains(first.paths["tight"], reduction)
+        return told(
+            search(single, fits, max_effects), "espm", ", since the good records share what it approximates"
+        )
+    most = max_effects if reduction is None or not reduction.notable else min(FIRST_LOOK, max_effects)
+    first = search(single, fits, most)
+    explained = _explains(first, reduction)
+    if most < max_effects and (not explained or first.verdict.word == "found"):
+        most = max_effects
+        first = search(single, fits, most)
+        explained = _explains(first, reduction)
     if explained:
         reduction = _larger(reduction, first.paths["tight"])
     if reduction is None or not reduction.notable:
@@ -71,7 +85,10 @@ def with_model(
     if not explained:
         return told(first, "espm", ", which leaves far more than the two differ by")
     full = fine("dfn")
-    second = search(full, kept(full, fits))
+    second = search(full, kept(full, fits), most_names(first, max_effects))
+    unknown = "unknown" in (first.verdict.word, second.verdict.word)
+    if most < max_effects and unknown and second.verdict.word != "none":
+        first = search(single, fits, max_effects)
     if with_single_particle(second, first):
         return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
@@ -84,6 +101,16 @@ def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
     ended = reduction_of(path.problem, path.chosen.values)
     known = [one for one in (declared, ended) if one is not None]
     return max(known, key=lambda one: one.shift_v, default=None)
+
+
+def most_names(single: Evidence, max_effects: int) -> int:
+    """Names with which the porous electrode could still be believed rather than a search with the single particle: no
+    more than that has, where it leaves nothing that further ones could lower."""
+    path = single.path
+    left_v = unseen_rmse_v(path.blocks, path.chosen)
+    if single.verdict.word == "unknown" or lowers_error(left_v, path.problem.noise_v):
+        return max_effects
+    return len(path.chosen.hypothesis)
 
 
 def with_single_particle(full: Evidence, single: Evidence) -> bool:
@@ -100,9 +127,12 @@ def with_single_particle(full: Evidence, single: Evidence) -> bool:
     return believed((full.path, full.verdict), (single.path, single.verdict))
 
 
-def _explains(path: Path, reduction: Reduction | None) -> bool:
-    """Could what the two models of the declared cell differ by be all that a search leaves beyond what a right
-    hypothesis may?"""
+def _explains(single: Evidence, reduction: Reduction | None) -> bool:
+    """Does a search with the single particle explain the data, or could what the two models of the declared cell differ
+    by be all that it leaves beyond what a right hypothesis may?"""
+    path = single.paths["tight"]
+    if single.verdict.word != "unknown":
+        return True
     allowed_v = tolerance_v(path.problem, Thresholds())
     left_v = structured_v(path, path.chosen) if path.beyond_reach_v is None else path.beyond_reach_v
     return left_v - (0.0 if reduction is None else reduction.shift_v) <= allowed_v

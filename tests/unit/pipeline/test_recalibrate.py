@@ -9,8 +9,9 @@ import pytest
 from small_experiment import BPX, SOC0
 
 import aesi
+from aesi.physics.cell.relations import Constant
 from aesi.pipeline.experiment.recalibrate import FitRecord, recalibrate
-from aesi.pipeline.product.deviations import ALL, RESISTOR
+from aesi.pipeline.product.deviations import ALL, FILM, KNOBS, RESISTOR, deviating
 from aesi.records import Measurement
 
 CELL = replace(aesi.Cell.from_bpx(BPX), contact_resistance_ohm=1e-3)
@@ -52,3 +53,13 @@ def test_all_parameters_are_told_from_each_record_by_itself():
     fitted = recalibrate(CELL, (), {"worse": record(1e-3), "as declared": record(0.0)}, "backward", ALL)
     assert len(fitted.deviations) == len(ALL)
     assert fitted.cell.contact_resistance_ohm == pytest.approx(1e-3 * (1 + 1 / 3), rel=0.05)
+
+
+def test_films_are_moved_where_the_file_has_some():
+    films = [k for k, knob in enumerate(KNOBS) if knob.owner == FILM]
+    moved = deviating(CELL, (), films, np.ones(2), "espm").cell
+    assert (moved.negative, moved.positive) == (CELL.negative, CELL.positive)
+    filmed = replace(CELL, negative=replace(CELL.negative, film_ohm_m2=Constant(2e-3)))
+    moved = deviating(filmed, (), films, np.ones(2), "espm").cell
+    assert moved.negative.film_ohm_m2 == Constant(2e-3 * np.exp(KNOBS[films[0]].deviation))
+    assert moved.positive == CELL.positive

@@ -13,7 +13,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content, found_model
 from aesi.records import Measurement
 from aesi.tracer import discover
-from aesi.tracer.decide.model_choice import with_single_particle
+from aesi.tracer.decide.model_choice import most_names, with_single_particle
 
 from .conftest import CELLS, NOISE_V, steps
 
@@ -40,7 +40,10 @@ def found(cell, data, **options):
 
 @pytest.mark.parametrize("truth", ["dfn", "espm"])
 def test_the_model_is_the_one_that_explains_the_data_and_nothing_is_blamed_on_the_cell(m50, truth):
-    one = found(m50, record(m50, truth))
+    tried = []
+    one = found(m50, record(m50, truth), progress=tried.append)
+    if truth == "dfn":  # no pair is sought with the single particle, which does not fit
+        assert max(len(hypothesis.effects) for hypothesis in tried) == 1
     assert one.verdict.word == "none"
     assert one.choice.model == truth
     assert 1e3 * one.choice.reduction.shift_v > NOTABLE_MV
@@ -85,9 +88,16 @@ def explained(names, total, rmse_v, word="found"):
     point = SimpleNamespace(residual_v=np.full(n, rmse_v), jacobian_v=np.zeros((n, 0)))
     chosen = SimpleNamespace(hypothesis=names, score=score, point=point)
     blocks = SimpleNamespace(of_row=np.zeros(n, dtype=int), compared=np.ones(n, dtype=bool))
-    problem = SimpleNamespace(competing=lambda: range(20))
+    problem = SimpleNamespace(competing=lambda: range(20), noise_v=1e-3)
     path = SimpleNamespace(chosen=chosen, blocks=blocks, problem=problem)
     return SimpleNamespace(path=path, verdict=SimpleNamespace(word=word))
+
+
+def test_the_porous_electrode_is_tried_with_as_many_names_as_could_be_believed():
+    assert most_names(explained(("a",), 100.0, 1e-3), 3) == 1
+    assert most_names(explained((), 100.0, 1e-3, "none"), 3) == 0
+    assert most_names(explained(("a",), 100.0, 1.1e-3), 3) == 3  # further names could lower what is left
+    assert most_names(explained(("a",), 100.0, 1e-3, "unknown"), 3) == 3
 
 
 def test_a_further_name_than_with_the_other_model_has_to_lower_the_error_of_unseen_data():
