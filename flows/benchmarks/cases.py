@@ -83,6 +83,11 @@ def judged_once(case: Any, judge: Callable[[Any], CaseRow], keep: str | None) ->
     return row
 
 
+def kept(folder: str) -> list[CaseRow]:
+    """The rows that `judged_once` has kept there, by name."""
+    return [json.loads(path.read_text(encoding="utf-8")) for path in sorted(Path(folder).glob("*.json"))]
+
+
 def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:
     if address is not None:
         return on_dask(cases.judge, cases.specs, workers, address)

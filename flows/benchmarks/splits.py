@@ -21,7 +21,7 @@ from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
-from flows.benchmarks.cases import Cases, judged_once, tracked
+from flows.benchmarks.cases import Cases, judged_once, kept, tracked
 from flows.benchmarks.page import write_between
 
 QUICK = {"a_cell": 5, "seeds": 1, "candidates": 24, "resamples": 40, "dt_s": 1.0}
@@ -84,7 +84,7 @@ def run(
     cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : laid over all files.
     workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two marks becomes
     the table.  keep : a folder for what each split gave; one that is in it is not run again, so that an interrupted run
-    goes on. It is of one state of the code: empty it after a change.
+    goes on, and the table is of all that it holds. It is of one state of the code: empty it after a change.
     """
     asked = {"a_cell": a_cell, "seeds": seeds, "candidates": candidates, "resamples": resamples, "dt_s": dt_s}
     standing = {"seeds": 3} if whole else QUICK
@@ -100,7 +100,7 @@ def run(
         rows.append(row)
         yield row
     if write is not None:
-        write_between(write, BEGIN, END, table(rows[:-1]))
+        write_between(write, BEGIN, END, table(kept(keep) if keep else rows[:-1]))
 
 
 def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Sequence[str]) -> tuple[str, ...]:
