@@ -202,7 +202,8 @@ def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
     time, current = numbers(time_s, "time_s"), numbers(current_a, "current_a")
     if time.ndim != 1 or time.shape != current.shape or len(time) == 0:
         raise DataError(
-            f"time_s and current_a have shapes {time.shape} and {current.shape}; give two equal rows."
+            f"time_s and current_a have shapes {time.shape} and {current.shape}; give two rows of one length, "
+            "at least one number each."
         )
     check_row(time, "time_s")
     check_row(current, "current_a")

@@ -28,7 +28,7 @@ from aesi.numerics.typing import Array
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import style
 from aesi.pipeline.report.arrays.decimate import envelope
-from aesi.pipeline.report.sizes import finding_line
+from aesi.pipeline.report.words.sizes import finding_line
 
 WIDTH, HEIGHT = 860, 490
 LEFT, RIGHT = 64, 16

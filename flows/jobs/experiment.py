@@ -118,14 +118,12 @@ def _stages(
 
 def _page(folder: Path, summary: Mapping[str, Any], tracker: Tracker) -> str:
     """The headline of the report as Prefect shows it, and where the rest is."""
+    from flows.tracking.experiment_log import result_line
+
     row = next(row for row in summary["models"] if row["name"] == summary["chosen"])
-    free, step = row["free_run"], row.get("intervals", {})
-    lines = [f"# {row['name']}: {free['test_mser_pct']:.1f} % less squared error on test, in free run", ""]
+    lines = [f"# {row['name']}, {row['terms']} terms", "", result_line(row), ""]
     if summary["fallback"]:
         lines += [f"**{summary['fallback']}**", ""]
-    lines.append(f"- {free['test_rmse_mv']:.2f} mV RMSE in free run, {row['terms']} terms")
-    if step:
-        lines.append(f"- {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:.0f} %")
     lines += [f"- report: `{folder / 'report.html'}`", f"- tracked: [{tracker.run_id}]({tracker.address})"]
     return "\n".join(lines)
 

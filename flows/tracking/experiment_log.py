@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from math import log10
+from math import isfinite, log10
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +148,9 @@ def result_line(row: Mapping[str, Any]) -> str:
     free, step = row["free_run"], row.get("intervals") or {}
     line = f"{row['name']}: {free['test_mser_pct']:.1f} % less squared error on test in free run"
     line += f" ({free['test_rmse_mv']:.2f} mV)"
+    beyond = free.get("test_mser_recalibrated_pct")
+    if beyond is not None and isfinite(beyond):
+        line += f", {beyond:.1f} % less than recalibrated"
     if step:
         line += f"; {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:.0f} %"
     return f"{line}."

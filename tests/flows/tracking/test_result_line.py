@@ -1,0 +1,23 @@
+"""What a tracked run says of itself in one sentence."""
+
+from flows.tracking.experiment_log import result_line
+
+ROW = {
+    "name": "ESPM + AESI I",
+    "free_run": {"test_mser_pct": 99.86, "test_rmse_mv": 1.014, "test_mser_recalibrated_pct": 2.16},
+    "intervals": {"coverage_pct": 90.53, "nominal_pct": 90.0},
+}
+
+
+def test_a_run_says_what_is_the_recalibrations_and_what_the_corrections():
+    assert result_line(ROW) == (
+        "ESPM + AESI I: 99.9 % less squared error on test in free run (1.01 mV), 2.2 % less than recalibrated; "
+        "90.5 % covered one step ahead at 90 %."
+    )
+
+
+def test_what_was_not_judged_is_not_told():
+    alone = {"test_mser_pct": 0.0, "test_rmse_mv": 27.16, "test_mser_recalibrated_pct": None}
+    assert result_line({"name": "ESPM", "free_run": alone, "intervals": None}) == (
+        "ESPM: 0.0 % less squared error on test in free run (27.16 mV)."
+    )
