@@ -120,14 +120,11 @@ def _load(config: ExperimentConfig) -> Loaded:
     for name, rows in drives:
         records[name].rows[rows] = True
     hold = config.data.hold
-    same_record = config.data.repeats is not None
-    physics = physics_models(
-        cell, effects, records, hold, config.cell.start, model=model, same_record=same_record
-    )
+    physics = physics_models(cell, effects, records, hold, config.cell.start, model=model)
     training = TrainingDrives(config, records, drives, sources.roles)
     left_out = None
     if config.cell.start == "recalibrated" and len(drives) > 1:
-        left_out = training.left_out(physics)
+        physics, left_out = training.left_out(physics)
     if model == "dfn":
         notes.append(DFN_NOTE)
     series, empty = series_under(physics, records, config)

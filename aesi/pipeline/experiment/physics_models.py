@@ -23,6 +23,7 @@ from aesi.pipeline.product.deviations import (
     INITIAL_STATE,
     RESISTOR,
     PhysicsStart,
+    deviating,
     slopes_v,
 )
 from aesi.pipeline.product.error_series import error_series
@@ -46,6 +47,15 @@ class PhysicsModels:
     def chosen(self) -> PhysicsStart:
         """What the correction is learned on."""
         return self.by_name[self.start]
+
+    def carried(self, share: float) -> PhysicsModels:
+        """With that share of each deviation of the recalibrated one."""
+        whole = self.by_name[RECALIBRATED]
+        if share == 1.0:
+            return self
+        z = share * np.array(whole.deviations)
+        moved = deviating(whole.declared, whole.effects, ALL, z, whole.model)
+        return replace(self, by_name={**self.by_name, RECALIBRATED: moved})
 
     def series(self, record: Measurement, soc0: float, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
         """The error of the chosen physics along a record, what the others say beside it, and whether it ran empty."""
@@ -71,15 +81,14 @@ def physics_models(
     start: str,
     begin: PhysicsModels | None = None,
     model: ModelName = "espm",
-    same_record: bool = False,
 ) -> PhysicsModels:
     """All of them, fitted to the rows that the records admit; start : "declared" or "recalibrated".
 
-    begin : fitted to nearly the same rows.  same_record : see `recalibrate`.
+    begin : fitted to nearly the same rows.
     """
     known = {} if begin is None else begin.by_name
     fitted = {
-        name: recalibrate(cell, effects, records, hold, free, known.get(name), model, same_record)
+        name: recalibrate(cell, effects, records, hold, free, known.get(name), model)
         for name, free in FREE.items()
     }
     by_name = {DECLARED: PhysicsStart(cell, cell, effects, model=model), **fitted}

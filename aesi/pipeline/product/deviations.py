@@ -12,12 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.parameters import FILM_ENERGY_SD, RATE_ENERGY_SD, SALT_EA, SOLID_EA
+from aesi.calibration.parameters import RATE_ENERGY_SD, SALT_EA, SOLID_EA
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, simulate
 from aesi.physics.balance import same_rest
-from aesi.physics.cell.parts import NO_FILM, Electrode
-from aesi.physics.cell.relations import scaled
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import model_with
 from aesi.records import Hold, Measurement, Run
@@ -25,13 +23,13 @@ from aesi.records import Hold, Measurement, Run
 STEP = 0.05
 """Of a difference quotient, in deviations."""
 
-SOC0, CONTACT, FILM = "soc0", "contact", "film"
+SOC0, CONTACT = "soc0", "contact"
 
 
 @dataclass(frozen=True)
 class FileParameter:
-    """owner : an effect of the catalogue, or SOC0, CONTACT or FILM.  deviation : of its value, of its logarithm where
-    `log`; of the contact resistance in V at a current of 1C.  energy_j_mol : deviation of its activation energy."""
+    """owner : an effect of the catalogue, or SOC0 or CONTACT.  deviation : of its value, of its logarithm where `log`;
+    of the contact resistance in V at a current of 1C.  energy_j_mol : deviation of the activation energy of a rate."""
 
     owner: str
     name: str
@@ -48,9 +46,8 @@ def _waves() -> Iterator[FileParameter]:
             yield FileParameter(POTENTIALS, name, POTENTIAL_SHARE * parameter.spread.loose)
 
 
-RATES = {"solid_diffusivity": SOLID_EA, "charge_transfer_kinetics": RATE_ENERGY_SD, FILM: FILM_ENERGY_SD}
+RATES = {"solid_diffusivity": SOLID_EA, "charge_transfer_kinetics": RATE_ENERGY_SD}
 """Effect -> deviation of its activation energies, as a calibration starts from; a file of one temperature keeps it."""
-SIDES = ("negative", "positive")
 POTENTIALS = "ocp_shape"
 POTENTIAL_SHARE = 0.6
 """Of the spread that the catalogue gives for half cells of other makes."""
@@ -61,7 +58,7 @@ KNOBS = (
     *(
         FileParameter(owner, f"{side}_factor", 0.15, True, energy)
         for owner, energy in RATES.items()
-        for side in SIDES
+        for side in ("negative", "positive")
     ),
     FileParameter("electrolyte_transport", "conductivity_factor", 0.1, True, SALT_EA),
     FileParameter("electrolyte_transport", "diffusivity_factor", 0.6, True, SALT_EA),
@@ -122,25 +119,11 @@ def deviating(
             values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
     shift = values.pop(SOC0, {}).get("shift", 0.0)
     volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
-    films = values.pop(FILM, {})
     added = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
     cell = model_with(declared, added).cell
     ohm = declared.contact_resistance_ohm + volts_at_1c / declared.nominal_capacity_ah
-    cell = replace(
-        cell,
-        contact_resistance_ohm=ohm,
-        negative=_filmed(cell.negative, films.get("negative_factor", 1.0)),
-        positive=_filmed(cell.positive, films.get("positive_factor", 1.0)),
-    )
+    cell = replace(cell, contact_resistance_ohm=ohm)
     return PhysicsStart(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
-
-
-def _filmed(electrode: Electrode, factor: float) -> Electrode:
-    """The electrode with so many times its film; one without a film has none."""
-    film = electrode.film_ohm_m2
-    if film == NO_FILM or factor == 1.0:
-        return electrode
-    return replace(electrode, film_ohm_m2=scaled(film, factor))
 
 
 def slopes_v(

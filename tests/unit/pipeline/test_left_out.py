@@ -1,11 +1,44 @@
-"""Training drives are left out under physics that has not seen them."""
+"""Of a recalibration is kept what carries over to drives that it has not seen."""
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
 from small_experiment import experiment, write_record
 
+from aesi.pipeline.experiment.left_out import carried_over, slope_on
 from aesi.pipeline.experiment.load import load
-from aesi.pipeline.experiment.physics_models import PhysicsModels
+from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED, PhysicsModels
+
+
+def test_one_part_on_which_physics_runs_off_does_not_decide():
+    assert carried_over(np.array([1.1, 1.3, 0.9, 1.2])) == 1.0
+    assert carried_over(np.array([0.7, 0.6, 0.8, 0.01])) == pytest.approx(0.65)
+    assert carried_over(np.array([-1.4, 0.2, 0.9, -0.6])) == 0.0
+    assert carried_over(np.array([np.nan, 0.4])) == 0.4
+    assert carried_over(np.array([])) == 1.0
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory):
+    small = experiment(write_record(tmp_path_factory.mktemp("record")))
+    return load(small.model_copy(update={"cell": small.cell.model_copy(update={"start": "recalibrated"})}))
+
+
+def test_a_recalibration_that_every_part_bears_out_is_kept_whole(loaded):
+    assert loaded.left_out.parts
+    for part in loaded.left_out.parts:
+        error = part.series.left_by(DECLARED)[part.rows]
+        assert slope_on(error, error - part.series.left_by(RECALIBRATED)[part.rows]) == pytest.approx(
+            1.0, abs=0.05
+        )
+
+
+def test_the_slope_is_that_of_the_declared_error_on_what_the_recalibration_takes_off():
+    error = np.array([4.0, -2.0, 1.0])
+    assert slope_on(error, 0.5 * error) == pytest.approx(2.0)
+    assert slope_on(error, np.array([1.0, 2.0, 0.0])) == 0.0
+    assert np.isnan(slope_on(error, np.zeros(3)))
 
 
 def test_the_records_are_simulated_once_for_each_piece_that_is_left_out(tmp_path, monkeypatch):
