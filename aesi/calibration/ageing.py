@@ -31,6 +31,9 @@ the zero of a cycler that whole cycles tell to 0.2 %: more is believed where a r
 a calibrated LG 18650HG2 as it is misses its fitted 1C discharge and drive by 119 and 4.9 mV, and the 1C discharge of
 two days later, fitted to nothing, by 10.3; with these by 17.6, 8.7 and 14.1. A record with a date has the second
 whatever its rate: its day says the rest."""
+MOST_AGE = 0.3
+"""Of the same without dates: no record is further from the file. A convention that nothing ends on. Descents scale
+their steps by bounds: with and without it they end elsewhere along what data at one temperature leave open."""
 WALK_SD = 0.0075
 """Of (1), a day's: 4 % in a month, 7 % in three. The eight steps between the fitted records of an LG 18650HG2 and a
 Panasonic NCR18650PF, 1 to 42 days apart, are of 0 to 1.5 % times the root of their days, 0.8 % root mean square (fitted
@@ -69,6 +72,17 @@ class Ageing:
             # A walk from nought: what two days share is the way that both have come.
             covariance += WALK_SD**2 * 0.5 * (size[:, None] + size[None, :] - apart)
         return cls(np.linalg.cholesky(covariance), day)
+
+    @property
+    def dated(self) -> bool:
+        """Are there records of a course?"""
+        return self.day is not None
+
+    @property
+    def most(self) -> Array:
+        """(records,) bounds of the working coordinates."""
+        own = np.diag(self.root)
+        return np.full(len(own), np.inf) if self.dated else MOST_AGE / own
 
     def share(self, index: int, z: Array) -> float:
         """Of its active material that the cell of a record has, at working coordinates z (records,)."""

@@ -176,10 +176,11 @@ def free_parameters(cell: Cell, span_k: float, same_cell: bool = False) -> tuple
     return tuple(out)
 
 
-def moved(cell: Cell, values: Mapping[str, float]) -> Cell:
+def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:
     """The cell with global parameters replaced; windows as wide as its capacity in the new electrodes.
 
-    The capacity goes with the size of both, so that a larger file and smaller shares of its records are one model.
+    ages : its records are of a course of ageing. The capacity goes with the size of both electrodes then, so that a
+    larger file and smaller shares of its records are one model.
     """
     n1 = values.get("negative.full_stoichiometry", cell.negative.theta_max)
     p1 = values.get("positive.full_stoichiometry", cell.positive.theta_min)
@@ -187,7 +188,9 @@ def moved(cell: Cell, values: Mapping[str, float]) -> Cell:
         cell.electrode_capacity_ah(x) * values.get(f"{side}.capacity", 1.0)
         for side, x in (("negative", cell.negative), ("positive", cell.positive))
     )
-    size = np.sqrt(values.get("negative.capacity", 1.0) * values.get("positive.capacity", 1.0))
+    size = (
+        np.sqrt(values.get("negative.capacity", 1.0) * values.get("positive.capacity", 1.0)) if ages else 1.0
+    )
     capacity_ah = cell.capacity_ah * float(size)
     n = replace(cell.negative, theta_min=n1 - capacity_ah / n_ah, theta_max=n1)
     p = replace(cell.positive, theta_min=p1, theta_max=p1 + capacity_ah / p_ah)

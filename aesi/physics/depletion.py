@@ -57,7 +57,11 @@ def sentence(
     soc = (float(rows[5, at]) - n.theta_min) / (n.theta_max - n.theta_min)
     surface = f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}"
     if not 0.0 <= soc <= 1.0:
-        asks = "asks for more charge than the cell has" if soc < 0.0 else "brings more than it can take up"
+        asks = (
+            "asks for more charge than the cell has"
+            if soc < 0.0
+            else "brings more charge than the cell can hold"
+        )
         return (
             f"{head}{surface}, at a state of charge of {100 * soc:.1f} %: the record {asks}. "
             f"Check soc0, the capacity and the sign of the current, {tail}"

@@ -2,7 +2,7 @@
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
 # Without arguments all three, into this folder. Each takes some minutes of one processor. Dates are those in the names of
-# the published files (Panasonic) and their first time stamps (HG2).
+# the published files.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -29,10 +29,7 @@ panasonic_25degc() {
 hg2() {
     p=$data/lg_18650hg2
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
-        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" "$p/40degC_c20_ocv.csv" \
-        "$p/0degC_c20_ocv.csv" \
-        --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --date 25degC_mixed1=2018-10-29 \
-        --date 40degC_c20_ocv=2018-11-03 --date 0degC_c20_ocv=2018-11-27 --as-of 2018-10-29 \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
         --out "$out/lg_18650hg2.bpx.json"
 }
 case $which in
