@@ -1,8 +1,8 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
-# Without arguments all three, into this folder. Each takes some minutes of one processor. Dates are those in the names of
-# the published files.
+# Without arguments all three, into this folder. Each takes some minutes of one processor. The shipped file of the Panasonic
+# over temperatures is from before its pulses, which are of three months, were fitted in one state (docs/cells.md).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -15,8 +15,6 @@ panasonic() {
     aesi calibrate --cell "$start" --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_hppc.csv.gz" "$p/10degC_hppc.csv.gz" "$p/0degC_hppc.csv.gz" \
         "$p/n10degC_hppc.csv.gz" --until n10degC_hppc=78611 \
-        --date 25degC_c20_ocv=2017-05-08 --date 25degC_hppc=2017-03-11 --date 10degC_hppc=2017-03-27 \
-        --date 0degC_hppc=2017-05-20 --date n10degC_hppc=2017-06-07 --as-of 2017-03-11 \
         --impedance "$p/25degC_eis.csv" --impedance "$p/10degC_eis.csv" \
         --out "$out/panasonic_ncr18650pf.bpx.json"
 }
