@@ -106,7 +106,7 @@ def gathered(
         path = measured  # the only one that tried anything
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, thresholds)
-        named = _named(path, paths["tight"], archive)
+        named = named_options(path, paths["tight"], blocks, archive)
     after, why = written(Option.of(problem, blocks, None), options, named)
     limits = (*stand_ins(after, verdict.effects), *limits_of(after)) if after.hypothesis else ()
     return Evidence(path, paths, recalibrated, after, with_confidence(verdict), why, limits)
@@ -198,17 +198,19 @@ def _borne_out(one: Option) -> bool:
     return one.state.problem.trust != "loose" or len(one.state.problem.records) > 1
 
 
-def _named(path: Path, tight: Path, archive: Archive) -> list[Option]:
+def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> list[Option]:
     """What was named with the own parameters as declared, and with these as far off as they may be.
 
     On a drive of the HG2 at 0 degC without its temperature, a development record of `aesi bench real`, the two leave
     23.0 and 8.2 mV of the last part, the declared model 97.5, the own parameters alone 67.6; on one of the Panasonic at
     10 degC 8.1, 5.0, 22.9 and 7.1; on one at -10 degC 42.8 and 82.1, of which the first is written.
+
+    blocks : by which all options are held against each other.
     """
-    named = [Option.of(path.problem, path.blocks, path.chosen)]
+    named = [Option.of(path.problem, blocks, path.chosen)]
     found = refitted(tight.problem, path, archive)
     if found is not None:
-        named.append(Option.of(found.problem, found.blocks, found.chosen))
+        named.append(Option.of(found.problem, blocks, found.chosen))
     return named
 
 

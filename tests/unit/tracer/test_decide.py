@@ -10,7 +10,7 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
-from aesi.tracer.decide.evidence import consistent
+from aesi.tracer.decide.evidence import consistent, named_options
 from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v, unexplained_v
 from aesi.tracer.decide.written import Option, carries_best, stand_ins, worst_ratio, written
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
@@ -161,6 +161,21 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert written(declared, [option(5.4, 38.0)], [named]) == (named.state, None)
     refined = option(4.0, 20.0)  # what was named, with the own parameters open
     assert written(declared, [option(5.4, 38.0)], [named, refined]) == (refined.state, None)
+
+
+def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cell, few, make):
+    effect = CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006)
+    problem = InverseProblem(
+        cell, prepare_all(cell, [make((effect,)), make((effect,), seed=2)], 0.9, 0.0), few
+    )
+    tight = searched(problem, 1, lambda blocks, fit: True, NEVER)
+    measured = searched(replace(problem, trust="measured"), 0, lambda blocks, fit: True, NEVER)
+    assert len(measured.blocks) != len(tight.blocks)
+    declared = Option.of(problem, tight.blocks, None)
+    options = named_options(measured, tight, tight.blocks, NEVER)
+    assert [one.state.problem.trust for one in options] == ["measured", "tight"]
+    assert {len(one.left_out.by_range) for one in options} == {len(declared.left_out.by_range)}
+    assert written(declared, [], options)[1] is None
 
 
 def test_effects_that_stand_in_are_written_where_they_leave_less_and_are_said_to_be_no_finding(path):
