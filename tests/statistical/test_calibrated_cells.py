@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,8 @@ def test_the_command_gives_the_file_again(name, file, data, tmp_path):
         records = locate(data, "25degC_c20_ocv").parent.parent.parent
     except DataError as error:
         pytest.skip(str(error))
-    environment = os.environ | {"AESI_DATA": str(records)}
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    environment = os.environ | {"AESI_DATA": str(records), "PATH": path}
     subprocess.run(["sh", CELLS / "calibrate.sh", name, tmp_path], check=True, env=environment, timeout=3600)
     shipped, again = (Cell.from_bpx(folder / f"{file}.bpx.json") for folder in (CELLS, tmp_path))
     time = np.arange(0.0, 2400.0)
