@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -23,6 +24,9 @@ FEWEST_MEASURED = 6
 which lasts longer there."""
 RANGES = 3
 """Ranges of the current's RMS, and of the state of charge, by which blocks are left out together."""
+OTHER_RATE = 1.1
+"""Times the smallest mean of such a range that the largest one has to be: where the current never changes there is one
+rate. A convention."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +80,20 @@ def blocks_of(problem: InverseProblem) -> Blocks:
             tuple(b for b, i in enumerate(record) if i == k) for k in range(len(problem.records))
         )
     for name, size in (("rate", rate), ("charge", charge)):
-        folds[name] = _ranges(size)
+        ranges = _ranges(size)
+        if name == "charge" or _differ([rate[list(r)] for r in ranges]):
+            folds[name] = ranges
     folds["end"] = (tuple(b for b in range(len(record)) if b >= round(SEEN_SHARE * len(record))),)
     return Blocks(bounds, np.array(record), folds, problem.compared)
 
 
 def _slices(bounds: IntArray) -> list[slice]:
     return [slice(int(a), int(b)) for a, b in pairwise(bounds)]
+
+
+def _differ(rates: Sequence[Array]) -> bool:
+    means = [float(np.mean(r)) for r in rates]
+    return max(means) > OTHER_RATE * min(means)
 
 
 def _ranges(size: Array) -> tuple[tuple[int, ...], ...]:

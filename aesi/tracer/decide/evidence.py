@@ -97,8 +97,7 @@ def gathered(
     if verdict.word != "unknown":
         return _adopted(path, paths, with_confidence(verdict), recalibrated)
     measured, blocks = path_of("measured"), path.blocks
-    options = [one for one in recalibrations if _borne_out(one)]
-    options.append(Option.of(measured.problem, blocks, measured.base))
+    options = [*recalibrations, Option.of(measured.problem, blocks, measured.base)]
     if path.beyond_reach_v is not None and len(problem.records) > 1:
         options += _with_stand_ins(path_of("loose"), blocks)
     named: list[Option] = []
@@ -187,15 +186,6 @@ def with_confidence(verdict: Verdict) -> Verdict:
     """The verdict with its confidence read off its margin."""
     kind = kind_of(verdict.word, verdict.effects)
     return replace(verdict, confidence=frequency_maps()[kind].frequency(verdict.margin))
-
-
-def _borne_out(one: Option) -> bool:
-    """Can a recalibration be written? What was open wide only where another record can bear it out.
-
-    On five development records of `aesi bench real`, each by itself, what was open wide left 14.4, 201, 12.2, 137 and
-    3.9 mV on its last part, what was not 12.2, 84.7, 18.4, 63.0 and 3.5.
-    """
-    return one.state.problem.trust != "loose" or len(one.state.problem.records) > 1
 
 
 def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> list[Option]:

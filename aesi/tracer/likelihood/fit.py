@@ -203,11 +203,20 @@ def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
     return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)
 
 
-def prediction_sd_v(problem: InverseProblem, blocks: Blocks, fit: LinearForm) -> Array:
-    """(n,) V, standard deviation of what is predicted of each block by the parameters that the others give, if the
-    hypothesis is right: with a model error as small as that of a right one."""
+def prediction_sd_v(
+    problem: InverseProblem, blocks: Blocks, fit: LinearForm, partition: str = "block"
+) -> Array:
+    """(n,) V, standard deviation of what is predicted of each block by the parameters that those outside its fold give,
+    if the hypothesis is right: with a model error as small as that of a right one.
+
+    partition : of `blocks.folds`, in which each block is left out once.
+    """
     x, jacobian = fit.point.x, fit.point.jacobian_v
     white, log_det = whitened(problem, blocks, fit.point.table(), PRIORS[problem.trust].median_v)
-    posterior = Posterior(block_sums(blocks, white, log_det), x, blocks.folds["block"])
-    spread = [jacobian[rows] @ c for rows, c in zip(blocks.rows, posterior.covariances_without, strict=True)]
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", np.concatenate(spread), jacobian)))
+    folds = blocks.folds[partition]
+    posterior = Posterior(block_sums(blocks, white, log_det), x, folds)
+    out = np.empty(len(jacobian))
+    for fold, covariance in zip(folds, posterior.covariances_without, strict=True):
+        rows = np.isin(blocks.of_row, fold)
+        out[rows] = np.sqrt(np.einsum("ij,ij->i", jacobian[rows] @ covariance, jacobian[rows]))
+    return out
