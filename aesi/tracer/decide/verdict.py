@@ -25,7 +25,7 @@ GROUP_SIZE = 3
 """Names that a group of look-alikes shows at most; the others are told in a note."""
 MOST_SDS = 50.0
 """Where nothing comes close."""
-TESTED_SHARE = 0.5
+FORETOLD_SHARE = 0.5
 """Of the rows of conditions that are left out, that the others have to foretell. A convention, see `Thresholds` and
 `decide.written.Option` for what was seen on either side of it."""
 
@@ -39,15 +39,16 @@ class Thresholds:
     an error by a tenth of it. On development cases right hypotheses left at most 0.4 mV.
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
     fewer nats, are not told apart. 1.64 is 95 % of a normal distribution, to one side.
-    tested_share : of the rows, that a hypothesis has to foretell where ranges of the current or of charge are left out.
-    Right ones foretold TODO. A half is a convention.
+    foretold_share : of the rows, that a hypothesis has to foretell where ranges of the current or of charge are left
+    out. Right ones foretold 92 to 99 % on five virtual cases, two wrong names on the 1C discharge of the NMC cell, a
+    development record, 22 %.
     """
 
     noise_share: float = 0.45
     solver_v: float = 4e-4
     alike_sds: float = 1.64
     alike_nats: float = ALIKE_NATS
-    tested_share: float = TESTED_SHARE
+    foretold_share: float = FORETOLD_SHARE
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,7 @@ def _counts(
     return np.asarray(told_v2 / (told_v2 + prediction_sd_v(problem, blocks, one, partition) ** 2))
 
 
-def tested_share(
+def foretold_share(
     problem: InverseProblem, blocks: Blocks, one: LinearForm, allowed_v: float, partition: str
 ) -> float:
     """Share of the rows that a hypothesis is tested on where the conditions of a partition are left out in turn: of the
@@ -150,8 +151,8 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
         )
         return Verdict("none", (), (), 0.0, left, allowed, reason, -best_gain(path))
     conditions = [name for name in ("rate", "charge") if name in path.blocks.folds]
-    tested = max(tested_share(path.problem, path.blocks, path.chosen, allowed, name) for name in conditions)
-    if tested < thresholds.tested_share:
+    tested = max(foretold_share(path.problem, path.blocks, path.chosen, allowed, name) for name in conditions)
+    if tested < thresholds.foretold_share:
         reason = (
             f"{' + '.join(path.chosen.hypothesis)} fits the data to {1e3 * left:.2f} mV beyond the noise, and so would "
             f"much else: of a range of charge that the fit has not seen it foretells {100 * tested:.0f} % of the rows; "

@@ -10,7 +10,7 @@ import numpy as np
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
-from aesi.tracer.decide.verdict import TESTED_SHARE, tested_share
+from aesi.tracer.decide.verdict import FORETOLD_SHARE, foretold_share
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
@@ -33,7 +33,7 @@ class Option:
     12.2, 137 and 3.9 mV on the last part where others left 12.2, 84.7, 18.4, 63.0 and 3.5; a diffusivity over
     concentration fitted to a 1C discharge 38 %, and left 1,880 mV where the declared model left 287. What was named on
     six others foretold 71 to 84 %, recalibrations within what files are off by 94 % and more. At one current nothing is
-    foretold of another: the NMC cell's 1C discharge fitted with own parameters open leaves 51 to 561 mV, 14 as declared.
+    foretold of another: the NMC cell's 1C fitted with own parameters open leaves 51 to 561 mV, 14 as declared.
     """
 
     state: ModelState
@@ -60,7 +60,7 @@ def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> b
         return True
     conditions = ("charge",) if problem.trust in MEASURED_CELL else ("rate", "charge")
     return all(
-        name in blocks.folds and tested_share(problem, blocks, fit, MEASURED_V, name) >= TESTED_SHARE
+        name in blocks.folds and foretold_share(problem, blocks, fit, MEASURED_V, name) >= FORETOLD_SHARE
         for name in conditions
     )
 

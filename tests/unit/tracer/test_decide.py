@@ -5,20 +5,30 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
+from aesi.records import Measurement
+from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
 from aesi.tracer.decide.evidence import consistent, named_options
-from aesi.tracer.decide.verdict import Thresholds, judged, partly, structured_v, unexplained_v
+from aesi.tracer.decide.verdict import (
+    Thresholds,
+    foretold_share,
+    judged,
+    partly,
+    structured_v,
+    unexplained_v,
+)
 from aesi.tracer.decide.written import Option, carries_best, stand_ins, worst_ratio, written
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
-from aesi.tracer.search.fitted import values_without
+from aesi.tracer.search.fitted import base_of, values_without
 from aesi.tracer.search.forward import searched
 from aesi.tracer.search.wrong_parameters import with_wrong_parameters
 
@@ -97,6 +107,47 @@ def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
     assert max(sd_v[blocks.rows[4]]) < 1e-3
     assert structured_v(path, flexible) > 0.1
     assert unexplained_v(path.problem, blocks, flexible, 1e-3) < 2 * structured_v(path, one)
+
+
+def test_what_the_data_could_not_have_spoken_against_is_not_found(path):
+    blocks, one = path.blocks, path.chosen
+    assert foretold_share(path.problem, blocks, one, 1e-3, "charge") > 0.8
+    assert judged(path, Thresholds()).word == "found"
+    by_charge = np.zeros((len(one.point.residual_v), len(blocks.folds["charge"])))
+    for k, fold in enumerate(blocks.folds["charge"]):
+        by_charge[np.isin(blocks.of_row, fold), k] = 1.0  # a parameter for each range of charge
+    point = replace(
+        one.point,
+        x=np.append(one.point.x, np.zeros(by_charge.shape[1])),
+        jacobian_v=np.column_stack([one.point.jacobian_v, by_charge]),
+        bounds=np.vstack([one.point.bounds, np.tile([-9.0, 9.0], (by_charge.shape[1], 1))]),
+    )
+    anything = replace(one, point=point, score=scored(path.problem, blocks, point))
+    steady = replace(blocks, folds={k: v for k, v in blocks.folds.items() if k != "rate"})
+    assert foretold_share(path.problem, steady, anything, 1e-3, "charge") < 0.1
+    verdict = judged(replace(path, chosen=anything, blocks=steady), Thresholds())
+    assert (verdict.word, verdict.effects) == ("unknown", ())
+    assert "other currents" in verdict.reason
+
+
+def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_written(cell, few, make):
+    problem = InverseProblem(cell, prepare_all(cell, [make()], 0.9, 0.3), few)
+    assert "rate" in blocks_of(problem).folds
+    time = np.arange(0.0, 2400.0, 4.0)
+    current = np.full(len(time), 0.8 * cell.nominal_capacity_ah)
+    voltage = simulate(cell, time, current, soc0=0.95).voltage_v
+    noisy = voltage + 1e-3 * np.random.default_rng(0).normal(size=len(time))
+    one = InverseProblem(cell, prepare_all(cell, [Measurement(time, current, noisy)], 0.95, 0.3), few)
+    blocks = blocks_of(one)
+    assert "rate" not in blocks.folds
+    assert "charge" in blocks.folds
+    base = base_of(one, blocks, NEVER)
+    assert not Option.of(one, blocks, base).tested
+    held = replace(one, trust="measured")
+    assert Option.of(held, blocks, base_of(held, blocks_of(held), NEVER)).tested
+    moved = Option.of(one, blocks, base)
+    declared = replace(Option.of(one, blocks, None), left_out=LeftOut((1.0,), (1.0,)))
+    assert written(declared, [moved])[0] is declared.state
 
 
 def test_data_that_order_nothing_give_look_alikes(path):
