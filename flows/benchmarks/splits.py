@@ -141,7 +141,7 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
     from aesi.pipeline.experiment.judging.validation import validation_mser
     from aesi.pipeline.experiment.load import load
     from aesi.sparse import Candidate
-    from aesi.sparse.search.average import averaged
+    from aesi.sparse.search.pick.average import averaged
     from flows.search.nsga2 import Constraints, search
 
     loaded = load(config)

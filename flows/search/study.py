@@ -13,7 +13,7 @@ from aesi.pipeline.experiment.candidate import ScoredCandidate, genome_space, to
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, Problem
-from aesi.sparse.search.average import averaged
+from aesi.sparse.search.pick.average import averaged
 from flows.base import environment, fingerprint
 from flows.base.console import Console
 from flows.evaluation.generation import Evaluation, Tally

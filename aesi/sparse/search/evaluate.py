@@ -68,7 +68,7 @@ class Candidate:
     rows, started anew with each fold).
     free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (of the fold models
     on the folds where there are none).
-    fold_sums : (2, n_folds, 3) for `aesi.sparse.search.nested`, of AESI I and II.
+    fold_sums : (2, n_folds, 3) for `aesi.sparse.search.pick.nested`, of AESI I and II.
     members : the candidates that this one is the mean of (average.py); none where it is one by itself.
     """
 
