@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from aesi.sparse import Genome, evaluate
-from aesi.sparse.search.pick.average import averaged, mean_model
 from aesi.sparse.search.fold_models import fold_models, with_leverage
+from aesi.sparse.search.pick.average import averaged, mean_model
 
 
 def candidates(problem, feedback=False):
