@@ -35,7 +35,7 @@ from functools import cached_property
 
 import numpy as np
 
-from aesi.calibration.ageing import WALK_SD
+from aesi.calibration.ageing import LOSS_SD
 from aesi.errors import AesiError
 from aesi.numerics.bounded import descend
 from aesi.numerics.typing import Array, BoolArray
@@ -63,7 +63,7 @@ ROUNDS = 8
 ROUNDS_AGAIN = 3
 """Gauss-Newton steps at most, from the declared cell and from a fit to nearly the same rows: with four no split of the
 NMC drive or the M50T's changes by 0.1 %."""
-OWN_CHARGE = WALK_SD
+OWN_CHARGE = LOSS_SD
 """Deviation of the state of charge of a record, by what a day makes of a cell. Over the drives that train the
 development splits of `aesi bench splits`, each left out in turn, a recalibration takes 45.7 % off the declared model's
 squared error on the Panasonic (24.6 at worst) and 7.0 on the LG HG2 (-13.9), without it 38.1 (8.7) and -16.5 (-58.7);
