@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.ageing import Ageing
+from aesi.calibration.ageing import LOADED_SD, SLOW_SD, Ageing
 from aesi.calibration.parameters import Free, moved
 from aesi.calibration.records.prepared import Prepared
 from aesi.calibration.records.zero import Zero
@@ -138,12 +138,15 @@ class Model:
         """The cell with shares of its active material and of its silicon left."""
         return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_soh(material)
 
-    def run(self, index: int, cell: Cell, x: Array) -> Array:
-        """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`)."""
+    def run(self, index: int, cell: Cell, x: Array, more: float = 1.0) -> Array:
+        """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`).
+
+        more : factor on the active material that its cell has.
+        """
         self.simulations += 1
         record = self.records[index]
         model = EspmModel(
-            self.aged(cell, self.material(index, x), self.silicon(index, x)),
+            self.aged(cell, more * self.material(index, x), self.silicon(index, x)),
             solid_order=SOLID_ORDER,
             electrode_points=ELECTRODE_POINTS,
             most_substeps=MOST_STEPS,
@@ -165,6 +168,7 @@ class Model:
         for index, record in enumerate(self.records):
             first = 0 if record.start.basis == "full charge" else 1
             out[self.layout.own(index)[first:]] = 0.0
+        out[self.layout.ages] = self.ageing.none
         return out
 
     def errors(self, x: Array) -> list[Array]:
@@ -201,14 +205,15 @@ class Model:
             blocks[i][:, self.layout.shapes] = self.shapes.columns(
                 x[self.layout.shapes], stretched(runs[i][1], self.edge, self.silicon(i, x)), runs[i][2], rise
             )
-            h = STEP if self.ageing.dated else OWN_STEP
-            for j in self.layout.own(i):
+            for j in (j for j in self.layout.own(i) if j != self.layout.age(i)):
                 there = x.copy()
-                there[j] += h
-                blocks[i][:, j] = (self.run(i, cell, there)[0] - runs[i][0]) / h
+                there[j] += OWN_STEP
+                blocks[i][:, j] = (self.run(i, cell, there)[0] - runs[i][0]) / OWN_STEP
             # Records of one course of ageing are moved by one another's coordinates, too.
-            root = self.ageing.root[i]
-            blocks[i][:, self.layout.ages] = blocks[i][:, [self.layout.age(i)]] * root / root[i]
+            h = OWN_STEP * (SLOW_SD if record.slow else LOADED_SD)
+            by_share = (self.run(i, cell, x, float(np.exp(h)))[0] - runs[i][0]) / h
+            slopes = self.ageing.slopes(i, x[self.layout.ages])
+            blocks[i][:, self.layout.ages] = by_share[:, None] * slopes
         parts = []
         for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
             lenient = w * leniency(record.rows.voltage_v - run[0])

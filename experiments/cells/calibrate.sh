@@ -1,7 +1,7 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
-#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2] [OUT_FOLDER]
-# Without arguments all three, into this folder. Each takes some minutes of one processor. The shipped file of the Panasonic
+#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc] [OUT_FOLDER]
+# Without arguments all four, into this folder. Each takes some minutes of one processor. The shipped file of the Panasonic
 # over temperatures is from before its pulses, which are of three months, were fitted in one state (docs/cells.md).
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
@@ -27,11 +27,18 @@ panasonic_25degc() {
 hg2() {
     p=$data/lg_18650hg2
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
-        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" "$p/40degC_c20_ocv.csv" \
+        "$p/0degC_c20_ocv.csv" "$p/n10degC_cap_1c.csv" \
         --out "$out/lg_18650hg2.bpx.json"
 }
+hg2_25degc() {
+    p=$data/lg_18650hg2
+    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated at 25 degC alone" \
+        --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
+        --out "$out/lg_18650hg2_25degc.bpx.json"
+}
 case $which in
-all) panasonic && panasonic_25degc && hg2 ;;
-panasonic | panasonic_25degc | hg2) "$which" ;;
+all) panasonic && panasonic_25degc && hg2 && hg2_25degc ;;
+panasonic | panasonic_25degc | hg2 | hg2_25degc) "$which" ;;
 *) echo "there is no cell $which" >&2 && exit 2 ;;
 esac

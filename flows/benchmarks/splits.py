@@ -135,12 +135,13 @@ def _row(run: SplitRun) -> CaseRow:
 
 def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float], Sequence[Fitted]]:
     """The stages of `aesi run`, untracked: what was loaded, validation MSER (per cent), the models of Table 1."""
-    from aesi.pipeline.experiment.candidate import genome_space, weights
+    from aesi.pipeline.experiment.candidate import genome_space, top_share, weights
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
     from aesi.pipeline.experiment.judging.validation import validation_mser
     from aesi.pipeline.experiment.load import load
     from aesi.sparse import Candidate
+    from aesi.sparse.search.pick.average import averaged
     from flows.search.nsga2 import Constraints, search
 
     loaded = load(config)
@@ -157,7 +158,7 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
         weights=weights(config),
         warm_start=None if config.search.warm_start else (),
     )
-    chosen = known[found.best().trial.number]
+    chosen = averaged([known[number] for number in found.fittest(top_share(config))])
     fitted = conformalise(final_models(problem, chosen, config), problem, chosen, config, loaded.left_out)
     validation = validation_mser(loaded, problem, [c for c in known.values() if isinstance(c, Candidate)])
     return loaded, validation, fitted

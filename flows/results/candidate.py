@@ -57,7 +57,7 @@ class Rebuilt:
 
 
 def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
-    """The candidate of a tracked run; for the run of an experiment, the one that was chosen.
+    """The candidate of a tracked run; for the run of an experiment, the fittest of those that were chosen.
 
     Raises InputError where the run is no candidate, had failed, or lacks what it was made from.
     """

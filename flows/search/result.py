@@ -103,6 +103,16 @@ class SearchResult:
         score, _, trial = max(scored, key=lambda entry: entry[:2])
         return Pick(weights, trial, score)
 
+    def fittest(self, share: float) -> tuple[int, ...]:
+        """Numbers of the feasible trials of highest fitness, a share of all trials and at least one; the best first.
+
+        Raises FitError as `best` does.
+        """
+        first = self.best().trial.number
+        ranked = sorted(self.feasible, key=lambda trial: (-trial.numbers["fitness"], trial.number))
+        others = [trial.number for trial in ranked if trial.number != first]
+        return (first, *others[: max(1, round(share * len(self.trials))) - 1])
+
     def _nothing_feasible(self) -> str:
         reasons = Counter(trial.reason or "a correlation below its constraint" for trial in self.trials)
         listed = "; ".join(f"{count} x {reason}" for reason, count in reasons.most_common(4))

@@ -9,10 +9,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from aesi.errors import FitError
-from aesi.pipeline.experiment.candidate import ScoredCandidate, genome_space, weights
+from aesi.pipeline.experiment.candidate import ScoredCandidate, genome_space, top_share, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import Failed
 from aesi.sparse import Candidate, Genome, Problem
+from aesi.sparse.search.pick.average import averaged
 from flows.base import environment, fingerprint
 from flows.base.console import Console
 from flows.evaluation.generation import Evaluation, Tally
@@ -30,14 +31,20 @@ OnScored = Callable[[int, Genome, ScoredCandidate | Failed], None]
 class Found:
     """The result of the search stage.
 
-    key : content key of the chosen candidate.  scored : number -> outcome, of all candidates.
+    numbers : of the fittest candidates, those that `chosen` is the mean of, the best first.
+    key : content key of these.  scored : number -> outcome, of all candidates.
     """
 
     result: SearchResult
-    number: int
+    numbers: tuple[int, ...]
     chosen: Candidate
     key: str
     scored: dict[int, ScoredCandidate | Failed]
+
+    @property
+    def number(self) -> int:
+        """Of the fittest candidate."""
+        return self.numbers[0]
 
     def candidates(self) -> tuple[Candidate, ...]:
         """All candidates that did not fail."""
@@ -55,7 +62,7 @@ class Found:
                 "fitness": trial.numbers.get("fitness"),
                 "feasible": trial.feasible,
                 "front": trial.number in front,
-                "chosen": trial.number == self.number,
+                "chosen": trial.number in self.numbers,
             }
             for trial in self.result.trials
             if trial.losses is not None
@@ -127,12 +134,16 @@ def run_study(
         outcomes.close()
     if tally.found:
         console.say(f"  {tally.evaluated} candidates evaluated, {tally.found} known from before")
-    number = result.best().trial.number
-    chosen = scored[number]
-    if isinstance(chosen, Failed):
-        raise FitError(f"the chosen candidate {number} failed: {chosen.reason}")
-    key = evaluation.key(chosen.candidate.genome)
-    return Found(result, number, chosen.candidate, key, scored)
+    numbers = result.fittest(top_share(config))
+    chosen = averaged([_alive(number, scored[number]) for number in numbers])
+    key = fingerprint.key(*(evaluation.key(genome) for genome in chosen.genomes))
+    return Found(result, numbers, chosen, key, scored)
+
+
+def _alive(number: int, outcome: ScoredCandidate | Failed) -> Candidate:
+    if isinstance(outcome, Failed):
+        raise FitError(f"the chosen candidate {number} failed: {outcome.reason}")
+    return outcome.candidate
 
 
 def shared_outcomes(config: ExperimentConfig) -> Outcomes:

@@ -23,6 +23,7 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
     ("name", "file", "data"),
     [
         ("hg2", "lg_18650hg2", "lg_18650hg2"),
+        ("hg2_25degc", "lg_18650hg2_25degc", "lg_18650hg2"),
         pytest.param("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf", marks=MONTHS),
         ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
     ],

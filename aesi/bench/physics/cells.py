@@ -79,10 +79,10 @@ RECORDS = (
     MeasuredRecord(HG2, "0degC_mixed1"),
     MeasuredRecord(HG2, "40degC_la92"),
     MeasuredRecord(HG2, "10degC_us06"),
-    MeasuredRecord(HG2, "n10degC_cap_1c"),
-    MeasuredRecord(HG2, "40degC_c20_ocv"),
-    MeasuredRecord(HG2, "0degC_c20_ocv"),
-    *(MeasuredRecord(HG2, name, fitted=True) for name in ("25degC_c20_ocv", "25degC_cap_1c", "25degC_mixed1")),
+    MeasuredRecord(HG2, "25degC_cap_1c_b"),
+    *(MeasuredRecord(HG2, name, fitted=True)
+        for name in ("25degC_c20_ocv", "40degC_c20_ocv", "0degC_c20_ocv", "25degC_cap_1c", "25degC_mixed1",
+                     "n10degC_cap_1c")),
     MeasuredRecord(M50T, "n0_udds", others_mv=15.3, protocol="SPMe of PyBaMM, parameters of O'Regan et al. 2022"),
 )  # fmt: skip
 

@@ -11,7 +11,7 @@ from aesi.bench.real.good import beside_good
 
 HG2, PANASONIC, NMC, M50T = "lg_18650hg2", "panasonic_ncr18650pf", "about_energy_nmc", "lg_m50t_w8"
 CELLS = {
-    HG2: "lg_18650hg2.bpx.json",
+    HG2: "lg_18650hg2_25degc.bpx.json",
     PANASONIC: "panasonic_ncr18650pf_25degc.bpx.json",
     NMC: f"{NMC}:cell.bpx.json",
     M50T: "lg_m50_chen2020.bpx.json",

@@ -51,7 +51,7 @@ class OpenCircuit:
 
     def full_sd(self, voltage_v: float) -> float:
         """Standard deviation of the state of charge of a full cell that rests at `voltage_v`."""
-        return max(0.5 * (1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), READING_V)[1])
+        return max(0.5 * abs(1.0 - self.soc_at(voltage_v)), self.reading(self.voltage_at(1.0), READING_V)[1])
 
     def charged(self, voltage_v: float, drop_v: float = 0.0) -> bool:
         """Is this rest voltage that of a full charge?  drop_v : of it is the model's, which may be far too much."""

@@ -35,7 +35,7 @@ class Result:
     """All that an experiment ended with.
 
     candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
-    chosen : the candidate the models come from.  run_id : of the tracked run.  seconds : wall time so far.
+    chosen : the candidates the models come from, as one.  run_id : of the tracked run.  seconds : wall time so far.
     failed : how many candidates more were evaluated and came to nothing.
     """
 
@@ -152,6 +152,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
             "p_c": str(genome.p_c),
             "d": str(genome.d),
             "feedback of the error": "yes" if genome.feedback else "no",
+            "candidates averaged": str(len(result.chosen.genomes)),
         },
         notes=notes(result),
         versions={"python": platform.python_version()} | {name: version(name) for name in VERSIONS},

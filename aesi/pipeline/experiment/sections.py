@@ -183,6 +183,8 @@ class SearchConfig(Section):
     scalar fitness (`aesi.sparse.search.evaluate.FitnessWeights`).  pearson_train, pearson_valid : epsilon of the two
     constraints, which the paper sets (-1: none; a correction that left-out drives do not bear out fades by itself).
     warm_start : begin with a few plain candidates (strong ridge on the whole library).
+    top_share : of the resamples, the best of which make an ensemble, and of the candidates, the fittest of which are
+    averaged where corrections are not shrunk (`library.fade`).
     timeout_s, memory_mb : what one candidate may take before it counts as failed.
     """
 

@@ -12,12 +12,12 @@ instead of 50.8 and 29.0 mV.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from aesi.numerics.blocks import Span, leave_out_weights, pieces
-from aesi.numerics.typing import IntArray
+from aesi.numerics.typing import Array, IntArray
 from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import ErrorSeries, HeldOutDrive
 from aesi.sparse.fade import Fade
@@ -42,16 +42,16 @@ def fold_models(
     left_out: Sequence[HeldOutDrive] = (),
     cut: Sequence[Span] | None = None,
 ) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
-    """A model with the candidate's genome, a training record, and the samples of it that the model has not seen.
+    """A model with the candidate's genome, or the mean of models with its members' genomes, a training record, and the
+    samples of it that the model has not seen.
 
     One for every piece of `cut`: by default the folds of the search, where these are drives.  Pieces without which no
     term survives are left out.  judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
     left_out : for every piece, its record under physics that has not seen the piece either; by default the records as
     they are.
     """
-    genome, judged = candidate.genome, judged or candidate.bagging
-    active = _terms(problem, candidate, judged)
-    solver = STRidge(genome.lambda1, genome.lambda2)
+    judged = judged or candidate.bagging
+    active, members = _members(problem, candidate, judged)
     n = len(problem.target)
     drives = problem.folds_are_drives
     if cut is None:
@@ -63,14 +63,14 @@ def fold_models(
     q_rows, r = orthonormal(augmented)
     factors = triangular_factors(weighted_grams(q_rows, leave_out_weights(cut, n)), r)
     for i, ((a, b), factor) in enumerate(zip(cut, factors, strict=True)):
-        coefficients = solver.fit_factor(factor)
+        coefficients = sum((member.coefficients(factor) for member in members), start=np.zeros(len(active)))
         if not coefficients.any():
             continue
         kept = np.flatnonzero(coefficients)
         seen = np.r_[0:a, b:n]
         model = replace(
             sparse_model(problem, active, coefficients, judged.memory, "left-out piece"),
-            leverage=Leverage.of(factor[:, kept], genome.lambda1, problem.theta(active[kept])[:, seen]),
+            leverage=Leverage.of(factor[:, kept], candidate.ridge, problem.theta(active[kept])[:, seen]),
         )
         if judged.fade is not None:
             region = TrainedRegion.of(problem.inputs[seen], problem.soc[seen], problem.temperature_degc[seen])
@@ -79,13 +79,45 @@ def fold_models(
         yield model, left_out[i].series if drives and left_out else record, rows
 
 
-def _terms(problem: Problem, candidate: Candidate, judged: SparseModel) -> IntArray:
-    """Numbers of the terms that enter the fits of a fold."""
+@dataclass(frozen=True, eq=False)
+class _Member:
+    """places : of its terms among all that enter the fits.  share : what it counts in the mean."""
+
+    solver: STRidge
+    places: IntArray
+    share: float
+
+    def coefficients(self, factor: Array) -> Array:
+        """(m,) of the problem that the factor (any, m + 1) poses, times its share."""
+        m = factor.shape[1] - 1
+        given = np.zeros(m)
+        given[self.places] = self.share * self.solver.fit_factor(factor[:, np.append(self.places, m)])
+        return given
+
+
+def _members(
+    problem: Problem, candidate: Candidate, judged: SparseModel
+) -> tuple[IntArray, tuple[_Member, ...]]:
+    """Numbers of all terms that enter the fits of a fold, and what is fitted with which of them."""
+    candidates = candidate.members or (candidate,)
+    stable = judged.name == candidate.stability.name
+    terms = [_terms(problem, one, stable) for one in candidates]
+    every = np.unique(np.concatenate(terms))
+    return every, tuple(
+        _Member(
+            STRidge(one.genome.lambda1, one.genome.lambda2), np.searchsorted(every, mine), 1 / len(candidates)
+        )
+        for one, mine in zip(candidates, terms, strict=True)
+    )
+
+
+def _terms(problem: Problem, candidate: Candidate, stable: bool) -> IntArray:
+    """Numbers of the terms of a candidate that enter its fits; stable : of AESI II."""
     active = np.flatnonzero(candidate.genome.active(problem.library))
-    if judged.name != candidate.stability.name:
+    if not stable:
         return active
-    stable = set(candidate.stability.library.terms)
-    return np.array([j for j in active if problem.library.terms[j] in stable])
+    kept = set(candidate.stability.library.terms)
+    return np.array([j for j in active if problem.library.terms[j] in kept])
 
 
 def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:

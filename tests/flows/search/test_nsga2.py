@@ -186,3 +186,14 @@ def _outcome(genome, losses):
         genome=genome, losses=losses, fitness=0.0, pearson_train=1.0, pearson_valid=1.0,
         free_run_valid_mser_pct=0.0, one_step_valid_rmse_v=0.0,
     )  # fmt: skip
+
+
+def test_the_fittest_are_a_share_of_all_and_begin_with_the_pick(problem):
+    result = search(problem, 30, seed=1, population=10)
+    numbers = result.fittest(0.1)
+    assert len(set(numbers)) == len(numbers) == 3
+    assert numbers[0] == result.best().trial.number
+    fitnesses = {trial.number: trial.numbers["fitness"] for trial in result.feasible}
+    others = [value for number, value in fitnesses.items() if number not in numbers]
+    assert min(fitnesses[number] for number in numbers) >= max(others)
+    assert result.fittest(0.0) == numbers[:1]

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from aesi.calibration.ageing import LOADED_SD, SLOW_SD, WALK_SD, Ageing
+from aesi.calibration.ageing import LOADED_SD, LOSS_SD, SLOW_SD, Ageing
 from aesi.calibration.fit import problem
 from aesi.errors import DataError
 
@@ -18,23 +18,39 @@ def of(names, dates, slow=(), as_of=None):
     return Ageing.of(records, dates, as_of)
 
 
-def test_shares_of_records_further_apart_may_differ_by_more():
-    root = of(list(DAYS), DAYS).root
-    covariance = root @ root.T
-    days = np.array([(d - DAYS["march"]).days for d in DAYS.values()])
-    apart = np.abs(days[:, None] - days)
-    difference = np.diag(covariance)[:, None] + np.diag(covariance) - 2.0 * covariance
-    expected = WALK_SD**2 * apart + 2.0 * LOADED_SD**2 * (apart > 0)
-    assert difference == pytest.approx(expected)
+def shares(ageing, z):
+    return np.array([ageing.share(i, z) for i in range(len(z))])
 
 
-def test_a_day_between_two_records_lies_on_the_line_between_them():
-    root = of(list(DAYS), DAYS, as_of=DAYS["march"]).root
-    covariance = root @ root.T
-    other = [0, 2]
-    weights = np.linalg.solve(covariance[np.ix_(other, other)], covariance[other, 1])
-    share = 31 / 88
-    assert weights[1] == pytest.approx(share, rel=0.05)  # but for what a record has of its own
+@pytest.mark.parametrize("as_of", DAYS)
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_cell_only_loses(as_of, order):
+    names = list(DAYS)[::order]
+    ageing = of(names, DAYS, as_of=DAYS[as_of])
+    for z in np.random.default_rng(0).standard_normal((20, 3)):
+        found = dict(zip(names, shares(ageing, z), strict=True))
+        assert found["march"] > found["april"] > found["june"]
+        assert found[as_of] == 1.0
+
+
+def test_losses_are_the_sizes_of_normal_deviates_and_grow_with_the_root_of_the_days():
+    ageing = of(["march", "june"], {name: DAYS[name] for name in ("march", "june")})
+    drawn = [np.log(ageing.share(0, z)) for z in np.random.default_rng(1).standard_normal((4000, 2))]
+    sd = LOSS_SD * 88**0.5
+    assert min(drawn) > 0.0
+    assert np.sqrt(np.mean(np.square(drawn))) == pytest.approx(sd, rel=0.05)
+    assert np.median(drawn) == pytest.approx(0.6745 * sd, rel=0.05)
+
+
+def test_records_of_one_day_are_in_one_state():
+    ageing = of(["a", "b", "later"], {"a": DAYS["march"], "b": DAYS["march"], "later": DAYS["june"]})
+    found = shares(ageing, np.array([0.7, -0.4, 0.1]))
+    assert found[0] == found[1] > found[2] == 1.0
+
+
+def test_the_file_as_simulated_is_that_of_every_record():
+    ageing = of(list(DAYS), DAYS)
+    assert shares(ageing, ageing.none) == pytest.approx(np.ones(3), abs=0.0)
 
 
 def test_the_file_is_in_the_state_of_the_last_day_with_a_load_or_of_a_given_one():
@@ -42,14 +58,14 @@ def test_the_file_is_in_the_state_of_the_last_day_with_a_load_or_of_a_given_one(
     assert of(["march"], {"march": DAYS["march"]}, slow=["march"]).day == DAYS["march"]
     given = of(list(DAYS), DAYS, as_of=DAYS["march"])
     assert "2017-03-11" in given.sentences[0]
-    assert np.diag(given.root @ given.root.T)[0] == pytest.approx(LOADED_SD**2)
+    assert given.share(0, np.ones(3)) == 1.0
     with pytest.raises(DataError, match="no record has a date"):
         of(["march"], {}, as_of=DAYS["march"])
 
 
 def test_records_without_a_date_differ_from_the_file_alone():
     ageing = of(["slow", "loaded"], {}, slow=["slow"])
-    assert ageing.root == pytest.approx(np.diag([SLOW_SD, LOADED_SD]))
+    assert np.log(shares(ageing, np.array([1.0, -2.0]))) == pytest.approx([SLOW_SD, -2.0 * LOADED_SD])
     assert ageing.day is None
     assert ageing.sentences == ()
 

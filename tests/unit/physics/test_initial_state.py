@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from aesi.errors import DataError
 from aesi.physics import Cell, initial_state, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.start.open_circuit import READING_V
+from aesi.physics.start.open_circuit import READING_V, OpenCircuit
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -60,6 +60,13 @@ def test_a_rest_above_the_upper_cut_off_is_said_to_be_above_it():
     said = initial_state(LG_M50, resting(LG_M50.upper_voltage_v + 0.05)).sentence
     assert "rests at 4.250 V, 50 mV above the upper cut-off (4.2 V): a full charge" in said
     assert said.endswith("check the voltage's sensor, and the cell file, which may be another cell's.")
+
+
+def test_a_rest_as_far_above_full_as_below_leaves_the_same_doubt():
+    open_circuit = OpenCircuit(LG_M50, resting(LG_M50.upper_voltage_v))
+    below, above = (open_circuit.full_sd(open_circuit.voltage_at(1.0 + off)) for off in (-0.02, 0.02))
+    assert above == pytest.approx(below, rel=1e-2)
+    assert above == pytest.approx(0.01, rel=1e-2)
 
 
 def _ocv() -> tuple[np.ndarray, np.ndarray]:

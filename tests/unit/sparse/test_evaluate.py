@@ -128,7 +128,7 @@ def test_a_model_without_a_piece_is_the_fit_to_the_other_rows(split):
     np.testing.assert_allclose(model.coefficients, by_hand[by_hand != 0], rtol=1e-8)
 
 
-def test_validation_records_replace_the_folds(split):
+def test_the_figure_on_validation_is_of_the_validation_records(split):
     both = Split(split.train, (make_record(300, seed=8, name="valid"),), ())
     problem = Problem.build(both, Options(p_c=1, d=2, mixed=False, resamples=10, block=60))
     candidate = evaluate(problem, whole(problem, feedback=False, p_c=1))
@@ -277,3 +277,16 @@ def test_a_constant_ranks_nothing(problem, split):
         model, library=Library(model.library.variables, (Term(),)), coefficients=np.array([0.1])
     )
     assert svd_ranking(constant, split.train) == []
+
+
+def test_one_lucky_validation_drive_does_not_choose_alone(split):
+    # Half of the validation loss is on the left-out pieces, so that a drive that bears a candidate out by chance
+    # cannot hide that it errs where training has been.
+    valid = make_record(300, seed=8, name="valid")
+    options = Options(p_c=1, d=2, mixed=False, resamples=10, block=60)
+    pieces, both = (Problem.build(Split(split.train, records, ()), options) for records in ((), (valid,)))
+    left_out = evaluate(pieces, whole(pieces, feedback=False, p_c=1)).valid_losses
+    found = evaluate(both, whole(both, feedback=False, p_c=1))
+    for loss, on_pieces, model in zip(found.valid_losses, left_out, found.ensembles, strict=True):
+        free = mser(valid.error_v[1:], model.free_run(valid).error_v[1:])
+        assert loss == pytest.approx(0.5 * (on_pieces + 1.0 - free / 100.0), abs=1e-3)

@@ -14,7 +14,7 @@ from aesi.sparse import Candidate, Genome, Options, Problem, SparseModel, evalua
 from aesi.sparse.baselines.dmd_c import dmd_with_control
 from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
 from aesi.sparse.fade import DOUBT, shrunken
-from aesi.sparse.search.nested import nested_shares
+from aesi.sparse.search.pick.nested import nested_shares
 
 OPTIONS = Options(p_c=2, d=2, special=False, mixed=False, resamples=20, block=60, fade=True)
 

@@ -53,7 +53,7 @@ def _conformalised(
         pairs += fold_models(problem, chosen, one.model, left_out.parts)
         if left_out.drives and problem.folds_are_drives:
             drives += fold_models(problem, chosen, one.model, left_out.drives, problem.spans)
-        one = replace(one, model=with_leverage(one.model, problem, chosen.genome.lambda1))
+        one = replace(one, model=with_leverage(one.model, problem, chosen.ridge))
     elif isinstance(one.model, Bare | Persistence):
         pairs += [(one.model, each.series, each.rows) for each in left_out.parts]
         drives += [(one.model, each.series, each.rows) for each in left_out.drives]

@@ -28,7 +28,7 @@ from aesi.pipeline.experiment.physics_models import DECLARED, PHYSICS_NAMES
 from aesi.records import ErrorSeries, HeldOutDrive
 from aesi.sparse import ENSEMBLES, Candidate, Problem
 from aesi.sparse.search.fold_models import fold_models, fold_samples
-from aesi.sparse.search.nested import nested_shares, picked
+from aesi.sparse.search.pick.nested import nested_shares, picked
 
 SquaresLeft = dict[str, float]
 """Model -> sum of squares, V**2, that it leaves on a left-out piece."""

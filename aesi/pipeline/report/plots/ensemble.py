@@ -35,8 +35,8 @@ POWERS_FROM = 30.0
 def front_figure(candidates: Sequence[Row]) -> Figure:
     """Every candidate of the search: validation against out-of-bag loss, terms as colour."""
     caption = (
-        "One point a candidate. Diamonds form the Pareto front over the three losses; the star is the "
-        "chosen one; crosses miss the correlation constraints."
+        "One point a candidate. Diamonds form the Pareto front over the three losses; stars are what was "
+        "chosen, several being averaged; crosses miss the correlation constraints."
     )
     fig = style.figure("Candidates of the search", caption, 400)
     groups = (

@@ -1,0 +1,68 @@
+"""The fittest candidates of a search, averaged: one model with the mean of their coefficients over the union of terms.
+
+The losses of the fittest candidates differ by less than chance moves them, and what each adds of its own is mostly its
+own error. A map without feedback is linear in its coefficients, so that its free run is the mean of theirs; where terms
+hold the error it is the mean of the maps over one step.
+Hoeting, Madigan, Raftery & Volinsky, Stat. Sci. 14 (1999) 382, with equal weights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from aesi.numerics.typing import Array
+from aesi.sparse.model import SparseModel
+from aesi.sparse.search.evaluate import ENSEMBLES, Candidate
+from aesi.sparse.terms.library import Library, Term
+
+
+def averaged(candidates: Sequence[Candidate]) -> Candidate:
+    """One candidate with the mean of theirs as its ensembles, and them as its `members`.
+
+    candidates : of one problem, the fittest first; what else is told of the result (genome, losses) is of that one.
+    """
+    if len(candidates) == 1:
+        return candidates[0]
+    bagging, stability = (
+        mean_model([candidate.ensembles[number] for candidate in candidates])
+        for number in range(len(ENSEMBLES))
+    )
+    one, stable = np.mean([candidate.valid_losses for candidate in candidates], axis=0)
+    return replace(
+        candidates[0],
+        bagging=bagging,
+        stability=stability,
+        valid_losses=(float(one), float(stable)),
+        members=tuple(candidates),
+    )
+
+
+def mean_model(models: Sequence[SparseModel]) -> SparseModel:
+    """The mean of models of one problem, none of which fades; a term that one of them lacks counts as nought there."""
+    terms = tuple(dict.fromkeys(term for model in models for term in model.library.terms))
+    mean = replace(
+        models[0],
+        library=Library(models[0].library.variables, terms),
+        coefficients=_mean(terms, models, [model.coefficients for model in models]),
+        inclusion=_spread(terms, models, "inclusion"),
+        low=_spread(terms, models, "low"),
+        high=_spread(terms, models, "high"),
+    )
+    memory = 0.0 if mean.has_feedback else float(np.mean([model.memory for model in models]))
+    return replace(mean, memory=memory)
+
+
+def _mean(terms: Sequence[Term], models: Sequence[SparseModel], values: Sequence[Array]) -> Array:
+    number = {term: j for j, term in enumerate(terms)}
+    total = np.zeros(len(terms))
+    for model, each in zip(models, values, strict=True):
+        total[[number[term] for term in model.library.terms]] += each / len(models)
+    return total
+
+
+def _spread(terms: Sequence[Term], models: Sequence[SparseModel], name: str) -> Array | None:
+    known = [values for model in models if (values := getattr(model, name)) is not None]
+    return _mean(terms, models, known) if len(known) == len(models) else None
