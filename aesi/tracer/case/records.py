@@ -36,7 +36,7 @@ class PreparedRecord:
     fit_until_s : the time where the fit part of `data` ends (inf for all).  start : the state at the first row.
     hold, thin_hold : how the current runs between the samples of either.  white_v : (n_thin,) V, standard deviation of
     the white noise in each row of `thin`.  noise_full_v : of that in `data`.
-    seen_rows : rows of `data` at the start that only lead to what is judged.
+    lead_rows : rows of `data` at the start that only lead to what is judged.
     good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
     """
 
@@ -49,7 +49,7 @@ class PreparedRecord:
     thin_hold: Hold
     white_v: Array
     noise_full_v: float
-    seen_rows: int = 0
+    lead_rows: int = 0
     notes: tuple[str, ...] = ()
     good: bool = False
 
@@ -74,14 +74,14 @@ class PreparedRecord:
         return float(np.sqrt(np.mean(self.white_v[: self.n_fit] ** 2)))
 
     @property
-    def seen_rows_thin(self) -> int:
+    def lead_rows_thin(self) -> int:
         """Rows of `thin` that only serve to get to the part that is judged."""
-        if not self.seen_rows:
+        if not self.lead_rows:
             return 0
-        return int(np.searchsorted(self.thin.time_s, self.data.time_s[self.seen_rows]))
+        return int(np.searchsorted(self.thin.time_s, self.data.time_s[self.lead_rows]))
 
     @property
-    def fit_rows_full(self) -> int:
+    def n_fit_whole(self) -> int:
         """Rows of `data` that belong to the fit part."""
         return int(np.searchsorted(self.data.time_s, self.fit_until_s))
 
@@ -195,11 +195,11 @@ def prepare_test(
         n = len(known)
         same = len(data) > n and np.array_equal(data.time_s[:n], known.time_s)
         if same and np.array_equal(data.voltage_v[:n], known.voltage_v):
-            return replace(prepare(cell, data, soc0, 0.0, given=given, shared=True), seen_rows=n)
+            return replace(prepare(cell, data, soc0, 0.0, given=given, shared=True), lead_rows=n)
         gap = float(data.time_s[0] - known.time_s[-1])
         if 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s))):
             return replace(
-                prepare(cell, _joined(known, data), soc0, 0.0, given=given, shared=True), seen_rows=n
+                prepare(cell, _joined(known, data), soc0, 0.0, given=given, shared=True), lead_rows=n
             )
     return prepare(cell, data, soc0, 0.0, given=given, shared=True)
 

@@ -74,13 +74,13 @@ def outcomes(
     out = []
     for index, record in enumerate(records):
         runs = {name: state.simulated(record, index, thin=False) for name, state in states.items()}
-        cut = record.fit_rows_full
+        cut = record.n_fit_whole
         out.append(_outcome(record, "fit", slice(0, cut), runs, rng))
         if cut < len(record.data):
             out.append(_outcome(record, "test", slice(cut, len(record.data)), runs, rng))
     for record in tests:
         runs = {name: state.simulated(record, None, thin=False) for name, state in states.items()}
-        out.append(_outcome(record, "test", slice(record.seen_rows, len(record.data)), runs, rng))
+        out.append(_outcome(record, "test", slice(record.lead_rows, len(record.data)), runs, rng))
     return tuple(out)
 
 
@@ -119,7 +119,7 @@ def test_rmse_v(
     parts = []
     for record in tests:
         run = state.simulated(record, None, thin=True)
-        parts.append((record.thin.voltage_v - run.voltage_v)[record.seen_rows_thin :])
+        parts.append((record.thin.voltage_v - run.voltage_v)[record.lead_rows_thin :])
     for index, record in enumerate(records):
         if tests and record.n_fit == len(record.thin):
             continue

@@ -140,7 +140,7 @@ def test_a_continuation_is_judged_only_after_what_was_seen(cell):
     seen, rest = whole.between(0, 600), whole.between(600, 900)
     for test in (whole, rest):
         record = prepare_test(cell, test, [seen], None)
-        assert record.seen_rows == 600
+        assert record.lead_rows == 600
         assert len(record.data) == 900
     other = replace(rest, time_s=rest.time_s + 5000.0, current_a=np.zeros(300))
-    assert prepare_test(cell, other, [seen], None).seen_rows == 0
+    assert prepare_test(cell, other, [seen], None).lead_rows == 0
