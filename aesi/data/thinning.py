@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.records import Measurement
+from aesi.records import Hold, Measurement
 
 STEP_C_RATE = 0.01
 """A change of the current by more than this is a step."""
@@ -117,15 +117,16 @@ def averaged_over(data: Measurement, step_s: float) -> Measurement:
 
 
 def condensed(
-    data: Measurement, capacity_ah: float, longest_s: float, spacing: Spacing
+    data: Measurement, capacity_ah: float, longest_s: float, spacing: Spacing, hold: Hold = "backward"
 ) -> tuple[Measurement, Array] | None:
     """A record of steady currents and rests with few rows where little happens, and how many each stands for.
 
     None for a drive, which `averaged_over` thins.  capacity_ah : what a step of the current is measured by.
-    longest_s : the most that a row may stand for.
+    longest_s : the most that a row may stand for.  hold : how the current runs between the rows, then and afterwards.
     Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
-    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for; the current is what
-    moves the charge of the record, as its logger held it ("backward").
+    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for. So is a current that runs
+    in straight lines ("linear"), as rows at a step stand for themselves; one that its logger held since the row before
+    ("backward") is what moves the charge of the record.
     """
     steps = current_steps(data, capacity_ah)
     if not _steady(data, steps):
@@ -148,18 +149,23 @@ def condensed(
     if len(starts) == n:
         return data, rows
     time = means_of_rows(t, rows)
-    charge = np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(t))])
-    current = np.diff(np.interp(time, t, charge)) / np.diff(time)
     thin = replace(
         data,
         time_s=time,
-        current_a=np.concatenate([data.current_a[:1], current]),
+        current_a=_held(data, time) if hold == "backward" else means_of_rows(data.current_a, rows),
         voltage_v=means_of_rows(data.voltage_v, rows),
         temperature_degc=None
         if data.temperature_degc is None
         else means_of_rows(data.temperature_degc, rows),
     )
     return thin, rows
+
+
+def _held(data: Measurement, time_s: Array) -> Array:
+    """(m,) A, held since the time before, that moves the charge of a current that was held since the row before."""
+    charge = np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(data.time_s))])
+    current = np.diff(np.interp(time_s, data.time_s, charge)) / np.diff(time_s)
+    return np.concatenate([data.current_a[:1], current])
 
 
 def means_of_rows(column: Array, rows: Array) -> Array:

@@ -46,9 +46,7 @@ class ThinnedRecord:
     @property
     def thin_hold(self) -> Hold:
         """How the current of `thin` runs between its rows."""
-        if self.thin is self.whole:
-            return self.hold
-        return "linear" if self.rows is None else "backward"
+        return self.hold if self.thin is self.whole or self.rows is not None else "linear"
 
     def averaged(self, voltage_v: Array) -> Array:
         """(n_thin,) V: another voltage of the whole record (n,) as its own was thinned."""
@@ -61,7 +59,7 @@ def thinned_record(cell: Cell, data: Measurement, step_s: float = THIN_STEP_S) -
     """One record; at most one sample in `step_s` of a drive."""
     hold = data.hold or assumed_hold(data.time_s)
     longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_SAMPLES
-    steady = condensed(data, cell.nominal_capacity_ah, longest_s, STEADY_SPACING)
+    steady = condensed(data, cell.nominal_capacity_ah, longest_s, STEADY_SPACING, hold)
     thin, rows = (averaged_over(data, step_s), None) if steady is None else steady
     return ThinnedRecord(data, thin, rows, hold)
 

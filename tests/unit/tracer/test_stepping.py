@@ -8,7 +8,7 @@ from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
 from aesi.tracer.case.stepping import STEPS_A_SAMPLE, stepping
-from aesi.tracer.case.thinned import STEADY_SPACING
+from aesi.tracer.case.thinned import STEADY_SPACING, thinned_record
 
 
 @pytest.fixture
@@ -40,3 +40,21 @@ def test_few_steps_between_thinned_rows_are_as_good_as_many(cell, pulses, name):
     coarse, fine = voltage(*stepping(pulses)), voltage()
     assert pulses.time_s[-1] > 20 * STEPS_A_SAMPLE * len(pulses)  # steps of a second would be many more
     assert coarse == pytest.approx(fine, abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["double_layer", "series_resistance"])
+def test_pulses_between_whose_rows_the_current_runs_straight_lose_nothing_when_thinned(cell, name):
+    time = np.arange(3600.0)
+    current = np.where(time % 600 < 20, 60.0, 0.0)
+    data = Measurement(time, current, np.full(len(time), 3.7), name="pulses", hold="linear")
+    record = thinned_record(cell, data)
+    assert record.rows is not None
+    assert len(record.thin) < 0.5 * len(time)
+    assert record.thin_hold == "linear"
+    effects = (CATALOGUE[name].activate(),)
+    whole, thin = (
+        simulate(cell, one.time_s, one.current_a, 0.8, effects, None, "linear").voltage_v
+        for one in (record.whole, record.thin)
+    )
+    assert thin == pytest.approx(record.averaged(whole), abs=1e-3)
+    assert np.sqrt(np.mean((thin - record.averaged(whole)) ** 2)) < 1e-4
