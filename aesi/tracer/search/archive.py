@@ -70,7 +70,9 @@ def context_of(problem: InverseProblem) -> str:
     """Changes whenever a stored fit would no longer be the same fit."""
     text = [repr(problem.cell), problem.model, *(identity(e) for e in problem.effects.values())]
     text += [f"fixed {active.values} {identity(active.effect)}" for active in problem.fixed]
-    text += [f"{r.data.digest} {r.thin.digest} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}" for r in problem.records]
+    text += [
+        f"{r.data.digest} {r.thin.digest} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}" for r in problem.records
+    ]
     text += ["good" for r in problem.records if r.good]
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]
 
