@@ -124,9 +124,9 @@ def condensed(
     None for a drive, which `averaged_over` thins.  capacity_ah : what a step of the current is measured by.
     longest_s : the most that a row may stand for.  hold : how the current runs between the rows, then and afterwards.
     Rows are dense after a step of the current and ever sparser with the time since it: a pulse stays a pulse, at any
-    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for. So is a current that runs
-    in straight lines ("linear"), as rows at a step stand for themselves; one that its logger held since the row before
-    ("backward") is what moves the charge of the record.
+    rate of sampling. Voltage, temperature and time are averages of the rows that one stands for. So is a current that
+    runs in straight lines ("linear"), as rows at a step stand for themselves; one that its logger held since the row
+    before ("backward") is what moves the charge of the record.
     """
     steps = current_steps(data, capacity_ah)
     if not _steady(data, steps):
