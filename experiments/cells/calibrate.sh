@@ -1,8 +1,7 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
 #   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc] [OUT_FOLDER]
-# Without arguments all four, into this folder. Each takes some minutes of one processor. The shipped file of the Panasonic
-# over temperatures is from before its pulses, which are of three months, were fitted in one state (docs/cells.md).
+# Without arguments all four, into this folder. Each takes some minutes of one processor.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -14,7 +13,9 @@ panasonic() {
     p=$data/panasonic_ncr18650pf
     aesi calibrate --cell "$start" --title "Panasonic NCR18650PF 2.9 Ah NCA|graphite, calibrated" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_hppc.csv.gz" "$p/10degC_hppc.csv.gz" "$p/0degC_hppc.csv.gz" \
-        "$p/n10degC_hppc.csv.gz" --until n10degC_hppc=78611 \
+        "$p/n10degC_hppc.csv.gz" "$p/25degC_1c_start.csv" --until n10degC_hppc=78611 \
+        --date 25degC_1c_start=2017-03-09 --date 25degC_hppc=2017-03-11 --date 10degC_hppc=2017-03-27 \
+        --date 25degC_c20_ocv=2017-05-08 --date 0degC_hppc=2017-05-20 --date n10degC_hppc=2017-06-07 --as-of 2017-03-11 \
         --impedance "$p/25degC_eis.csv" --impedance "$p/10degC_eis.csv" \
         --out "$out/panasonic_ncr18650pf.bpx.json"
 }

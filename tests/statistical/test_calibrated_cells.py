@@ -12,9 +12,6 @@ from aesi.data.catalogue import locate
 from aesi.errors import DataError
 from aesi.physics import Cell, simulate
 
-MONTHS = pytest.mark.xfail(
-    reason="pulses of three months, in whose one state the command's file is worse at 25 degC", strict=False
-)
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
 
 
@@ -24,7 +21,7 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
     [
         ("hg2", "lg_18650hg2", "lg_18650hg2"),
         ("hg2_25degc", "lg_18650hg2_25degc", "lg_18650hg2"),
-        pytest.param("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf", marks=MONTHS),
+        ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
         ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
     ],
 )

@@ -68,9 +68,8 @@ RECORDS = (
     MeasuredRecord(NCR, "10degC_cycle_1", others_mv=43.5, protocol=f"UDDS; {ECM_UDE}"),
     MeasuredRecord(NCR, "0degC_cycle_1", others_mv=71.0, protocol=f"UDDS; {ECM_UDE}"),
     MeasuredRecord(NCR, "n10degC_cycle_1", others_mv=127.4, protocol=f"UDDS; {ECM_UDE}"),
-    MeasuredRecord(NCR, "25degC_1c_start"),
     *(MeasuredRecord(NCR, f"{name}", fitted=True)
-        for name in ("25degC_c20_ocv", "25degC_hppc", "10degC_hppc", "0degC_hppc")),
+        for name in ("25degC_1c_start", "25degC_c20_ocv", "25degC_hppc", "10degC_hppc", "0degC_hppc")),
     MeasuredRecord(NCR, "n10degC_hppc", fitted=True, until_s=78611.0),
     MeasuredRecord(HG2, "25degC_us06"),
     MeasuredRecord(HG2, "25degC_la92"),
