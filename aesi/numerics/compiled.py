@@ -12,6 +12,7 @@ import hashlib
 import os
 import re
 import shutil
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -24,6 +25,9 @@ from numba import njit
 from aesi.numerics.cache_folder import cache_folder
 
 SETTINGS: Any = numba.config
+CHOOSING = threading.Lock()
+"""Numba has one cache folder a process: functions that two threads define at once would take each other's, or the
+working folder."""
 ROOT = Path(__file__).resolve().parents[2]
 IMPORT = re.compile(rb"^from (aesi[\w.]*) import", re.MULTILINE)
 COMPILED = re.compile(rb"^@(njit|compiled|kept_njit)\b", re.MULTILINE)
@@ -37,14 +41,15 @@ def kept_njit(**options: Any) -> Callable[[Any], Any]:
     """
 
     def compiler(function: Any) -> Any:
-        chosen = SETTINGS.CACHE_DIR
         source = Path(function.__code__.co_filename)
-        if source.exists():
-            SETTINGS.CACHE_DIR = str(_folder(source, chosen))
-        try:
-            return njit(cache=True, **options)(function)
-        finally:
-            SETTINGS.CACHE_DIR = chosen
+        with CHOOSING:
+            chosen = SETTINGS.CACHE_DIR
+            if source.exists():
+                SETTINGS.CACHE_DIR = str(_folder(source, chosen))
+            try:
+                return njit(cache=True, **options)(function)
+            finally:
+                SETTINGS.CACHE_DIR = chosen
 
     return compiler
 

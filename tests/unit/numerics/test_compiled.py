@@ -6,6 +6,8 @@ import re
 import shutil
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -91,6 +93,28 @@ def test_a_folder_that_the_user_names_is_used(package, tmp_path):
     chosen = tmp_path / "chosen"
     assert ask(package, NUMBA_CACHE_DIR=str(chosen)) == (30.0, 0)
     assert not list(package.rglob("*.nbi"))
+
+
+def test_two_threads_that_define_functions_at_once_left_a_folder_in_the_working_folder(monkeypatch, tmp_path):
+    seen = []
+
+    def slow_njit(**_):
+        def define(function):
+            before = compiled.SETTINGS.CACHE_DIR
+            time.sleep(0.05)
+            seen.append((before, compiled.SETTINGS.CACHE_DIR))
+            return function
+
+        return define
+
+    monkeypatch.setattr(compiled, "njit", slow_njit)
+    chosen = str(tmp_path)
+    monkeypatch.setattr(compiled.SETTINGS, "CACHE_DIR", chosen)
+    with ThreadPoolExecutor(2) as threads:
+        list(threads.map(compiled.kept_njit(), [compiled.sources, compiled.cache_folder]))
+    assert sorted(Path(before).name.split("-")[0] for before, _ in seen) == ["cache_folder", "compiled"]
+    assert all(before == after for before, after in seen)
+    assert chosen == compiled.SETTINGS.CACHE_DIR
 
 
 def test_machine_code_is_kept_in_no_other_way():
