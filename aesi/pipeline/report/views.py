@@ -23,6 +23,7 @@ class ModelVoltage:
     """One model's voltage over one record, (n,) V each; None where it was not computed.
 
     free_run_* : no measured voltage after the first sample.  one_step_* : the step before is given.
+    outside : (n,) True where an input of the free run lies outside the range that this model was trained on.
     """
 
     free_run_v: Array
@@ -32,14 +33,14 @@ class ModelVoltage:
     one_step_lower_v: Array | None = None
     one_step_upper_v: Array | None = None
     diverged_at: int | None = None
+    outside: BoolArray | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class RecordTrace:
     """One record: what was measured, what the physics says, and what each model says.
 
-    time_s, current_a, soc, measured_v, physics_v : (n,).  outside : (n,) True where an input lies outside the
-    range the models were trained on.
+    time_s, current_a, soc, measured_v, physics_v : (n,).  predictions : by the model's name.
     """
 
     name: str
@@ -50,7 +51,6 @@ class RecordTrace:
     measured_v: Array
     physics_v: Array
     predictions: Mapping[str, ModelVoltage] = field(default_factory=dict)
-    outside: BoolArray | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,11 +32,9 @@ def trace(name, role, n, rng):
         free = physics + share * error
         one = measured + 4e-4 * rng.standard_normal(n)
         predictions[model] = ModelVoltage(
-            free, free - 0.012, free + 0.012, one, one - 1e-3, one + 1e-3, diverged_at=None
+            free, free - 0.012, free + 0.012, one, one - 1e-3, one + 1e-3, outside=np.zeros(n, dtype=bool)
         )
-    return RecordTrace(
-        name, role, time_s, current_a, soc, measured, physics, predictions, np.zeros(n, dtype=bool)
-    )
+    return RecordTrace(name, role, time_s, current_a, soc, measured, physics, predictions)
 
 
 def model_row(name, terms, rmse_mv, mser):

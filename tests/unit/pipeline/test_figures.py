@@ -73,7 +73,10 @@ def test_the_measurement_is_inside_the_drawn_band_exactly_where_it_is_inside_the
 def test_samples_outside_the_trained_range_are_marked_and_no_others(views):
     trace = views.trace("t", "test", 500, np.random.default_rng(0))
     outside = np.arange(500) >= 450
-    fig = records.voltage_figure([replace(trace, outside=outside)], "ESPM + AESI I", "ESPM")
+    of_chosen = replace(trace.predictions["ESPM + AESI I"], outside=outside)
+    of_another = replace(trace.predictions["ESPM + AESI II"], outside=~outside)
+    both = {"ESPM + AESI I": of_chosen, "ESPM + AESI II": of_another}
+    fig = records.voltage_figure([replace(trace, predictions=both)], "ESPM + AESI I", "ESPM")
     marked = next(t for t in fig.data if t.name.startswith("outside"))
     np.testing.assert_array_equal(np.isfinite(marked.y), outside)
     inside = records.voltage_figure([trace], "ESPM + AESI I", "ESPM")

@@ -57,7 +57,7 @@ def evaluate_models(
     validation : model -> reduction over drives that chose nothing, per cent (`judging.validation`).
     """
     traces: dict[tuple[Role, str], dict[str, ModelVoltage]] = {}
-    rows, outside = [], {}
+    rows = []
     for one in fitted:
         started = time.monotonic()
         judged = {role: [_judge(one, series, role) for series in getattr(split, role)] for role in ROLES}
@@ -70,12 +70,10 @@ def evaluate_models(
             for record in records:
                 key = (role, record.series.name)
                 traces.setdefault(key, {})[one.model.name] = _prediction(record)
-                if one.terms:
-                    outside[key] = record.free.outside
     return EvaluatedModels(
         rows=tuple(rows),
         traces=tuple(
-            _trace(role, series, traces[role, series.name], outside.get((role, series.name)))
+            _trace(role, series, traces[role, series.name])
             for role in ROLES
             for series in cast("tuple[ErrorSeries, ...]", getattr(split, role))
         ),
@@ -237,12 +235,11 @@ def _prediction(record: _Judged) -> ModelVoltage:
         one_step_lower_v=None if intervals is None else step_v + intervals.lower_v,
         one_step_upper_v=None if intervals is None else step_v + intervals.upper_v,
         diverged_at=record.free.diverged_at,
+        outside=record.free.outside,
     )
 
 
-def _trace(
-    role: Role, series: ErrorSeries, predictions: dict[str, ModelVoltage], outside: Any
-) -> RecordTrace:
+def _trace(role: Role, series: ErrorSeries, predictions: dict[str, ModelVoltage]) -> RecordTrace:
     return RecordTrace(
         name=series.name,
         role=role,
@@ -252,7 +249,6 @@ def _trace(
         measured_v=series.model_v + series.error_v,
         physics_v=series.model_v,
         predictions=predictions,
-        outside=outside,
     )
 
 

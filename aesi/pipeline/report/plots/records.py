@@ -69,7 +69,7 @@ def voltage_figure(traces: Sequence[RecordTrace], chosen: str, physics: str) -> 
             line(fig, item.x, prediction.free_run_v, chosen, style.BLUE, first=first)
             line(fig, item.x, _error(trace, prediction.free_run_v), chosen, style.BLUE, 2, first=False)
         line(fig, item.x, trace.measured_v, "measured", style.MEASURED, first=first, width=1.0)
-    mark_outside(fig, placed)
+    mark_outside(fig, placed, chosen)
     mark_records(fig, placed)
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="error, mV", row=2, zeroline=True)

@@ -126,13 +126,14 @@ def mark_records(fig: Figure, placed: Sequence[Placed]) -> None:
             )
 
 
-def mark_outside(fig: Figure, placed: Sequence[Placed]) -> None:
-    """A thick line along zero error where an input lies outside the range the models were trained on."""
+def mark_outside(fig: Figure, placed: Sequence[Placed], model: str) -> None:
+    """A thick line along zero error where an input lies outside the range that this model was trained on."""
     first = True
     for item in placed:
-        outside = getattr(item.trace, "outside", None)
-        if outside is not None and outside.any():
-            y = np.where(outside, 0.0, np.nan)
+        assert isinstance(item.trace, RecordTrace)
+        prediction = item.trace.predictions.get(model)
+        if prediction is not None and prediction.outside is not None and prediction.outside.any():
+            y = np.where(prediction.outside, 0.0, np.nan)
             line(fig, item.x, y, OUTSIDE, style.ORANGE, 2, first, 5.0)
             first = False
 
