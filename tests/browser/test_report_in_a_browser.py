@@ -83,6 +83,15 @@ def test_no_table_is_wider_than_the_paper(page, request, report):
         page.call("Emulation.setEmulatedMedia", media="")
 
 
+def test_on_a_phone_the_names_of_a_wide_table_stay_beside_its_last_column(page, run_report):
+    page.open(run_report, width=400)
+    wide = "[...document.querySelectorAll('.scroll')].reduce((a, b) => a.scrollWidth > b.scrollWidth ? a : b)"
+    assert page.evaluate(f"{wide}.scrollWidth > {wide}.clientWidth + 50")
+    page.evaluate(f"{wide}.scrollLeft = {wide}.scrollWidth")
+    seen = f"{wide}.querySelector('tbody th').getBoundingClientRect()"
+    assert page.evaluate(f"{seen}.left >= 0 && {seen}.right < innerWidth / 2")
+
+
 @pytest.mark.slow
 def test_a_hundred_thousand_samples_stay_smooth(page, views, tmp_path):
     path = write_discovery_report(tmp_path / "r.html", views.discovery_view(100_000))
