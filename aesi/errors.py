@@ -37,6 +37,12 @@ class CellError(InputError):
     """A cell file fails its schema or lacks a field that is needed."""
 
 
+class EffectError(InputError, KeyError):
+    """The catalogue is asked for an effect that it does not have."""
+
+    __str__ = Exception.__str__  # KeyError puts its message in quotes
+
+
 class ConfigError(InputError):
     """An experiment file has an unknown key or an inadmissible value."""
 

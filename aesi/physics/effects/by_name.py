@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copyreg
 import importlib.util
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -12,9 +13,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from aesi.errors import InputError, did_you_mean
+from aesi.errors import InputError
 from aesi.physics.effect import ActiveEffect, Effect
-from aesi.physics.effects.catalogue import CATALOGUE
+from aesi.physics.effects.catalogue import CATALOGUE, no_such_effect
 
 
 def find_effect(name: str, file: str | None = None) -> Effect:
@@ -46,12 +47,14 @@ def selected(
 ) -> dict[str, Effect]:
     """Of `known` those named, or all but those named; a name may be several with commas between them.
 
-    Raises InputError with the nearest match for an unknown id.
+    Raises InputError with the nearest match for an unknown id, and for one that is named to be tried and left out.
     """
     kept, left_out = (
         {named_effect(name.strip(), known).id for names in given for name in names.split(",")}
         for given in (only, without)
     )
+    for name in sorted(kept & left_out):
+        raise InputError(f"{name} is named both to be tried alone and to be left out; drop one of the two.")
     kept = kept or set(known)
     return {name: effect for name, effect in known.items() if name in kept - left_out}
 
@@ -61,19 +64,23 @@ def activated(
 ) -> tuple[ActiveEffect, ...]:
     """Effects by id with their values, in the order given; `files` hold the user's own.
 
-    Raises InputError for an unknown effect, ParameterError for its values.
+    Raises InputError for an unknown effect and for one that is named twice, ParameterError for its values.
     """
     known = known_effects(files)
-    return tuple(named_effect(name, known).activate(**values) for name, values in effects)
+    active = tuple(named_effect(name, known).activate(**values) for name, values in effects)
+    for name, times in Counter(effect.id for effect in active).items():
+        if times > 1:
+            raise InputError(
+                f"the effect {name} is named {times} times; give it once, with all its parameters."
+            )
+    return active
 
 
 def named_effect(name: str, known: Mapping[str, Effect]) -> Effect:
     """One of `known`.  Raises InputError with the nearest match for an unknown id."""
     if name in known:
         return known[name]
-    raise InputError(
-        f"there is no effect {name!r} in the catalogue{did_you_mean(name, known)} `aesi effects` lists them."
-    )
+    raise InputError(no_such_effect(name, known))
 
 
 def load_effect(path: str | PathLike[str]) -> Effect:

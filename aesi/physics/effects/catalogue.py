@@ -1,5 +1,8 @@
 """The catalogue of effects: one file an effect, registered here."""
 
+from collections.abc import Iterable
+
+from aesi.errors import EffectError, did_you_mean
 from aesi.physics.effect import Effect
 from aesi.physics.effects import (
     active_material_loss_negative,
@@ -31,8 +34,21 @@ from aesi.physics.effects import (
     voltage_sensor_offset,
 )
 
-CATALOGUE: dict[str, Effect] = {
-    effect.id: effect
+
+class Catalogue(dict[str, Effect]):
+    """Effects by id.  Raises EffectError, with the nearest match, where one is asked for that is not there."""
+
+    def __missing__(self, name: str) -> Effect:
+        raise EffectError(no_such_effect(name, self))
+
+
+def no_such_effect(name: object, known: Iterable[str]) -> str:
+    """The sentence on an id that none of the known effects has."""
+    return f"there is no effect {name!r} in the catalogue{did_you_mean(str(name), known)} `aesi effects` lists them."
+
+
+CATALOGUE = Catalogue(
+    (effect.id, effect)
     for effect in (
         self_heating.EFFECT,
         ambient_temperature.EFFECT,
@@ -62,5 +78,5 @@ CATALOGUE: dict[str, Effect] = {
         clock_skew.EFFECT,
         numerical_error.EFFECT,
     )
-}
+)
 """id -> Effect, in the order in which listings show them."""
