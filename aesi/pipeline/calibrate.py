@@ -96,7 +96,8 @@ def calibrate_files(
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
-    """Raises DataError for a record that is given twice or too short, InputError for a temperature that no cell has."""
+    """Raises DataError for a record that is given twice, is too short or holds no current, InputError for a temperature
+    that no cell has."""
     check_distinct(measurements)
     for record in measurements:
         span_s = float(record.time_s[-1] - record.time_s[0])
@@ -104,6 +105,11 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
             raise DataError(
                 f"{record.name} lasts {span_s:.3g} s, in which neither diffusion nor the slope of the open-circuit "
                 f"voltage shows; give records of at least {SHORTEST_S:g} s."
+            )
+        if not record.current_a.any():
+            raise DataError(
+                f"{record.name}: the current is 0 A in all {len(record):,} rows, so that no parameter shows; leave the "
+                "record out, or check the column of the current."
             )
     for name, value in (temperatures_degc or {}).items():
         check_temperature(value, f"the temperature of {name}")

@@ -239,3 +239,9 @@ def test_an_impedance_says_what_cannot_be_meant(cell):
     ):
         with pytest.raises(InputError, match=sentence):
             aesi.impedance(**({"cell": cell, "frequency_hz": [1.0], "soc": 0.5} | changes))
+
+
+def test_a_record_without_any_current_ended_a_calibration_with_an_index_error(cell):
+    rest = aesi.Measurement(TIME, np.zeros(len(TIME)), np.full(len(TIME), 4.0), name="rest")
+    with pytest.raises(DataError, match="rest: the current is 0 A in all 1,800 rows"):
+        aesi.calibrate(cell, rest)
