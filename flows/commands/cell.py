@@ -10,6 +10,9 @@ import typer
 from aesi.errors import InputError
 from flows.commands import options, outputs
 
+BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
+"""What `aesi discover` takes beside an experiment file, which says all else itself."""
+
 
 @options.reads_files
 def simulate(
@@ -27,7 +30,7 @@ def simulate(
     self_heating: options.SelfHeating = False,
 ) -> None:
     """The physics model alone, under a current profile."""
-    outputs.check_file(out, [cell, current])
+    outputs.check_table(out, [cell, current])
     from aesi.pipeline.simulation import simulate_file
 
     run = simulate_file(
@@ -64,7 +67,7 @@ def predict(
     self_heating: options.SelfHeating = False,
 ) -> None:
     """A saved hybrid model with its intervals."""
-    outputs.check_file(out, [current])
+    outputs.check_table(out, [current])
     from aesi.pipeline.simulation import predict_file
 
     rows = predict_file(
@@ -164,7 +167,7 @@ def impedance(
     soh: options.Soh = None,
 ) -> None:
     """The physics model in the frequency domain, at rest."""
-    outputs.check_file(out, [cell, Path(frequencies)])
+    outputs.check_table(out, [cell, Path(frequencies)])
     from aesi.pipeline.impedance import impedance_file
 
     z = impedance_file(
@@ -186,6 +189,7 @@ def impedance(
 @options.reads_files
 def discover(
     *,
+    context: typer.Context,
     reading: Any,
     experiment: Annotated[
         Path | None, typer.Argument(help="An experiment file instead of --cell and --data.")
@@ -242,6 +246,7 @@ def discover(
     if out is not None:
         outputs.check_folder(out)
     if experiment is not None:
+        options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
         options.say_reading([experiment])
         from flows.jobs.start import discover_experiment
 
@@ -249,6 +254,10 @@ def discover(
         return
     if cell is None or not data or out is None:
         raise InputError("give --cell, --data and --out, or an experiment file.")
+    if overrides:
+        raise InputError(
+            "--set changes a key of an experiment file, and none is given; use the options instead."
+        )
     options.say_reading([*data, *(test or []), *(good or [])])
     from aesi.pipeline.discovery.cases import case_of_files
     from flows.jobs.start import discover as flow

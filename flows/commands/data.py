@@ -54,7 +54,7 @@ def convert(
     ] = "aesi",
 ) -> None:
     """Write a measurement as CSV in SI units, and say what was done to it."""
-    outputs.check_file(out, [file])
+    outputs.check_table(out, [file])
     from aesi.data.convert import convert_file, record_lines
 
     record = convert_file(file, out, reading, to)

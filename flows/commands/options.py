@@ -140,6 +140,17 @@ def reads_files(command: Callable[..., None]) -> Callable[..., None]:
     return reading_command
 
 
+def check_unsaid(context: typer.Context, admissible: Iterable[str]) -> None:
+    """Raises InputError where an option is given beside an experiment file that would not be looked at."""
+    for name in context.params:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE" and name not in admissible:
+            option = "--" + name.replace("_", "-")
+            raise InputError(
+                f"{option} is not read beside an experiment file; say it there, or with --set KEY=VALUE."
+            )
+
+
 def _reading(
     column: list[str] | None,
     unit: list[str] | None,

@@ -8,6 +8,8 @@ from pathlib import Path
 
 from aesi.errors import InputError
 
+OTHER_FORMATS = (".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5")
+
 
 def check_file(out: Path, inputs: Iterable[Path] = ()) -> None:
     """Raises InputError where `out` cannot be a file to write, or is one of the files that are read."""
@@ -18,6 +20,13 @@ def check_file(out: Path, inputs: Iterable[Path] = ()) -> None:
     if out.exists() and not os.access(out, os.W_OK):
         raise InputError(f"--out {out} is there and may not be written over; give another name.")
     _check_place(out.parent)
+
+
+def check_table(out: Path, inputs: Iterable[Path] = ()) -> None:
+    """As `check_file`, of a CSV.  Raises InputError also where the name promises another format."""
+    check_file(out, inputs)
+    if out.suffix.lower() in OTHER_FORMATS:
+        raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv.")
 
 
 def check_folder(out: Path) -> None:

@@ -18,6 +18,9 @@ from flows import cli
 from flows.commands.options import dates, day
 
 
+LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
+
+
 def test_version(call):
     assert call("--version")[:2] == (0, "aesi 0.1.0\n")
 
@@ -42,6 +45,17 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         (["discover", "--data", "a.csv"], "give --cell, --data and --out"),
         (["simulate", "--cell", "no.json", "--current", "no.csv", "--out", "o.csv"], "no.csv"),
         (["tables", "nothing"], "no experiment 'nothing' is tracked"),
+        (["discover", "e.yaml", "--max-effects", "1"], "--max-effects is not read beside an experiment file"),
+        (["discover", "e.yaml", "--unit", "current_a=mA"], "--unit is not read beside an experiment file"),
+        (
+            ["discover", "--cell", "c.json", "--data", "d.csv", "--out", "found", "--set", "seed=1"],
+            "--set changes a key of an experiment file, and none is given",
+        ),
+        (["predict", "--model", "m", "--current", "d.csv", "--out", "o.xlsx"], "what is written is a CSV"),
+        (
+            ["impedance", "--cell", LG_M50, "--soc", "0.5", "--frequencies", "1:10", "--out", "z.csv"],
+            "--frequencies 1:10: has to read LOW:HIGH:N",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, words):
