@@ -30,14 +30,14 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     if missing or not any(name in header for name in STATES):
         wanted = ", ".join(missing) if missing else " or ".join(STATES)
         raise DataError(
-            f"{file} has no column {wanted}; a file of spectra needs {', '.join(NEEDED)} and a state."
+            f"{file} has no column {wanted}; a file of spectra needs {', '.join(NEEDED)}, and {' or '.join(STATES)}."
         )
     names = [name for name in (*NEEDED, *DESCRIBED) if name in header]
     columns = dict(zip(names, table.read(tuple(header.index(name) for name in names)), strict=True))
     for name, values in columns.items():
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise DataError(f"{file}, row {row + 2}, column {name}: not a number.")
+            raise DataError(f"{file}, {table.where(row)}, column {name}: not a number.")
     if not (columns["frequency_hz"] > 0.0).all():
         raise DataError(f"{file}, column frequency_hz: a frequency has to be positive.")
     return tuple(_spectrum(file, k, columns, rows) for k, rows in enumerate(_pieces(columns)))

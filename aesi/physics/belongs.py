@@ -136,6 +136,11 @@ def _cause(ratio: float, record: Measurement) -> str:
         return "the time is in hours; declare it: --unit time_s=h"
     if ratio < 1.0 / 15.0:
         return "the time is in minutes or hours (declare it: --unit time_s=min or h), or the cell file is another's"
+    if ratio > 15.0:
+        return (
+            "the current is in mA or the time in ms (declare it: --unit current_a=mA, or --unit time_s=ms), or the "
+            "cell file is another's"
+        )
     one_way = np.min(record.current_a) >= 0.0 or np.max(record.current_a) <= 0.0
     if ratio > 1.0 and one_way:
         return (

@@ -49,10 +49,10 @@ def impedance_file(
 
 def read_frequencies(text: str) -> Array:
     """Hz, of LOW:HIGH:N or of a file.  Raises InputError or DataError for what is neither."""
-    parts = text.split(":")
-    if len(parts) == 3:
+    if ":" in text and not Path(text).exists():
         try:
-            low, high, n = float(parts[0]), float(parts[1]), int(parts[2])
+            lowest, highest, count = text.split(":")
+            low, high, n = float(lowest), float(highest), int(count)
         except ValueError:
             raise InputError(f"--frequencies {text}: has to read LOW:HIGH:N, as in 0.001:1000:61.") from None
         if not 0.0 < low < high < np.inf or n < 2:

@@ -27,7 +27,8 @@ def load_columns(
     data = _numbers(table, mapped)
     if len(data["time_s"]) < 2:
         raise DataError(
-            f"{table.path.name} has {len(data['time_s'])} rows below its header; a measurement needs at least two."
+            f"{table.path.name} has too few rows below its header ({len(data['time_s'])}); a measurement needs at "
+            "least two."
         )
     context = Context(table.path.name, mapped.header, table.where)
     notes = [*table.notes, *mapped.notes]

@@ -47,9 +47,10 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
     Raises InputError naming the file that is missing or not as it was written.
     """
-    head = _read_json(
-        folder / HEAD, f"a model folder is written by `aesi run` or `aesi discover`{_below(folder)}"
-    )
+    written = f"a model folder is written by `aesi run` or `aesi discover`{_below(folder)}"
+    if folder.is_file():
+        raise InputError(f"{folder} is a file, not the folder of a model; {written}")
+    head = _read_json(folder / HEAD, written)
     schema = head.get("schema") if isinstance(head, dict) else None
     if schema != SCHEMA:
         raise InputError(f"{folder / HEAD} has schema {schema!r}; this version reads {SCHEMA!r}.")

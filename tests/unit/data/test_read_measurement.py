@@ -196,7 +196,7 @@ def test_a_unit_in_the_name_is_believed(tmp_path):
     ("content", "word"),
     [
         (b"", "empty"),
-        (HEADER.encode(), "0 rows"),
+        (HEADER.encode(), "too few rows below its header (0)"),
         (text().split("\n", 1)[1].encode(), "header"),
         (bytes(range(256)) * 10, "binary"),
         (gzip.compress(text().encode())[:300], "truncated"),

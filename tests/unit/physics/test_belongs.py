@@ -68,5 +68,10 @@ def test_a_record_of_a_cell_thirty_times_smaller_is_not_taken_for_one_in_minutes
         check_belongs(m50, [replace(record, current_a=record.current_a / 30.0)])
 
 
+def test_a_short_record_in_ma_was_said_to_be_of_many_cells_in_parallel(m50, record):
+    with pytest.raises(DataError, match=r"--unit current_a=mA.*or the cell file is another's"):
+        check_belongs(m50, [replace(record, current_a=record.current_a * 60.0)])
+
+
 def test_a_profile_without_a_voltage_says_nothing(m50, record):
     check_belongs(m50, [replace(record, voltage_v=np.full_like(record.voltage_v, np.nan))])

@@ -150,6 +150,12 @@ def test_a_folder_of_runs_is_asked_about_its_newest_model(model, tmp_path):
         HybridModel.load(tmp_path)
 
 
+def test_a_file_given_for_a_model_is_told_as_one(tmp_path):
+    (tmp_path / "cell.json").write_text("{}")
+    with pytest.raises(InputError, match=r"cell.json is a file, not the folder of a model; a model folder is"):
+        HybridModel.load(tmp_path / "cell.json")
+
+
 def test_a_file_in_the_place_of_a_model_is_not_written_over(model, tmp_path):
     (tmp_path / "there").write_text("kept")
     for place in (tmp_path / "there", tmp_path / "there" / "below"):
