@@ -67,7 +67,7 @@ def _kind(row: CaseRow) -> str:
         return str(row["put_in"].split()[0]).replace("_", " ")
     if "self_heating" in row["answer"][:1]:
         return "temperature withheld, warming up"
-    return NOUNS.get(row["group"], row["group"])
+    return NOUNS.get(row["group"], str(row["group"]))
 
 
 def _each(rows: Sequence[CaseRow]) -> Iterator[str]:
