@@ -119,6 +119,7 @@ def _scored(case: BlindCase, content: Mapping[str, Any]) -> dict[str, Any]:
         "false_name": bool(judgement.false_names),
         "false_names": list(judgement.false_names),
         "after_over_noise": after_over_noise,
+        "contradicted": content["contradicted"],
         "fitted": judgement.named == 1.0 and after_over_noise <= TO_THE_NOISE,
         "parameter_error": max(errors) if errors else None,
         "parameters_covered": covered,
@@ -153,6 +154,7 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     seen = [r for r in effect if r["seen_nats"] is not None and r["seen_nats"] > SEEN_NATS]
     answered = [r for r in rows if r["verdict"] not in NO_ANSWER]
     unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
+    claimed = [r for r in answered if r["verdict"] in ("found", "none")]
     covered = [{"covered": one} for r in named for one in r["parameters_covered"]]
     confusion: dict[str, Counter[str]] = {}
     for row in rows:
@@ -180,6 +182,8 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         **rate(effect, "false_name").named("effect_false_name"),
         **rate(unknown, "false_name").named("false_name_beside_unknown"),
         **rate(fitted, "called_found").named("fitted_called_found"),
+        **rate([r for r in claimed if r["exact"]], "contradicted").named("exact_contradicted"),
+        **rate([r for r in claimed if not r["exact"]], "contradicted").named("wrong_contradicted"),
         "after_over_noise_median": _median([r["after_over_noise"] for r in named]),
         "parameter_error_median": _median(
             [r["parameter_error"] for r in named if r["parameter_error"] is not None]
@@ -190,6 +194,32 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "processor_s_most": max((r["processor_s"] for r in rows), default=None),
         "confusion": {label: dict(counts) for label, counts in confusion.items()},
     }
+
+
+def table(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Lines of Markdown, a case a line. `nats`: what the label says of unseen data more than nothing does."""
+    lines = [
+        "| cell | truth | records | lacks | by, mV | nats | answer | exact | in a group | test part / noise "
+        "| contradicted |",
+        "|---|---|---|---|---:|---:|---|---|---|---:|---|",
+    ]
+    for row in (row for row in rows if row["verdict"] != NOT_MADE):
+        nats, left = row["seen_nats"], row.get("after_over_noise")
+        cells = [
+            row["cell"],
+            row["model"],
+            row["records"],
+            row["label"].replace("+", ", "),
+            f"{row['unexplained_mv']:.1f}",
+            "" if nats is None else f"{nats:.1f}",
+            row["verdict"] + (f": {', '.join(row['effects'])}" if row["effects"] else ""),
+            "yes" if row["exact"] else "no",
+            "yes" if row["grouped"] else "no",
+            "" if left is None else f"{left:.2f}",
+            "yes" if row.get("contradicted") else "",
+        ]
+        lines.append(f"| {' | '.join(cells)} |")
+    return lines
 
 
 def _median(values: Sequence[float]) -> float | None:

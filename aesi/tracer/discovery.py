@@ -30,6 +30,7 @@ from aesi.tracer.report.explain import explain
 from aesi.tracer.report.outcome import FileOutcome, State, States, outcomes, test_rmse_v
 from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
+from aesi.tracer.report.warning import contradicted_by_v, warnings
 from aesi.tracer.report.yardstick import Yardstick, measure
 from aesi.tracer.search.archive import Archive, context_of
 
@@ -71,8 +72,9 @@ class Discovery:
     own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
     soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
     part.  before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
-    tell them apart.  choice : of the model of the cell.  warnings : where the written model does worse than another one
-    on the test part.
+    tell them apart.  choice : of the model of the cell.  contradicted : whether what explains the data leaves more of
+    the test part than a right explanation may.  warnings : that, and where the written model does worse on the test
+    part than another one.
     """
 
     cell: Cell
@@ -89,6 +91,7 @@ class Discovery:
     experiments: tuple[tuple[tuple[str, ...], str], ...]
     choice: ModelChoice
     notes: tuple[str, ...] = ()
+    contradicted: bool = False
     warnings: tuple[str, ...] = ()
     written: tuple[str, ...] = ()
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
@@ -236,7 +239,8 @@ def _told(
         experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,
         notes=(choice.sentence, *_notes(evidence, tested)),
-        warnings=_warnings(files),
+        contradicted=contradicted_by_v(files, verdict) is not None,
+        warnings=warnings(files, verdict),
         written=tuple(evidence.after.hypothesis),
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         seconds=seconds,
@@ -257,29 +261,6 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, .
     if evidence.fault is not None:
         notes.append(f"not adopted: {evidence.fault}.")
     return tuple(dict.fromkeys(notes))
-
-
-WORSE_SHARE = 1.05
-"""The model that is written is said to do worse on the test part where it leaves so many times as much. A convention,
-as in `decide.carry_over`; it decides a warning alone."""
-
-
-def _warnings(files: Sequence[FileOutcome]) -> tuple[str, ...]:
-    out = []
-    tests = [f for f in files if f.part == "test"]
-    if not tests:
-        return ()
-    left = {
-        state: float(np.sqrt(np.mean(np.concatenate([f.residual_v(state) for f in tests]) ** 2)))
-        for state in ("before", "recalibrated", "after")
-    }
-    for state, words in (("before", "the declared model"), ("recalibrated", "the recalibrated model")):
-        if left["after"] > WORSE_SHARE * left[state]:
-            out.append(
-                f"on the test part the model with what was found leaves {1e3 * left['after']:.1f} mV, {words} "
-                f"{1e3 * left[state]:.1f} mV: do not use it there."
-            )
-    return tuple(out)
 
 
 def _left(records: Sequence[PreparedRecord], state: ModelState) -> Left:

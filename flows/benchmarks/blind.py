@@ -9,8 +9,9 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from aesi.bench.blind import LIMIT_S, chosen, judged, summary
+from aesi.bench.blind import LIMIT_S, chosen, judged, summary, table
 from flows.benchmarks.cases import Cases, tracked
+from flows.benchmarks.page import write_between
 
 SHOWN = (
     "cell",
@@ -23,6 +24,7 @@ SHOWN = (
     "false_names",
     "error",
 )
+BEGIN, END = "<!-- table of aesi bench blind -->", "<!-- end of blind -->"
 
 
 def run(
@@ -35,13 +37,20 @@ def run(
     limit_s: float | None = LIMIT_S,
     workers: int = 1,
     address: str | None = None,
+    write: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """One dict a case as it is judged, and a last one with `summary`: true.
 
     cells : folder of the declared cell files.  cases, only, small, seed, every : which cases, see `chosen`.
     limit_s : processor seconds a case.  workers : processes on this machine.  address : of a Dask scheduler, whose
-    workers must see `cells`.
+    workers must see `cells`.  write : a page whose part between the two marks becomes the table.
     """
     specs = chosen(cases, only, small, seed, every)
     judge = partial(judged, cells=cells, limit_s=limit_s)
-    yield from tracked(Cases("blind", seed, specs, judge, summary, SHOWN), workers, address)
+    rows = []
+    for row in tracked(Cases("blind", seed, specs, judge, summary, SHOWN), workers, address):
+        rows.append(row)
+        yield row
+    if write is not None:
+        order = {spec.name: k for k, spec in enumerate(specs)}
+        write_between(write, BEGIN, END, table(sorted(rows[:-1], key=lambda row: order[row["case"]])))

@@ -10,11 +10,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from aesi.bench.real import chosen, judged, summary, write_report
+from aesi.bench.real import chosen, judged, summary, table, write_report
 from aesi.bench.real.judge import LIMIT_S
 from flows.benchmarks.cases import Cases, judged_once, tracked
+from flows.benchmarks.page import write_between
 
 SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
+BEGIN, END = "<!-- table of aesi bench real -->", "<!-- end of real -->"
 
 
 def run(
@@ -27,14 +29,16 @@ def run(
     workers: int = 1,
     address: str | None = None,
     report: str | None = None,
+    write: str | None = None,
     keep: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """One dict a case as it is judged, and a last one with `summary`: true.
 
     cells : folder of the declared cell files.  cases, only, development, every : which cases, see `chosen`.
     limit_s : processor seconds a case.  workers, address : processes here, or a Dask scheduler.
-    report : an HTML file to write.  keep : a folder for what each case gave; a case that is in it is not judged again,
-    so that an interrupted run goes on. It is of one state of the code: empty it after a change.
+    report : an HTML file to write.  write : a page whose part between the two marks becomes the table.  keep : a folder
+    for what each case gave; a case that is in it is not judged again, so that an interrupted run goes on. It is of one
+    state of the code: empty it after a change.
     """
     specs = chosen(cases, only, development, every)
     judge = partial(judged_once, judge=partial(judged, cells=cells, limit_s=limit_s), keep=keep)
@@ -47,3 +51,6 @@ def run(
         else:
             rows.append(row)
             yield {key: value for key, value in row.items() if key != "residual"}
+    if write is not None:
+        order = {spec.name: k for k, spec in enumerate(specs)}
+        write_between(write, BEGIN, END, table(sorted(rows, key=lambda row: order[row["case"]])))

@@ -5,5 +5,6 @@ from aesi.bench.real.judge import judged
 from aesi.bench.real.plan import chosen, plan
 from aesi.bench.real.report import write_report
 from aesi.bench.real.summary import summary
+from aesi.bench.real.table import table
 
-__all__ = ["RealCase", "Take", "chosen", "judged", "plan", "summary", "write_report"]
+__all__ = ["RealCase", "Take", "chosen", "judged", "plan", "summary", "table", "write_report"]

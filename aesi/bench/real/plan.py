@@ -59,19 +59,18 @@ COLDER_CONTROLS: dict[str, tuple[str, ...]] = {
 }
 """The thermocouple is given: what is left is what a file calibrated at 25 degC lacks there, and no temperature."""
 FAULTY = {HG2: "25degC_mixed2", PANASONIC: "25degC_cycle_1", NMC: "drive_cycle"}
-FAULTS: dict[FaultKind, tuple[tuple[float, ...], tuple[str, ...], str]] = {
+FAULTS: dict[FaultKind, tuple[tuple[float, ...], dict[str, float]]] = {
     "current_offset": (
         (0.05, 0.1, 0.3),
-        ("current_sensor_offset", "leakage_current"),
-        "current_sensor_offset.offset_a",
+        {"current_sensor_offset.offset_a": 1.0, "leakage_current.leakage_a": -1.0},
     ),
-    "current_gain": ((1.01, 1.02, 1.03), ("current_sensor_gain",), "current_sensor_gain.gain"),
-    "voltage_offset": ((0.003, 0.008, 0.015), ("voltage_sensor_offset",), "voltage_sensor_offset.offset_v"),
-    "voltage_lag": ((0.3, 1.0, 2.0), ("clock_skew",), "clock_skew.lag_s"),
-    "wrong_soc0": ((0.02, 0.05, 0.1), (), ""),
+    "current_gain": ((1.01, 1.02, 1.03), {"current_sensor_gain.gain": 1.0}),
+    "voltage_offset": ((0.003, 0.008, 0.015), {"voltage_sensor_offset.offset_v": 1.0}),
+    "voltage_lag": ((0.3, 1.0, 2.0), {"clock_skew.lag_s": 1.0}),
+    "wrong_soc0": ((0.02, 0.05, 0.1), {}),
 }
-"""Kind -> three sizes, right names, and the parameter that holds the size. An initial state that was told wrongly is
-for the finder to correct, without a name."""
+"""Kind -> three sizes, and the parameters of the right names as multiples of the size. An initial state that was told
+wrongly is for the finder to correct, without a name."""
 RESISTANCES_OHM = {HG2: (0.005, 0.015), PANASONIC: (0.005, 0.015), NMC: (0.0005, 0.002)}
 MORE_IN_FILE = 0.05
 """Of both electrodes, in a cell file that is made wrong."""
@@ -170,7 +169,7 @@ def _withheld() -> Iterator[RealCase]:
 
 def _faults() -> Iterator[RealCase]:
     for number in range(3):
-        for kind, (sizes, answers, parameter) in FAULTS.items():
+        for kind, (sizes, parameters) in FAULTS.items():
             for cell, file in FAULTY.items():
                 size = sizes[number]
                 yield RealCase(
@@ -179,9 +178,9 @@ def _faults() -> Iterator[RealCase]:
                     cell=CELLS[cell],
                     take=Take(cell, file, WINDOW_S),
                     soc0=1.0,
-                    answers=answers,
+                    answers=tuple(name.partition(".")[0] for name in parameters),
                     source=PUT_IN,
-                    parameters={parameter: size} if parameter else {},
+                    parameters={name: times * size for name, times in parameters.items()},
                     fault=Fault(kind, size),
                     matched=f"control-{cell}-{file}",
                 )
@@ -210,6 +209,7 @@ def _physics() -> Iterator[RealCase]:
             soc0=1.0,
             answers=(*LOSSES, "current_sensor_gain"),
             source=f"{PUT_IN} to the file: {MORE_IN_FILE:.0%} more of both electrodes",
+            parameters={"current_sensor_gain.gain": 1.0 / (1.0 + MORE_IN_FILE)},
             fault=Fault("capacity_in_file", MORE_IN_FILE),
             matched=f"control-{cell}-{file}",
         )

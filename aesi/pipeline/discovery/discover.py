@@ -164,6 +164,7 @@ def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, A
         "points_to": _pointers(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
         "notes": list(together((*read, *found.notes))),
+        "contradicted": found.contradicted,
         "warnings": list(found.warnings),
         "seconds": round(found.seconds, 2),
         "simulations": found.simulations,

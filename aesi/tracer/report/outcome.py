@@ -42,8 +42,8 @@ class Errors:
 class FileOutcome:
     """One part of one file.
 
-    voltages : state -> (n,) V.  gain_v : RMSE recalibrated minus after, with its 95 % block-bootstrap
-    interval.
+    voltages : state -> (n,) V.  noise_v : of the measured voltage.  gain_v : RMSE recalibrated minus after, with its
+    95 % block-bootstrap interval.
     """
 
     name: str
@@ -52,6 +52,7 @@ class FileOutcome:
     current_a: Array
     soc: Array
     measured_v: Array
+    noise_v: float
     voltages: Mapping[State, Array]
     gain_v: tuple[float, float, float]
 
@@ -93,7 +94,17 @@ def _outcome(
         data.voltage_v - voltages["recalibrated"], data.voltage_v - voltages["after"], data.time_s, rng
     )
     soc = runs["after"].series["soc"][rows]
-    return FileOutcome(record.name, part, data.time_s, data.current_a, soc, data.voltage_v, voltages, gain)
+    return FileOutcome(
+        record.name,
+        part,
+        data.time_s,
+        data.current_a,
+        soc,
+        data.voltage_v,
+        record.noise_full_v,
+        voltages,
+        gain,
+    )
 
 
 def rmse_difference(

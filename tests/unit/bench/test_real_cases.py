@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.bench.real import chosen, judged, plan, summary, write_report
+from aesi.bench.real import chosen, judged, plan, summary, table, write_report
 from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import of_model, of_spectrum
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
 from aesi.bench.real.judge import _known, declared_cell, record
 from aesi.physics import Cell
+from aesi.physics.effect import Record
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement, Spectrum
 
@@ -92,6 +93,21 @@ def content(*effects, groups=(), parameters=None, verdict="found"):
         "candidates": [{"effect": name, "parameters": parameters or {}} for name in effects],
         "own_parameters": {"recalibrated": [], "after": []},
     }
+
+
+def test_each_right_name_takes_back_what_was_put_into_the_current():
+    taken_back = 0
+    data = Measurement(np.arange(4.0), np.array([0.0, 1.0, 2.0, -1.0]), np.full(4, 3.7))
+    for case in plan():
+        if case.fault is None or case.fault.kind not in ("current_offset", "current_gain"):
+            continue
+        faulty = with_fault(data, case.fault.kind, case.fault.size)
+        for key, value in case.parameters.items():
+            effect, name = key.split(".")
+            seen = CATALOGUE[effect].on_record(Record(faulty.time_s, faulty.current_a), **{name: value})
+            np.testing.assert_allclose(seen.current_a, data.current_a, atol=1e-12)
+            taken_back += 1
+    assert taken_back == 2 * (9 * 2 + 9)
 
 
 def test_a_name_counts_in_a_group_of_two_and_not_of_three():
@@ -175,6 +191,33 @@ def test_the_report_is_one_file_with_what_was_said(tmp_path):
     assert 'data-figure="confusion"' in body
     assert 'data-figure="sizes"' in body
     assert "100 [2, 100] of 1" in body
+
+
+def test_the_table_counts_by_kind_and_shows_each_case(gain_rows):
+    lines = table(gain_rows)
+    assert "| current gain |  | 2 | 1 | 1 | 1 | 10 % | 1 of 1 |" in lines
+    assert "| control |  | 1 | 0 |  |  |  |  |" in lines
+    each = [line.strip() for line in lines if "drive |" in line]
+    assert each[0] == (
+        "| x/drive | current gain 1.02 | found: current_sensor_gain | yes | 9.0 | 1.02 | 1.02 [1.01, 1.03] "
+        "| 5.0 | 5.0 | 5.0 |"
+    )
+    assert len(each) == 3
+
+
+@pytest.fixture
+def gain_rows():
+    put_in = {
+        "group": "fault",
+        "put_in": "current_gain 1.02",
+        "record": "x/drive",
+        "answer": ["current_sensor_gain"],
+    }
+    estimate = {"gain": {"value": 1.018, "low": 1.01, "high": 1.03, "unit": "dimensionless"}}
+    truth, right = {"current_sensor_gain.gain": 1.02}, ("current_sensor_gain",)
+    seen = put_in | {"seen_nats": 9.0} | scored(right, truth, content(*right, parameters=estimate))
+    unseen = put_in | {"seen_nats": 0.3} | scored(right, truth, content(verdict="unknown"))
+    return [seen, unseen, control("still", "ocp_shape") | {"record": "x/drive"}, {"verdict": "not run"}]
 
 
 def test_half_of_a_wrong_initial_state_taken_back():

@@ -1,0 +1,57 @@
+"""What the part that chose nothing says against what was found or written; it changes neither."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aesi.constants import MV_PER_V
+from aesi.tracer.decide.verdict import Verdict, beyond
+from aesi.tracer.report.outcome import FileOutcome, State
+
+WORSE_SHARE = 1.05
+"""The model that is written is said to do worse on the test part where it leaves so many times as much. A convention,
+as in `decide.carry_over`; it decides a warning alone."""
+OTHERS: tuple[tuple[State, str], ...] = (
+    ("before", "the declared model"),
+    ("recalibrated", "the recalibrated model"),
+)
+
+
+def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float | None:
+    """V beyond the noise that an explanation of the data leaves of the test part, where that is more than a right one
+    may leave; else None."""
+    tests = [f for f in files if f.part == "test"]
+    if verdict.word == "unknown" or not tests:
+        return None
+    noise_v = np.repeat([f.noise_v for f in tests], [len(f.time_s) for f in tests])
+    over_v = beyond(_left_v(tests, "after"), float(np.sqrt(np.mean(noise_v**2))))
+    return over_v if over_v > verdict.tolerance_v else None
+
+
+def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
+    """Where the test part contradicts a verdict that explains the data, and where the written model does worse there
+    than another one."""
+    out = []
+    over_v = contradicted_by_v(files, verdict)
+    if over_v is not None:
+        said = "what was found" if verdict.effects else "that nothing is missing"
+        out.append(
+            f"the test part contradicts {said}: {MV_PER_V * over_v:.2f} mV beyond the noise are left there, and "
+            f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. Something else is "
+            "missing, or more; look again with the test part among the data."
+        )
+    tests = [f for f in files if f.part == "test"]
+    for state, words in OTHERS if tests else ():
+        after_v, other_v = _left_v(tests, "after"), _left_v(tests, state)
+        if after_v > WORSE_SHARE * other_v:
+            out.append(
+                f"on the test part the model with what was found leaves {MV_PER_V * after_v:.1f} mV, {words} "
+                f"{MV_PER_V * other_v:.1f} mV: do not use it there."
+            )
+    return tuple(out)
+
+
+def _left_v(files: Sequence[FileOutcome], state: State) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([f.residual_v(state) for f in files]) ** 2)))

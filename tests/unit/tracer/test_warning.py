@@ -1,0 +1,49 @@
+"""What the test part says against a verdict: more than a right model leaves, or worse than another model."""
+
+import numpy as np
+import pytest
+
+from aesi.tracer.decide.verdict import Verdict
+from aesi.tracer.report.outcome import FileOutcome
+from aesi.tracer.report.warning import contradicted_by_v, warnings
+
+NOISE_V = 1e-3
+TOLERANCE_V = 0.6e-3
+
+
+def outcome(after_v, part="test", before_v=9e-3, recalibrated_v=5e-3):
+    time_s = np.arange(400.0)
+    sign = np.where(time_s % 2, 1.0, -1.0)
+    voltages = {"before": -before_v * sign, "recalibrated": -recalibrated_v * sign, "after": -after_v * sign}
+    nought = np.zeros(400)
+    return FileOutcome("drive", part, time_s, nought, nought, nought, NOISE_V, voltages, (0.0, 0.0, 0.0))
+
+
+def verdict(word, *effects):
+    return Verdict(word, effects, (), 0.7, 0.1e-3, TOLERANCE_V, "")
+
+
+@pytest.mark.parametrize(("word", "effects"), [("found", ("series_resistance",)), ("none", ())])
+def test_what_explains_the_data_and_not_the_test_part_is_contradicted(word, effects):
+    right = NOISE_V * np.hypot(1.0, 0.5)
+    wrong = NOISE_V * np.hypot(1.0, 2.0)
+    said = verdict(word, *effects)
+    assert contradicted_by_v([outcome(wrong, part="fit"), outcome(right)], said) is None
+    assert warnings([outcome(wrong, part="fit"), outcome(right)], said) == ()
+    assert contradicted_by_v([outcome(right, part="fit"), outcome(wrong)], said) == pytest.approx(2.0e-3)
+    (sentence,) = warnings([outcome(wrong)], said)
+    assert "2.00 mV" in sentence
+    assert "0.60 mV" in sentence
+    assert ("what was found" in sentence) == bool(effects)
+
+
+def test_nothing_contradicts_an_unknown_or_a_discovery_without_a_test_part():
+    assert contradicted_by_v([outcome(4e-3)], verdict("unknown")) is None
+    assert contradicted_by_v([outcome(4e-3, part="fit")], verdict("found", "film_growth")) is None
+    assert warnings([outcome(4e-3, part="fit")], verdict("found", "film_growth")) == ()
+
+
+def test_a_written_model_that_does_worse_than_another_one_is_told():
+    sentences = warnings([outcome(7e-3)], verdict("unknown"))
+    assert [("declared" in s, "recalibrated" in s) for s in sentences] == [(False, True)]
+    assert len(warnings([outcome(12e-3)], verdict("unknown"))) == 2
