@@ -17,7 +17,6 @@ from aesi.errors import InputError
 from flows import cli
 from flows.commands.options import dates, day
 
-
 LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
 
 

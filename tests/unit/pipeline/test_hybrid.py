@@ -152,7 +152,9 @@ def test_a_folder_of_runs_is_asked_about_its_newest_model(model, tmp_path):
 
 def test_a_file_given_for_a_model_is_told_as_one(tmp_path):
     (tmp_path / "cell.json").write_text("{}")
-    with pytest.raises(InputError, match=r"cell.json is a file, not the folder of a model; a model folder is"):
+    with pytest.raises(
+        InputError, match=r"cell.json is a file, not the folder of a model; a model folder is"
+    ):
         HybridModel.load(tmp_path / "cell.json")
 
 
