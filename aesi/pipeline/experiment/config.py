@@ -115,7 +115,7 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
 
     Raises ConfigError in one sentence: file, key, what was found, what is admissible.
     """
-    from aesi.pipeline.experiment import yaml_text
+    from aesi.pipeline import yaml_text
 
     path = Path(path)
     try:
