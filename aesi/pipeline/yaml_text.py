@@ -22,7 +22,7 @@ class _UniqueKeys(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
-def load(text: str) -> Any:
+def parse_yaml(text: str) -> Any:
     """Plain values of a YAML text.  Raises ValueError that says where it is not YAML."""
     try:
         return yaml.load(text, _UniqueKeys)

@@ -115,7 +115,7 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
 
     Raises ConfigError in one sentence: file, key, what was found, what is admissible.
     """
-    from aesi.pipeline import yaml_text
+    from aesi.pipeline.yaml_text import parse_yaml
 
     path = Path(path)
     try:
@@ -125,7 +125,7 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read as text ({error}).") from None
     try:
-        content = yaml_text.load(text)
+        content = parse_yaml(text)
     except ValueError as error:
         raise ConfigError(f"{path}: {error}") from None
     if not isinstance(content, dict):
