@@ -79,11 +79,18 @@ class Parameter:
 def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> dict[str, float]:
     """Defaults overlaid with `values`, each within its bounds.
 
-    Raises ParameterError for an unknown name (with the nearest match) or a value out of bounds.
+    Raises ParameterError for an unknown name (with the nearest match), no number, or a value out of bounds.
     """
     for name in values:
         if name not in parameters:
             raise ParameterError(
                 f"unknown parameter {name!r}{did_you_mean(name, parameters)} Known: {', '.join(parameters) or 'none'}."
             )
-    return {name: p.check(name, float(values.get(name, p.default))) for name, p in parameters.items()}
+    return {name: p.check(name, _number(name, values.get(name, p.default))) for name, p in parameters.items()}
+
+
+def _number(name: str, value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise ParameterError(f"{name} = {value!r} is not a number.") from None

@@ -74,7 +74,8 @@ def main() -> NoReturn:
     except Exception as error:
         if os.environ.get("AESI_DEBUG"):
             raise
-        _fail(f"unexpected {type(error).__name__}: {_first_line(error)} (AESI_DEBUG=1 shows where).", 1)
+        told = "; ".join((_first_line(error), *getattr(error, "__notes__", ())))
+        _fail(f"unexpected {type(error).__name__}: {told} (AESI_DEBUG=1 shows where).", 1)
     raise SystemExit(0)
 
 
@@ -109,7 +110,7 @@ def _os_sentence(error: OSError) -> str:
 
 
 def _first_line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or ["no message"])[0]
+    return (str(error).strip().splitlines() or ["no message"])[0].rstrip(".")
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
 
 from aesi.data.channels.checks import check_alive, check_finite, check_ranges, check_time
@@ -15,6 +16,7 @@ from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading
 from aesi.data.resample import decimate
+from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
@@ -55,8 +57,14 @@ def read_measurement(
     duplicates : which row of several with one stamp to keep; None refuses, but keeps the first in known exports.
 
     Returns a Measurement with discharge-positive current; its `notes` say all that was mapped, converted, dropped
-    or averaged. Raises DataError, one sentence with file, column and first row, for anything else.
+    or averaged. Raises DataError, one sentence with file, column and first row, for anything else; InputError for what
+    is no file.
     """
+    if not isinstance(path, str | PathLike):
+        raise InputError(
+            f"an object of type {type(path).__name__} is no file; what is in memory already is a record as "
+            "aesi.Measurement(time_s, current_a, voltage_v)."
+        )
     given = dict(columns or {}) | ({} if state is None else {"state": state})
     reading = Reading(
         given,

@@ -16,12 +16,16 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
+import numpy as np
+
+from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
 
+Acted = TypeVar("Acted")
 Kind = Literal["physics", "parameter", "instrument"]
 Measurable = Literal["temperature"]
 """Quantities that a record may hold beside current and voltage."""
@@ -167,9 +171,46 @@ class ActiveEffect:
         """What identifies it: id, file of a user's own effect, values."""
         return self.effect.id, self.effect.file, self.values
 
+    def act(self, function: Callable[..., Acted], given: object) -> Acted:
+        """What one of the effect's functions makes of what it is given; what a user's own raises names its file."""
+        try:
+            return function(given, **self.parameters)
+        except Exception as error:
+            if self.effect.file is not None:
+                error.add_note(f"raised by {function.__name__} of {self.effect.file}")
+            raise
+
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready; `aesi.physics.effects.active_effect` gives it back."""
         out: dict[str, Any] = {"effect": self.effect.id, "parameters": self.parameters}
         if self.effect.file is not None:
             out["file"] = self.effect.file
         return out
+
+
+def check_contribution(file: str, added: object, trace: Trace) -> None:
+    """Raises TypeError or ValueError, which stop a search, for what no on_voltage of a user's own may give."""
+    if not isinstance(added, Contribution):
+        raise TypeError(
+            f"{file}: on_voltage gives an object of type {type(added).__name__}, not a Contribution."
+        )
+    check_row_of(file, "on_voltage", added.voltage_v, trace)
+    for name, state in added.series.items():
+        if name in trace.series:
+            raise ValueError(
+                f"{file}: on_voltage gives a state {name!r}, which the run has; name it otherwise."
+            )
+        check_row_of(file, f"on_voltage, state {name!r},", state, trace)
+
+
+def check_row_of(file: str, what: str, row: Any, trace: Trace) -> None:
+    """Raises ValueError for a row of another shape; SimulationError, which a search passes by, where values lack."""
+    shape = np.shape(row)
+    if shape != trace.time_s.shape:
+        raise ValueError(
+            f"{file}: {what} gives the shape {shape}, where the record has {trace.time_s.shape}."
+        )
+    unknown = ~np.isfinite(row)
+    if unknown.any():
+        at = float(trace.time_s[int(np.argmax(unknown))])
+        raise SimulationError(f"{file}: {what} gives no number at {at:.6g} s.")

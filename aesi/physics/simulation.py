@@ -22,7 +22,7 @@ from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
-from aesi.physics.effect import ActiveEffect, Record, Trace
+from aesi.physics.effect import ActiveEffect, Record, Trace, check_contribution, check_row_of
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
@@ -81,7 +81,7 @@ def simulate(
     record = Record(time, current, _kelvin(temperature_degc, time))
     for effect in active:
         if effect.effect.on_record is not None:
-            record = effect.effect.on_record(record, **effect.parameters)
+            record = effect.act(effect.effect.on_record, record)
     if soc0 is None:
         soc0 = _soc_from_rest(changed, active, rest_voltage_v)
     else:
@@ -125,7 +125,7 @@ def _model_with(cell: Cell, effects: tuple[ActiveEffect, ...]) -> EspmModel:
 def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
     """One effect's change; the records of a case share all but the last of them."""
     assert active.effect.on_model is not None
-    return active.effect.on_model(model, **active.parameters)
+    return active.act(active.effect.on_model, model)
 
 
 def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
@@ -193,13 +193,17 @@ def _voltage_effects(
     for active in effects:
         if active.effect.on_voltage is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
-            added = active.effect.on_voltage(trace, **active.parameters)
+            added = active.act(active.effect.on_voltage, trace)
+            if active.effect.file is not None:
+                check_contribution(active.effect.file, added, trace)
             voltage = voltage + added.voltage_v
             series.update(added.series)
     for active in effects:
         if active.effect.on_reading is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
-            voltage = active.effect.on_reading(trace, **active.parameters)
+            voltage = active.act(active.effect.on_reading, trace)
+            if active.effect.file is not None:
+                check_row_of(active.effect.file, "on_reading", voltage, trace)
     return voltage
 
 

@@ -99,6 +99,7 @@ def calibrate(
     Raises AesiError, one sentence, for what cannot be used.
     """
     check_soc(soc0)
+    _check_days(dates or {}, as_of)
     given = declared_model(cell)
     declared, physics = given.cell, model or given.model
     measurements = [_read(one, None, hold) for one in _listed(data)]
@@ -127,6 +128,14 @@ def _check_asked(soc0: float | None, holdout: float, max_effects: int, seed: int
         if not isinstance(value, int | np.integer) or not 0 <= value <= most:
             upper = f" up to {most:g}" if np.isfinite(most) else ""
             raise InputError(f"{name} = {value!r} is not a whole number from 0{upper}.")
+
+
+def _check_days(dates: Mapping[str, date], as_of: date | None) -> None:
+    """Raises InputError for a day that is given as text or number."""
+    days = {f"dates[{name!r}]": day for name, day in dates.items()} | {"as_of": as_of}
+    for name, day in days.items():
+        if day is not None and not isinstance(day, date):
+            raise InputError(f"{name} = {day!r} is no day; give a datetime.date, as in date(2019, 5, 31).")
 
 
 def _folder(out: str | PathLike[str]) -> Path:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from flows.commands import options, outputs
 
@@ -48,7 +49,8 @@ def simulate(
         self_heating=self_heating,
     )
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
-    typer.echo(f"{out}: {len(run.time_s):,} rows, {low:.3f} to {high:.3f} V", err=True)
+    hours = float(run.time_s[-1] - run.time_s[0]) / SECONDS_PER_HOUR
+    typer.echo(f"{out}: {len(run.time_s):,} rows over {hours:.4g} h, {low:.3f} to {high:.3f} V", err=True)
 
 
 @options.reads_files

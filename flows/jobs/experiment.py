@@ -108,10 +108,10 @@ def _stages(
     summary = run("report", lambda: write_outputs(folder, result))
     tracker.json("comparison.json", comparison(result))
     track_result(tracker, folder, summary, found.number, fitted, config.note)
-    key = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")
-    run.publish(f"{key}-report", _page(folder, summary, tracker), f"What came of {config.name}")
+    slug = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")
+    run.publish(f"{slug}-report", _page(folder, summary, tracker), f"What came of {config.name}")
     run.publish(
-        f"{key}-tables", (folder / "tables.md").read_text(encoding="utf-8"), f"Tables of {config.name}"
+        f"{slug}-tables", (folder / "tables.md").read_text(encoding="utf-8"), f"Tables of {config.name}"
     )
     return folder
 

@@ -10,9 +10,9 @@ from typing import Protocol, TypeVar
 from uuid import UUID
 
 from aesi.errors import AesiError
-from flows.base.console import duration
+from flows.base.console import duration, first_line
 from flows.base.time_limit import Overdue, time_limit
-from flows.jobs.temporary_server import KeptWork, first_line, no_answer, of_prefect, stop_sending
+from flows.jobs.temporary_server import KeptWork, no_answer, of_prefect, stop_sending
 
 T = TypeVar("T")
 Say = Callable[[str], None]

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from flows.base import environment
-from flows.base.console import Console
+from flows.base.console import Console, first_line
 from flows.jobs.discovery import EXPERIMENT, case_and_folder, check, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
@@ -17,7 +17,6 @@ from flows.jobs.temporary_server import (
     CURRENT,
     KeptWork,
     ServerNotStarted,
-    first_line,
     of_prefect,
     start_server,
 )

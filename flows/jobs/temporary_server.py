@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
 from aesi.errors import AesiError
+from flows.base.console import first_line
 from flows.base.time_limit import Overdue, time_limit
 
 T = TypeVar("T")
@@ -68,11 +69,6 @@ def stop_sending() -> None:
         for handler in logger.handlers[:]:
             if isinstance(handler, APILogHandler):
                 logger.removeHandler(handler)
-
-
-def first_line(error: Exception) -> str:
-    """What an exception says, in one line of at most 200 characters; its type where it says nothing."""
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
 
 
 @dataclass

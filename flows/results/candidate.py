@@ -118,7 +118,7 @@ def said(rebuilt: Rebuilt, out: Path) -> str:
     candidate = rebuilt.candidate
     return (
         f"candidate {rebuilt.number}: {len(candidate.bagging.terms)} and {len(candidate.stability.terms)} terms, "
-        f"{candidate.free_run_valid_mser_pct!r} % less squared error on validation in free run; "
+        f"{candidate.free_run_valid_mser_pct:.2f} % less squared error on validation in free run; "
         f"{candidate.better.name} is in {out / 'model'}"
     )
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from flows.base.console import first_line
 from flows.base.files import write_atomically
 
 Item = dict[str, Any]
@@ -139,7 +140,7 @@ class Outbox:
             aside = self._folder / REFUSED / path.name
             aside.parent.mkdir(exist_ok=True)
             path.replace(aside)
-            self._say(f"tracking: the store refused an item ({_line(error)}); it is kept in {aside}.")
+            self._say(f"tracking: the store refused an item ({first_line(error)}); it is kept in {aside}.")
             return True
         self._tries = 0
         path.unlink(missing_ok=True)
@@ -152,10 +153,6 @@ class Outbox:
         if self._failing_since is None:
             self._failing_since = time.monotonic()
             self._say(
-                f"tracking: the store does not answer ({_line(error)}); results are kept in {self._folder} "
+                f"tracking: the store does not answer ({first_line(error)}); results are kept in {self._folder} "
                 "and delivered when it is back."
             )
-
-
-def _line(error: Exception) -> str:
-    return (str(error).strip().splitlines() or [type(error).__name__])[0][:200]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import aesi
-from aesi.errors import ConfigError, InputError
+from aesi.errors import ConfigError, InputError, SimulationError
 from aesi.physics import Effect
 from aesi.physics.effects import CATALOGUE, activated, known_effects, load_effect
 from aesi.pipeline.discovery.discover import Case, write_discovery
@@ -159,3 +159,71 @@ def test_the_saved_model_names_the_file(file, cell, tmp_path):
     aesi.HybridModel(cell, (load_effect(file).activate(),), soc0=SOC0).save(tmp_path / "model")
     (saved,) = json.loads((tmp_path / "model" / "effects.json").read_text())
     assert saved["file"] == str(file)
+
+
+@pytest.mark.parametrize(
+    ("was", "now", "sentence"),
+    [
+        (OWN[: OWN.index("from")], "", "EFFECT has no docstring; write one"),
+        (
+            '"physics", __doc__',
+            '"chemistry", __doc__',
+            "the kind 'chemistry' is not known; give one of 'physics',",
+        ),
+        ('"lead", "physics"', '"the lead", "physics"', "the id 'the lead' has to be letters"),
+        (", on_voltage=drop", "", "EFFECT acts nowhere; give it one of on_model"),
+        (
+            "*, lead_ohm",
+            "*, lead",
+            r"on_voltage cannot be called .* \(parameters: lead_ohm\): missing .* 'lead'\.",
+        ),
+        ("(0.0, 0.01)", "(0.01, 0.0)", "give low < high\\.$"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_told_when_it_is_read(tmp_path, was, now, sentence):
+    path = tmp_path / "mine.py"
+    assert was in OWN
+    path.write_text(OWN.replace(was, now))
+    with pytest.raises(InputError, match=sentence) as caught:
+        load_effect(path)
+    assert str(path) in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("body", "error", "sentence"),
+    [
+        (
+            "-lead_ohm * trace.current_a",
+            TypeError,
+            "on_voltage gives an object of type ndarray, not a Contribution",
+        ),
+        (
+            "Contribution(trace.current_a[1:])",
+            ValueError,
+            r"gives the shape \(1799,\), where the record has \(1800,\)",
+        ),
+        (
+            "Contribution(0 * trace.current_a, {'soc': trace.current_a})",
+            ValueError,
+            "a state 'soc', which the run has",
+        ),
+        ("Contribution(trace.current_a / 0.0)", SimulationError, "on_voltage gives no number at 0 s"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:invalid value", "ignore:divide by zero")
+def test_what_an_effect_of_ones_own_may_not_give_is_told_with_its_file(
+    tmp_path, cell, current, body, error, sentence
+):
+    path = tmp_path / "mine.py"
+    path.write_text(OWN[: OWN.index("    return")] + f"    return {body}\n" + OWN[OWN.index("\n\nEFFECT") :])
+    with pytest.raises(error, match=sentence) as caught:
+        aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
+    assert str(path) in str(caught.value)
+
+
+def test_what_an_effect_of_ones_own_raises_names_its_file(tmp_path, cell, current):
+    path = tmp_path / "mine.py"
+    path.write_text(OWN.replace("    return", "    lead_ohm / 0\n    return"))
+    with pytest.raises(ZeroDivisionError) as caught:
+        aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
+    assert caught.value.__notes__ == [f"raised by drop of {path}"]

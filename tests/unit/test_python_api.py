@@ -245,3 +245,28 @@ def test_a_record_without_any_current_ended_a_calibration_with_an_index_error(ce
     rest = aesi.Measurement(TIME, np.zeros(len(TIME)), np.full(len(TIME), 4.0), name="rest")
     with pytest.raises(DataError, match="rest: the current is 0 A in all 1,800 rows"):
         aesi.calibrate(cell, rest)
+
+
+@pytest.mark.parametrize(
+    ("days", "sentence"),
+    [
+        (
+            {"dates": {"drive": "2019-05-31"}},
+            r"dates\['drive'\] = '2019-05-31' is no day; give a datetime.date",
+        ),
+        ({"as_of": 2019}, "as_of = 2019 is no day"),
+    ],
+)
+def test_a_day_that_is_text_or_a_number_is_told(cell, record, days, sentence):
+    with pytest.raises(InputError, match=sentence):
+        aesi.calibrate(cell, record, **days)
+
+
+def test_a_table_in_place_of_a_file_is_told_what_takes_one():
+    with pytest.raises(InputError, match=r"of type DataFrame is no file; .* aesi\.Measurement\(time_s"):
+        aesi.read_measurement(pd.DataFrame({"time_s": TIME}))
+
+
+def test_a_parameter_that_is_no_number_is_told():
+    with pytest.raises(InputError, match="resistance_ohm = '1m' is not a number"):
+        CATALOGUE["series_resistance"].activate(resistance_ohm="1m")

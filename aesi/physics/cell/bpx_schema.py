@@ -49,7 +49,9 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
     try:
         raw = json.loads(text)
     except json.JSONDecodeError as error:
-        raise CellError(f"{path} is not JSON: {error.msg} in line {error.lineno}.") from None
+        raise CellError(
+            f"{path} is not JSON ({error.msg} in line {error.lineno}), so no BPX file; is it a record?"
+        ) from None
     if not isinstance(raw, dict):
         raise CellError(f"{path} does not hold a BPX object with a Header and a Parameterisation.")
     return raw, str(path)

@@ -16,6 +16,7 @@ from typing import Any
 from aesi.errors import InputError
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects.catalogue import CATALOGUE, no_such_effect
+from aesi.physics.effects.own_effect import check_own
 
 
 def find_effect(name: str, file: str | None = None) -> Effect:
@@ -87,7 +88,7 @@ def load_effect(path: str | PathLike[str]) -> Effect:
     """An effect of the user's own: runs the Python file at `path`, which has to define `EFFECT`.
 
     The file is code and is run as such; name only files that you trust.
-    Raises InputError where there is no such file, or no Effect in it.
+    Raises InputError where there is no such file, no Effect in it, or one that could not be named, shown or called.
     """
     return _load(str(Path(path).resolve()))
 
@@ -104,10 +105,12 @@ def _load(path: str) -> Effect:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise InputError(f"the effect file {path} fails: {type(error).__name__}: {error}.") from error
+        said = str(error).rstrip(".")
+        raise InputError(f"the effect file {path} fails: {type(error).__name__}: {said}.") from error
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
         raise InputError(f"{path} defines no EFFECT of type aesi.physics.Effect.")
+    check_own(effect, path)
     if effect.id in CATALOGUE:
         raise InputError(f"{path}: the id {effect.id!r} is taken by the catalogue; choose another.")
     return replace(effect, file=path)

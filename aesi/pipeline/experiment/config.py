@@ -69,7 +69,8 @@ class ExperimentConfig(Section):
     def _known(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         unknown = [name for name in value if name not in model_names()]
         if unknown:
-            raise ValueError(f"there is no model {unknown[0]!r}; known are {', '.join(model_names())}")
+            known = ", ".join(map(repr, model_names()))
+            raise ValueError(f"there is no model {unknown[0]!r}; known are {known}")
         return value
 
     @model_validator(mode="after")
@@ -114,17 +115,19 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
 
     Raises ConfigError in one sentence: file, key, what was found, what is admissible.
     """
-    import yaml
+    from aesi.pipeline.yaml_text import parse_yaml
 
     path = Path(path)
     try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise ConfigError(f"{path}: there is no such experiment file.{_neighbours(path)}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read as text ({error}).") from None
-    except yaml.YAMLError as error:
-        raise ConfigError(f"{path}: is not YAML ({' '.join(str(error).split())}).") from None
+    try:
+        content = parse_yaml(text)
+    except ValueError as error:
+        raise ConfigError(f"{path}: {error}") from None
     if not isinstance(content, dict):
         raise ConfigError(f"{path}: holds no keys; an experiment starts with `name:`, `data:`, `cell:`.")
     for override in overrides:
@@ -139,7 +142,9 @@ def parse_experiment(
     try:
         return ExperimentConfig.model_validate({**content, "base": base or Path.cwd()})
     except ValidationError as error:
-        raise ConfigError(f"{where}: {_sentence(error.errors()[0])}") from None
+        details = error.errors()
+        unknown = (one for one in details if one["type"] == "extra_forbidden")  # why another key is missing
+        raise ConfigError(f"{where}: {_sentence(next(unknown, details[0]))}") from None
 
 
 def _neighbours(path: Path) -> str:
@@ -175,17 +180,23 @@ def _override(content: dict[str, Any], override: str) -> None:
 def _sentence(detail: ErrorDetails) -> str:
     """One pydantic error as a sentence that says where, what was found and what to do."""
     location = [str(part) for part in detail["loc"]]
-    key = ".".join(location) or "the experiment"
+    key = ".".join(location)
     if detail["type"] == "extra_forbidden":
         known = _keys_at(location[:-1])
         near = get_close_matches(location[-1], known, n=1)
         hint = f" Did you mean {near[0]!r}?" if near else f" Known here: {', '.join(known)}."
         return f"unknown key {key!r}.{hint}"
     if detail["type"] == "missing":
+        if location[-1].isdigit():
+            number = int(location[-1]) + 1
+            return f"{'.'.join(location[:-1])!r} lacks its value number {number}; please give it."
         return f"{key!r} is missing; please give it."
     if detail["type"] == "value_error":
-        return f"{key}: {str(detail['ctx']['error']).rstrip('.')}."
+        said = str(detail["ctx"]["error"]).rstrip(".")
+        return f"{key}: {said}." if key else f"{said}."
     found = detail["input"]
+    if detail["type"] in ("model_type", "model_attributes_type"):
+        return f"{key} = {found!r} is not admissible: it takes keys: {', '.join(_keys_at(location))}."
     return f"{key} = {found!r} is not admissible: {_lower_first(detail['msg'].rstrip('.'))}."
 
 

@@ -186,6 +186,7 @@ def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
         "simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o/run.csv", "--soc0", 0.6
     )
     assert code == 0, err
+    assert "run.csv: 600 rows over 0.1664 h, 3." in err  # a time in another unit is seen at once
     table = pd.read_csv(tmp_path / "o/run.csv")
     assert {"time_s", "current_a", "voltage_v", "c_sp", "c_sn", "c_e0", "c_eL", "soc"} <= set(table)
     assert len(table) == 600

@@ -57,7 +57,10 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
         ({"search": {"timeout_s": float("nan")}}, "search.timeout_s"),
         ({"conformal": {"alpha": 1.5}}, "conformal.alpha = 1.5"),
         ({"data": {"kind": "catalogue", "train": ["a"], "test": ["b"]}}, "needs `set`"),
-        ({"data": {"kind": "files"}}, "give `train` and `test`"),
+        ({"data": {"kind": "files"}}, "experiment: data: give `train` and `test`"),
+        ({"data": 3}, "data = 3 is not admissible: it takes keys: kind, set, record"),
+        ({"library": {"d": [1]}}, "'library.d' lacks its value number 2; please give it"),
+        ({"models": ["ESPN"]}, "known are 'ESPM', 'ESPM, one resistor', "),
         (
             {
                 "data": {
@@ -113,6 +116,33 @@ def test_yaml_cannot_build_objects(tmp_path):
     path.write_text("name: !!python/object/apply:os.system ['touch owned']\n")
     with pytest.raises(ConfigError, match="is not YAML"):
         read_experiment(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("name: x\nseed: 1\nname: y\n", r"at line 3, column 1: the key 'name' is there twice; keep one\.$"),
+        ("name: x\ndata: {kind: files, kind: virtual}\n", "line 2, column 21: the key 'kind' is there twice"),
+        ("name: [x\n", r"at line 2, column 1: while parsing a flow sequence, expected ',' or '\]'"),
+        ("name: \x00\n", "is not YAML: character 7: "),
+        ("name: 2001-99-99\n", "is not YAML: month must be in 1..12"),
+        ("name: x\n--- y\n", "line 2, column 1: expected a single document in the stream, but found another"),
+    ],
+)
+def test_what_is_wrong_with_yaml_is_told_by_line_and_column(tmp_path, text, words):
+    path = tmp_path / "x.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=words) as caught:
+        read_experiment(path)
+    assert "\n" not in str(caught.value)
+    assert "unicode string" not in str(caught.value)
+
+
+def test_keys_that_are_merged_in_may_be_said_again(tmp_path):
+    path = tmp_path / "x.yaml"
+    files = "data: {<<: &common {kind: files, train: [a.csv]}, train: [c.csv], test: [b.csv]}\n"
+    path.write_text("name: x\n" + files)
+    assert read_experiment(path).data.train == ("c.csv",)
 
 
 def test_paths_start_from_the_experiments_folder(tmp_path):
