@@ -59,15 +59,14 @@ def simulate(
     hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row before.
     on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
     "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
-    at 10 V per unit of stoichiometry, every value stays finite, and `series["depleted"]` is 1 from the first
-    such sample on.
+    at 10 V per unit of stoichiometry, and `series["depleted"]` is 1 from the first such sample on.
     model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both.
     profiles : of "dfn" alone: what runs across the electrodes, see `Run.profiles`.
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
-    Raises SimulationError naming time and electrode; DataError for arrays that cannot be simulated; InputError for
-    another model, hold or on_depletion, for what is no Cell, no effect, no state of charge or no temperature of a cell,
-    and for an effect that the model already holds.
+    Raises SimulationError naming time and electrode, or where a clipped simulation has no solution either; DataError
+    for arrays that cannot be simulated; InputError for another model, hold or on_depletion, for what is no Cell, no
+    effect, no state of charge or no temperature of a cell, and for an effect that the model already holds.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)
@@ -99,6 +98,12 @@ def simulate(
     elif on_depletion == "clip":
         series["depleted"] = np.zeros(len(time))
     voltage = _voltage_effects(changed, active, record, rows[0], series, hold)
+    if fault_at >= 0 and not np.isfinite(voltage).all():
+        lost = int(np.argmin(np.isfinite(voltage)))
+        raise SimulationError(
+            f"there is no solution at {time[lost]:g} s: the cell ran out at {time[fault_at]:g} s, and the current went "
+            "on; end the record there, or check soc0, capacity and the sign of the current."
+        )
     return Run(time, current, voltage, series, across or {})
 
 

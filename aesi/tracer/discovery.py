@@ -9,7 +9,7 @@ from pathlib import Path as FilePath
 
 import numpy as np
 
-from aesi.errors import DataError
+from aesi.errors import AesiError, DataError
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
@@ -221,8 +221,11 @@ def _told(
     files = outcomes(records, states, tested, rng)
     cell, model_effects, soc0 = evidence.after.settled()
 
-    def test_error(one: Explanation) -> float:
-        return test_rmse_v(ModelState.of(problem, one), records, tested)
+    def test_error(one: Explanation) -> float | None:
+        try:
+            return test_rmse_v(ModelState.of(problem, one), records, tested)
+        except AesiError:  # it was simulated on the fit part alone
+            return None
 
     return Discovery(
         cell=cell,

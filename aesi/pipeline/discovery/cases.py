@@ -73,8 +73,8 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
     if config.cell.effects:
         raise ConfigError(
             f"{config.name}: cell.effects: a discovery starts from what the cell's file declares, so that "
-            f"{', '.join(config.cell.effects)} would not be in it; leave it out, or name as `cell` the folder of a saved "
-            "model that has it."
+            f"{', '.join(config.cell.effects)} would not be in it; leave it out, or name as `cell` the folder of a "
+            "saved model that has it."
         )
     cell = cell_path(config)
     fit, test, good = discovery_records(config, wanted, cell)

@@ -148,7 +148,7 @@ def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, A
                 "effect": c.effect,
                 "kind": c.kind,
                 "score": c.score,
-                "test_rmse_mv": MV_PER_V * c.test_rmse_v,
+                "test_rmse_mv": None if c.test_rmse_v is None else MV_PER_V * c.test_rmse_v,
                 "parameters": {
                     name: {"value": p.value, "low": p.low, "high": p.high, "unit": p.unit}
                     for name, p in c.parameters.items()

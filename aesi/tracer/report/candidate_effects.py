@@ -33,14 +33,14 @@ class CandidateEffect:
     effect: str
     kind: str
     score: float
-    test_rmse_v: float
+    test_rmse_v: float | None
     parameters: Mapping[str, Estimate]
     hypothesis: tuple[str, ...]
     remark: str
 
 
 def ranking(
-    path: Path, verdict: Verdict, test_rmse_v: Callable[[Explanation], float]
+    path: Path, verdict: Verdict, test_rmse_v: Callable[[Explanation], float | None]
 ) -> tuple[CandidateEffect, ...]:
     """Rows for every effect that could be simulated, best first: one of the verdict as it stands in the chosen
     hypothesis, another one at its best alone or beside those chosen."""

@@ -12,6 +12,7 @@ from aesi.errors import DataError, InputError, SimulationError
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.simulation import solver as _solver
 
 LG_M50 = Cell.from_bpx(
     Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
@@ -188,3 +189,19 @@ def test_lithium_leaves_as_charge_where_the_temperature_was_measured(nmc, load, 
     run = simulate(nmc, time, current, soc0=0.9, temperature_degc=warm, hold=hold)
     plain = simulate(nmc, time, current, soc0=0.9, hold=hold)
     assert run.series["soc"] == pytest.approx(plain.series["soc"], abs=1e-9)
+
+
+def test_a_clipped_simulation_that_ends_in_no_numbers_says_since_when(nmc, load, monkeypatch):
+    time, current = load
+    whole = _solver("espm")
+
+    def lost(*arguments):
+        rows, further, _, _ = whole(*arguments)
+        rows[0, 20:] = np.nan
+        return rows, further, 10, 1
+
+    monkeypatch.setattr("aesi.physics.simulation.solver", lambda model, profiles: lost)
+    with pytest.raises(
+        SimulationError, match=f"no solution at {time[20]:g} s: the cell ran out at {time[10]:g} s"
+    ):
+        simulate(nmc, time, current, soc0=0.9, on_depletion="clip")

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.errors import DataError
+from aesi.errors import DataError, SimulationError
 from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.discovery.discover import discovery_content
 from aesi.tracer import discover
 from aesi.tracer.case.checks import FOREIGN_CELL_V, check_same_cell
 from aesi.tracer.discovery import inverse_problem
@@ -173,3 +174,15 @@ def test_a_diffusivity_that_is_off_is_no_radius(cell, make):
     slow = CATALOGUE["solid_diffusivity"].activate(negative_factor=1.0, positive_factor=0.35)
     found = discover(cell, [make((slow,))], soc0=0.9, effects=effects)
     assert found.verdict.effects == ("solid_diffusivity",)
+
+
+def test_a_candidate_that_the_test_part_cannot_be_simulated_with_has_no_error_there(
+    cell, few, make, monkeypatch
+):
+    def fails(*arguments):
+        raise SimulationError("there is no solution")
+
+    monkeypatch.setattr("aesi.tracer.discovery.test_rmse_v", fails)
+    found = discover(cell, [make()], soc0=0.9, effects=few)
+    assert {c.test_rmse_v for c in found.candidates} == {None}
+    assert {c["test_rmse_mv"] for c in discovery_content(found)["candidates"]} == {None}
