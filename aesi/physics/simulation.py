@@ -66,7 +66,8 @@ def simulate(
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
     Raises SimulationError naming time and electrode, or where a clipped simulation has no solution either; DataError
     for arrays that cannot be simulated; InputError for another model, hold or on_depletion, for what is no Cell, no
-    effect, no state of charge or no temperature of a cell, and for an effect that the model already holds.
+    effect, no state of charge or no temperature of a cell, and for an effect that the model holds of itself; CellError
+    for one that needs what the cell's file does not declare.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)

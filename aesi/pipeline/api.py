@@ -95,7 +95,8 @@ def calibrate(
     cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
     temperatures_degc : of records without a temperature column, by name.  dates : days of the records, by name; those
     of other days may be of another age.  as_of : day of the file's state; None takes the last with a load.
-    model : that is fitted, "espm" or "dfn"; None takes that of a saved model, else "espm".
+    model : that is fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else
+    "espm".
     Raises AesiError, one sentence, for what cannot be used.
     """
     check_soc(soc0)

@@ -38,8 +38,8 @@ class Request:
 
     temperatures_degc, dates : by record name.  as_of : day of the file's state.  impedance : spectra to hold the result
     against.  posterior : steps of each walker, 0 for none.  title : name of the cell that is written.  model : that is
-    fitted, "espm" or "dfn"; None takes that of a saved model, else "espm".  same_cell : the file is of this very cell,
-    see there.
+    fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else "espm".
+    same_cell : the file is of this very cell, see there.
     """
 
     soc0: float | None = None

@@ -36,7 +36,8 @@ def impedance_file(
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
 
     cell : a BPX file, or a folder of a saved model, whose effects are taken.  frequencies : LOW:HIGH:N in Hz,
-    log-spaced, or a CSV with a column frequency_hz.  model : "espm" or "dfn"; None takes that of a saved model.
+    log-spaced, or a CSV with a column frequency_hz.  model : "espm" or "dfn"; None takes that of a saved model, or that
+    the cell's file was fitted with, else "espm".
     soh : share of the file's capacity that the cell had then; None takes all of it.
     """
     declared = declared_model(cell).with_soh(soh)

@@ -50,7 +50,8 @@ def simulate_file(
     soc0 : None takes it from the file's voltage, where it has one (see `initial_state`), else from the saved model.
     hold : None takes straight lines for a profile alone, and what `assumed_hold` says for a measurement.
     say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
-    model : "espm" or "dfn"; None takes that of a saved model, else "espm".
+    model : "espm" or "dfn"; None takes that of a saved model, or that
+    the cell's file was fitted with, else "espm".
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then; None takes all of it.
     Raises DataError where a measurement cannot be of this cell.

@@ -68,7 +68,11 @@ SelfHeating = Annotated[
 
 ModelOption = Annotated[
     Literal["espm", "dfn"] | None,
-    typer.Option("--model", help="Single particle (espm, the default) or porous electrode (dfn)."),
+    typer.Option(
+        "--model",
+        help="Single particle or porous electrode; without it that of a saved model, or that the cell's file was "
+        "fitted with, else espm.",
+    ),
 ]
 
 PrefectOption = Annotated[

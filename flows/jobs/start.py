@@ -38,10 +38,11 @@ def start(
 ) -> Path:
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
     environment.prepare_process()
-    from aesi.pipeline.experiment.sources import check_there
+    from aesi.pipeline.experiment.sources import check_roles, check_there
 
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache)
     config = request.config()  # bad input is refused before anything is started
+    check_roles(config)
     check_there(config)
 
     def under_prefect() -> Path:

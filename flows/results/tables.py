@@ -88,14 +88,17 @@ def _name(experiment: str) -> str:
 
 
 def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:
-    """The runs asked for, else the newest finished run of each seed that shares the newest run's setting."""
+    """The runs asked for, else the newest finished run of each seed that shares the newest run's setting.
+
+    A discovery of the same experiment has a verdict and no tables.
+    """
     experiment_id = store.find_experiment(name)
     if experiment_id is None:
         known = sorted(e.name for e in store.client.search_experiments() if e.name != "Default")
         there = f" Tracked so far: {', '.join(known)}." if known else " Nothing is tracked there yet."
         raise InputError(f"no experiment {name!r} is tracked in {store.uri}.{there}")
     condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
-    finished = list(store.runs(experiment_id, condition))
+    finished = [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
     if run_ids:
         return [_by_id(finished, run_id, name) for run_id in run_ids]
     if not finished:

@@ -65,8 +65,17 @@ def case_of_files(
 
 
 def case_of_experiment(config: ExperimentConfig) -> Case:
-    """The case that an experiment with a `discover` section describes."""
+    """The case that an experiment with a `discover` section describes.
+
+    Raises ConfigError where it names no record to look at, or effects that the cell is declared to have.
+    """
     wanted = config.discover or DiscoverConfig()
+    if config.cell.effects:
+        raise ConfigError(
+            f"{config.name}: cell.effects: a discovery starts from what the cell's file declares, so that "
+            f"{', '.join(config.cell.effects)} would not be in it; leave it out, or name as `cell` the folder of a "
+            "saved model that has it."
+        )
     cell = cell_path(config)
     fit, test, good = discovery_records(config, wanted, cell)
     if not fit:
@@ -79,6 +88,7 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         wanted.holdout,
         wanted.max_effects,
         config.seed,
+        tuple(config.path(name) for name in config.cell.effect_files),
         model=config.cell.model,
         soh=config.cell.soh,
         good=good,

@@ -16,12 +16,12 @@ from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
 from aesi.physics.effects import activated
-from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
+from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
-from aesi.pipeline.experiment.sources import cell_path, sources_of
+from aesi.pipeline.experiment.sources import cell_path, check_roles, sources_of
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import Hold, LeftOutDrives, Split
 
@@ -65,8 +65,7 @@ def load(config: ExperimentConfig) -> Loaded:
     note, which is about the data that were asked for, is left out.
     Raises ConfigError or DataError naming the file and what to do.
     """
-    if not config.data.has_roles:
-        raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")
+    check_roles(config)
     try:
         return _load(config)
     except DataError as error:

@@ -112,7 +112,8 @@ class CellConfig(Section):
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
     soh : share of the file's capacity that the cell had when it was measured; None takes all of it.
-    model : espm, one particle an electrode, or dfn, the porous electrode; None takes that of a saved model, else espm.
+    model : espm, one particle an electrode, or dfn, the porous electrode; None takes that of a saved model, or
+    that the file was fitted with, else espm.
     effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
     the user's own; they are run, so name only files that you trust.
     start : the physics that the correction is learned on: the cell as declared, or recalibrated on the training

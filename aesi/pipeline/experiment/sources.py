@@ -12,7 +12,7 @@ from aesi.data.read import read
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, did_you_mean
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.experiment.config import ExperimentConfig
+from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
 from aesi.records import ROLES, Measurement, Role
 
@@ -46,6 +46,12 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     for role in ("train", "valid"):
         check_distinct([records[name][0] for name in roles[role]], test)
     return Sources(records, roles)
+
+
+def check_roles(config: ExperimentConfig) -> None:
+    """Raises ConfigError where the experiment has nothing to train on or to test on."""
+    if not config.data.has_roles:
+        raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")
 
 
 def check_there(config: ExperimentConfig) -> None:

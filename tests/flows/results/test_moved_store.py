@@ -32,6 +32,16 @@ def test_a_moved_store_carried_no_readable_summary(finished, tmp_path, monkeypat
     assert not Store(uri).notes  # once is enough
 
 
+def test_a_discovery_of_the_same_experiment_took_the_place_of_its_runs(finished, tmp_path):
+    here = copied(finished, tmp_path / "here")
+    uri = f"sqlite:///{here / 'mlflow.db'}"
+    before = tables_of("smoke", uri=uri)
+    store = Store(uri)
+    later = store.create_run(store.find_experiment("smoke"), "drive", {KIND: "run", "verdict": "none"})
+    store.client.set_terminated(later)
+    assert tables_of("smoke", uri=uri) == before
+
+
 def test_a_store_whose_artifacts_stayed_is_left_alone(finished, tmp_path):
     alone = tmp_path / "database only"
     alone.mkdir()

@@ -6,7 +6,7 @@ import pytest
 from small_experiment import BPX, SOC0, experiment, write_record
 
 from aesi.data import read_measurement
-from aesi.errors import CellError, DataError, InputError
+from aesi.errors import CellError, ConfigError, DataError, InputError
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_experiment, case_of_files
 from aesi.pipeline.experiment.config import read_experiment
@@ -51,6 +51,17 @@ def test_good_records_stand_beside_what_is_looked_at(tmp_path, shared_data, monk
     case = case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
     assert [m.name for m in case.good] == ["C2", "1C"]
     assert [m.name for m in case.records] == ["drive_cycle", "C2", "1C"]
+
+
+def test_effects_of_the_cell_and_files_with_effects_were_passed_over_in_silence(shared_data, monkeypatch):
+    monkeypatch.setenv("AESI_DATA", str(shared_data / "measured"))
+    with pytest.raises(ConfigError, match="so that series_resistance would not be in it; leave it out"):
+        case_of_experiment(
+            read_experiment(EXPERIMENTS / "measured_nmc.yaml", ["cell.effects={series_resistance: {}}"])
+        )
+    overrides = ["discover.fit=[C2]", "discover.test=[]", "cell.effect_files=[mine.py]"]
+    case = case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
+    assert case.effect_files == (EXPERIMENTS / "mine.py",)
 
 
 def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_path):
