@@ -197,11 +197,13 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:
-    """Lines of Markdown, a case a line. `nats`: what the label says of unseen data more than nothing does."""
+    """Lines of Markdown, a case a line in a note. `nats`: what the label says of unseen data more than nothing does."""
     lines = [
-        "| cell | truth | records | lacks | by, mV | nats | answer | exact | in a group | test part / noise "
+        '??? note "Each case"',
+        "",
+        "    | cell | truth | records | lacks | by, mV | nats | answer | exact | in a group | test part / noise "
         "| contradicted |",
-        "|---|---|---|---|---:|---:|---|---|---|---:|---|",
+        "    |---|---|---|---|---:|---:|---|---|---|---:|---|",
     ]
     for row in (row for row in rows if row["verdict"] != NOT_MADE):
         nats, left = row["seen_nats"], row.get("after_over_noise")
@@ -218,7 +220,7 @@ def table(rows: Sequence[dict[str, Any]]) -> list[str]:
             "" if left is None else f"{left:.2f}",
             "yes" if row.get("contradicted") else "",
         ]
-        lines.append(f"| {' | '.join(cells)} |")
+        lines.append(f"    | {' | '.join(cells)} |")
     return lines
 
 

@@ -49,7 +49,13 @@ def judged(spec, cells, limit_s):
         "case": spec.name,
         "kind": "none",
         "cell": spec.cell,
+        "model": spec.model,
+        "records": "+".join(spec.records),
         "label": "none",
+        "unexplained_mv": 0.0,
+        "seen_nats": None,
+        "after_over_noise": 1.02,
+        "contradicted": spec.name == "b001",
         "verdict": "none",
         "effects": [],
         "confidence": 0.9,
@@ -63,11 +69,20 @@ def judged(spec, cells, limit_s):
     }
 
 
-def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch):
+def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch, tmp_path):
     monkeypatch.setattr("flows.benchmarks.blind.judged", judged)
-    *rows, last = benchmarks.run("blind", small=True, cases=3)
+    page = tmp_path / "page.md"
+    page.write_text("before\n<!-- table of aesi bench blind -->\nold\n<!-- end of blind -->\nafter\n")
+    *rows, last = benchmarks.run("blind", small=True, cases=3, write=str(page))
     assert [row["case"] for row in rows] == ["b000", "b001", "b002"]
     assert last["summary"]
+    assert last["exact_contradicted_pct"] == 33.3
+    written = page.read_text()
+    assert written.startswith("before")
+    assert written.endswith("after\n")
+    assert "old" not in written
+    assert written.count("| none | yes | yes | 1.02 | yes |") == 1
+    assert written.count("| none | yes | yes | 1.02 |  |") == 2
     store = Store()
     (parent,) = store.runs(store.find_experiment("blind"), f"tags.`{KIND}` = 'run'")
     assert parent.data.metrics["none_false_name_pct"] == 0.0
