@@ -81,8 +81,10 @@ def calibrate_files(
     shares = tuple((e.name, found.capacities[e.name]) for e in found.errors)
     found = replace(found, cell=replace(described, capacity_shares=shares))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
-    spectra = held_against(found.cell, asked.impedance, model=model)
-    content = calibration_content(found, [note for m in measurements for note in m.notes], posterior, spectra)
+    spectra, told = held_against(found.cell, asked.impedance, model=model)
+    content = calibration_content(
+        found, [*(note for m in measurements for note in m.notes), *told], posterior, spectra
+    )
     out.parent.mkdir(parents=True, exist_ok=True)
     out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
     report = out.with_suffix(".report.json")
@@ -166,7 +168,7 @@ def calibration_content(
                 "name": s.measured.name,
                 "soc": s.soc,
                 "temperature_degc": s.measured.temperature_degc,
-                "rms_pct": 100.0 * s.off,
+                "rms_pct": None if s.off is None else 100.0 * s.off,
                 "band_hz": list(BAND_HZ),
             }
             for s in spectra
@@ -241,7 +243,7 @@ def to_text(content: dict[str, Any]) -> str:
             "|---|---|---|---|",
         ]
         lines += [
-            f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {s['rms_pct']:.1f} |"
+            f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {_number(s['rms_pct'])} |"
             for s in content["impedance"]
         ]
     sections = (

@@ -21,6 +21,9 @@ from aesi.records import Spectrum
 BAND_HZ = (0.01, 100.0)
 """Between them spectra are judged: above, leads and sensors; below, an open-circuit potential's slope."""
 
+ASSUMED_DEGC = 25.0
+"""Of a spectrum whose temperature was not measured; it is said."""
+
 
 def impedance_file(
     cell: Path,
@@ -70,13 +73,13 @@ class SpectrumError:
     """A measured spectrum beside the model's.
 
     soc : at which the model was taken.  z_ohm : (n,) the model's.  off : root mean square of |Z_model|/|Z| - 1 within
-    `BAND_HZ`.
+    `BAND_HZ`, None where no frequency lies in it.
     """
 
     measured: Spectrum
     soc: float
     z_ohm: ComplexArray
-    off: float
+    off: float | None
 
 
 def held_against(
@@ -84,18 +87,34 @@ def held_against(
     spectra: Sequence[Spectrum],
     effects: Sequence[ActiveEffect] = (),
     model: ModelName = "espm",
-) -> tuple[SpectrumError, ...]:
-    """Each spectrum beside the cell's; one below empty or above full is left out."""
-    out = []
+) -> tuple[tuple[SpectrumError, ...], tuple[str, ...]]:
+    """Each spectrum beside the cell's, and sentences on those below empty or above full, which are left out, and on
+    those whose temperature is not known."""
+    out, told = [], []
     for spectrum in spectra:
-        soc = spectrum.soc
-        if soc is None:
-            soc = 1.0 - (spectrum.discharged_ah or 0.0) / cell.capacity_ah
+        soc = _soc(cell, spectrum)
         if not 0.0 <= soc <= 1.0:
+            told.append(
+                f"{spectrum.name}: left out, since its state of charge of {soc:.4g} is not between 0 and 1 (50 % is "
+                "0.5)."
+            )
             continue
-        degc = 25.0 if spectrum.temperature_degc is None else spectrum.temperature_degc
+        degc = spectrum.temperature_degc
+        if degc is None:
+            degc = ASSUMED_DEGC
+            told.append(f"{spectrum.name}: no temperature; the model is taken at {degc:g} degC.")
         z = impedance(cell, spectrum.frequency_hz, soc, degc, effects, model=model)
         seen = (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
         ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
-        out.append(SpectrumError(spectrum, soc, z, float(np.sqrt(np.mean(ratio**2)))))
-    return tuple(out)
+        off = float(np.sqrt(np.mean(ratio**2))) if seen.any() else None
+        out.append(SpectrumError(spectrum, soc, z, off))
+    return tuple(out), tuple(told)
+
+
+def _soc(cell: Cell, spectrum: Spectrum) -> float:
+    """The state that the spectrum gives.  Raises DataError where it gives none."""
+    if spectrum.soc is not None:
+        return spectrum.soc
+    if spectrum.discharged_ah is None:
+        raise DataError(f"{spectrum.name}: the state of the cell is not known; give soc or discharged_ah.")
+    return 1.0 - spectrum.discharged_ah / cell.capacity_ah

@@ -30,7 +30,10 @@ def calibrate(
             f"{row['as_simulated_rmse_mv']:.2f} mV as the file is simulated"
         )
     for row in content["impedance"]:
-        console.say(f"  {row['name']}, state of charge {row['soc']:.2f}: |Z| {row['rms_pct']:.0f} % off")
+        low, high = row["band_hz"]
+        outside = row["rms_pct"] is None
+        off = f"no frequency from {low:g} to {high:g} Hz" if outside else f"|Z| {row['rms_pct']:.0f} % off"
+        console.say(f"  {row['name']}, state of charge {row['soc']:.2f}: {off}")
     for note in content["notes"]:
         if note not in read:
             console.say(f"  {note}")

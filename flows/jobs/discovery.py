@@ -61,7 +61,7 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
         content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
         _track_result(tracker, found, content, out)
     run.publish("discovery", _page(content, out, tracker), "What the model lacks")
-    _say(console, content, found.notes, out, started)
+    _say(console, content, (*case.restrictions, *found.notes), out, started)
     return content
 
 
@@ -142,6 +142,8 @@ def _track_case(tracker: Tracker | None, case: Case) -> None:
             "data_digest": ", ".join(m.digest for m in case.measurements),
             "test": ", ".join(m.name for m in case.tests),
             **({"good": ", ".join(m.name for m in case.good)} if case.good else {}),
+            **({"only": ", ".join(case.only)} if case.only else {}),
+            **({"without": ", ".join(case.without)} if case.without else {}),
             "soc0": case.soc0,
             "soh": case.soh,
             "holdout": case.holdout,

@@ -68,6 +68,25 @@ class Case:
         """All of them: those that are looked at, those that are known to be good, and those that choose nothing."""
         return (*self.measurements, *self.good, *self.tests)
 
+    @property
+    def restrictions(self) -> tuple[str, ...]:
+        """Sentences on effects that are not tried, so that nobody reads the verdict as one about them."""
+        only, without = (
+            ", ".join(name.strip() for names in given for name in names.split(","))
+            for given in (self.only, self.without)
+        )
+        said = {
+            "no effect is tried (at most 0 are added), so that none can be found.": self.max_effects == 0,
+            f"tried alone: {only}; nothing is said about other effects.": bool(only),
+            f"not tried: {without}.": bool(without),
+        }
+        return tuple(sentence for sentence, holds in said.items() if holds)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was not tried, and what a reader dropped, mapped or averaged in the files."""
+        return (*self.restrictions, *(note for m in self.records for note in m.notes))
+
     def declared(self) -> HybridModel:
         """What the cell is declared to be.  Raises CellError or InputError for what cannot be read."""
         return declared_model(self.cell).with_soh(self.soh)
@@ -103,7 +122,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     """Write discovery.json, report.html and model/ to `out`; returns the content of discovery.json."""
     from aesi.pipeline.report import write_discovery_report
 
-    content = discovery_content(found, [note for m in case.records for note in m.notes])
+    content = discovery_content(found, case.notes)
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(content, indent=1, allow_nan=False)
     (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
@@ -125,8 +144,8 @@ def found_model(found: Discovery) -> HybridModel:
     return HybridModel(inside.cell, left, soc0=found.soc0, hold=found.hold, model=found.choice.model)
 
 
-def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, Any]:
-    """The content of discovery.json.  read : what a reader dropped, mapped or averaged in the files."""
+def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, Any]:
+    """The content of discovery.json.  asked : what was not tried, and what a reader did to the files."""
     verdict = found.verdict
     return {
         "schema": SCHEMA,
@@ -163,7 +182,7 @@ def discovery_content(found: Discovery, read: Sequence[str] = ()) -> dict[str, A
         "dependence": _dependence(found),
         "points_to": _pointers(found),
         "experiments": [{"effects": list(g), "experiment": text} for g, text in found.experiments],
-        "notes": list(together((*read, *found.notes))),
+        "notes": list(together((*asked, *found.notes))),
         "contradicted": found.contradicted,
         "warnings": list(found.warnings),
         "seconds": round(found.seconds, 2),

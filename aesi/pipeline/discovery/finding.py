@@ -70,7 +70,7 @@ class Finding:
     @cached_property
     def content(self) -> dict[str, Any]:
         """What discovery.json holds."""
-        return discovery_content(self.found, [note for m in self.case.records for note in m.notes])
+        return discovery_content(self.found, self.case.notes)
 
     @cached_property
     def model(self) -> HybridModel:

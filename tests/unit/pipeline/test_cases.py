@@ -64,6 +64,18 @@ def test_effects_of_the_cell_and_files_with_effects_were_passed_over_in_silence(
     assert case.effect_files == (EXPERIMENTS / "mine.py",)
 
 
+def test_what_was_not_tried_is_said_so_that_no_verdict_is_read_as_one_about_it(tmp_path):
+    record = write_record(tmp_path)
+    assert case_of_files(BPX, [record]).restrictions == ()
+    alone = case_of_files(BPX, [record], only=["film_growth, clock_skew"], without=["series_resistance"])
+    assert alone.restrictions == (
+        "tried alone: film_growth, clock_skew; nothing is said about other effects.",
+        "not tried: series_resistance.",
+    )
+    (none,) = case_of_files(BPX, [record], max_effects=0).notes
+    assert none.startswith("no effect is tried")
+
+
 def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_path):
     record = read_measurement(write_record(tmp_path))
     with pytest.raises(DataError, match="twice among the data"):

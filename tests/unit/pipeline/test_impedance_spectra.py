@@ -1,0 +1,53 @@
+"""Measured spectra held against a cell: what is left out or assumed is said."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import aesi
+from aesi.errors import DataError
+from aesi.pipeline.impedance import held_against
+from aesi.records import Spectrum
+
+CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
+FREQUENCY_HZ = np.geomspace(1e-2, 1e3, 11)
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return aesi.Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+
+
+def spectrum(cell, hz=FREQUENCY_HZ, **state):
+    return Spectrum("s", hz, aesi.impedance(cell, hz, soc=0.5), **state)
+
+
+def test_the_models_own_spectrum_is_not_off(cell):
+    (one,), told = held_against(cell, [spectrum(cell, soc=0.5, temperature_degc=25.0)])
+    assert one.off == pytest.approx(0.0, abs=1e-12)
+    assert told == ()
+
+
+def test_a_spectrum_beyond_100_hz_ended_a_calibration_without_its_report(cell):
+    (one,), _ = held_against(
+        cell, [spectrum(cell, np.array([200.0, 1000.0]), soc=0.5, temperature_degc=25.0)]
+    )
+    assert one.off is None
+
+
+def test_a_spectrum_below_empty_was_left_out_in_silence(cell):
+    kept, told = held_against(cell, [spectrum(cell, soc=50.0), spectrum(cell, discharged_ah=9.0)])
+    assert kept == ()
+    assert [sentence.split(" is not between 0 and 1")[0] for sentence in told] == [
+        "s: left out, since its state of charge of 50",
+        f"s: left out, since its state of charge of {1.0 - 9.0 / cell.capacity_ah:.4g}",
+    ]
+
+
+def test_an_assumed_temperature_is_said_and_a_state_is_not_assumed(cell):
+    (one,), told = held_against(cell, [spectrum(cell, soc=0.5)])
+    assert told == ("s: no temperature; the model is taken at 25 degC.",)
+    assert one.off == pytest.approx(0.0, abs=1e-12)
+    with pytest.raises(DataError, match="s: the state of the cell is not known; give soc or discharged_ah"):
+        held_against(cell, [spectrum(cell)])
