@@ -22,7 +22,8 @@ def run(
         Literal["local", "dask"] | None, typer.Option(help="Who evaluates the candidates.")
     ] = None,
     address: Annotated[
-        str | None, typer.Option(help="Dask scheduler; without it a cluster on this machine.")
+        str | None,
+        typer.Option(help="Dask scheduler; without it that of the file, else a cluster on this machine."),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the last unfinished run.")] = False,
     cache: Annotated[

@@ -6,6 +6,7 @@ import shlex
 from dataclasses import dataclass
 from typing import Literal
 
+from aesi.errors import InputError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 
 
@@ -21,12 +22,18 @@ class RunRequest:
     use_cache: bool = True
 
     def config(self) -> ExperimentConfig:
-        """The experiment with all overrides."""
+        """The experiment with all overrides.  Raises InputError for an address that nobody would go to."""
         config = read_experiment(self.path, self.overrides)
         if self.runner is None and self.address is None:
             return config
-        kind = self.runner or ("dask" if self.address else config.runner.kind)
-        runner = config.runner.model_copy(update={"kind": kind, "address": self.address})
+        if self.runner == "local" and self.address is not None:
+            raise InputError(
+                f"--address {self.address} names a Dask scheduler, and --runner local uses none; leave one of the two "
+                "out."
+            )
+        kind = self.runner or "dask"
+        address = (self.address or config.runner.address) if kind == "dask" else None
+        runner = config.runner.model_copy(update={"kind": kind, "address": address})
         return config.model_copy(update={"runner": runner})
 
     @property

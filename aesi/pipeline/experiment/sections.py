@@ -264,6 +264,12 @@ class RunnerConfig(Section):
     storage: str | None = None
     stage_timeout_s: Positive | None = None
 
+    @model_validator(mode="after")
+    def _address_is_gone_to(self) -> RunnerConfig:
+        if self.address is not None and self.kind == "local":
+            raise ValueError("`address` names a Dask scheduler; give `kind: dask` beside it, or leave it out")
+        return self
+
 
 class DiscoverConfig(Section):
     """What `aesi discover` needs beyond cell and data.

@@ -1,0 +1,38 @@
+"""Who evaluates the candidates: by the experiment file, and by what the command line says over it."""
+
+import pytest
+
+from aesi.errors import ConfigError, InputError
+from flows.jobs.run_request import RunRequest
+
+THERE, ELSEWHERE = "tcp://there:8786", "tcp://elsewhere:8786"
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = tmp_path / "x.yaml"
+    runner = f"runner: {{kind: dask, address: '{THERE}'}}"
+    file.write_text(f"name: x\ndata: {{kind: files, train: [a.csv], test: [b.csv]}}\n{runner}\n")
+    return str(file)
+
+
+@pytest.mark.parametrize(
+    ("runner", "address", "kind", "goes_to"),
+    [
+        (None, None, "dask", THERE),
+        ("dask", None, "dask", THERE),
+        ("dask", ELSEWHERE, "dask", ELSEWHERE),
+        (None, ELSEWHERE, "dask", ELSEWHERE),
+        ("local", None, "local", None),
+    ],
+)
+def test_runner_dask_forgot_the_address_of_the_file(path, runner, address, kind, goes_to):
+    asked = RunRequest(path, runner=runner, address=address).config().runner
+    assert (asked.kind, asked.address) == (kind, goes_to)
+
+
+def test_an_address_that_nobody_would_go_to_is_refused(path):
+    with pytest.raises(InputError, match="names a Dask scheduler, and --runner local uses none"):
+        RunRequest(path, runner="local", address=ELSEWHERE).config()
+    with pytest.raises(ConfigError, match="runner: `address` names a Dask scheduler; give `kind: dask`"):
+        RunRequest(path, ("runner.kind=local",)).config()
