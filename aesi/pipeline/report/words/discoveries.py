@@ -22,9 +22,7 @@ def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
     a test part that contradicts it."""
     text = _verdict(view)
-    return (
-        f"{text[:-1]}; the test part contradicts it." if view.discovery.get("contradicted") else text
-    )
+    return f"{text[:-1]}; the test part contradicts it." if view.discovery.get("contradicted") else text
 
 
 def _verdict(view: DiscoveryView) -> str:
