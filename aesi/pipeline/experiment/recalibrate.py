@@ -24,7 +24,8 @@ have a charge of its own, x_r ~ N(0, OWN_CHARGE**2), integrated out: what is squ
     (1 + g_r g_r')**(-1/2) residual_r
 
 with g_r the slope of its weighted residual on x_r / OWN_CHARGE by the declared physics. Where all drives are of one
-record nothing is taken out: they have the charge that was fitted.
+record nothing is taken out: they have the charge that was fitted. Nor is it where a single knob is open: that is a
+baseline, as strong as the records make it, and an initial state that is fitted is that charge.
 """
 
 from __future__ import annotations
@@ -104,7 +105,7 @@ def recalibrate(
         hold,
         np.array(free),
         model,
-        len(records) == 1,
+        len(records) > 1 and len(free) > 1,
     )
     if not fit.records:
         return fit.physics(np.zeros(len(free)))
@@ -123,7 +124,7 @@ class _Fit:
     hold: Hold
     free: Array
     model: ModelName
-    one_record: bool
+    own_charges: bool
 
     def bounds(self) -> tuple[Array, Array]:
         low, high = np.full(len(KNOBS), -np.inf), np.full(len(KNOBS), np.inf)  # the prior is bound enough
@@ -173,9 +174,7 @@ class _Fit:
         run = physics.simulate(data, record.soc0, self.hold)
         weight = np.sqrt(every * dt_s / MEMORY_S) / MODEL_ERROR_V
         left: Array = weight * (data.voltage_v - run.voltage_v)[rows]
-        if self.one_record:
-            return left
-        return _without_own(left, weight * self._own_v[data.name][rows])
+        return _without_own(left, weight * self._own_v[data.name][rows]) if self.own_charges else left
 
     @cached_property
     def _own_v(self) -> dict[str, Array]:

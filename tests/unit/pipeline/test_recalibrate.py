@@ -6,6 +6,7 @@ from small_experiment import BPX
 
 from aesi.physics import Cell, simulate
 from aesi.pipeline.experiment.recalibrate import FitRecord, recalibrate
+from aesi.pipeline.product.deviations import INITIAL_STATE
 from aesi.records import Measurement
 
 CELL = Cell.from_bpx(BPX)
@@ -43,3 +44,11 @@ def test_of_one_record_its_charge_is_fitted():
     declared = recalibrate(CELL, (), {}, "linear")
     assert left_v(found, record) < 0.5 * left_v(declared, record)
     assert declared.deviations == pytest.approx(np.zeros(len(found.deviations)))
+
+
+def test_an_initial_state_that_is_fitted_alone_is_the_charge_of_all_records():
+    low = {name: discharged(name, -OFF) for name in ("one", "other")}
+    found = recalibrate(CELL, (), low, "linear", INITIAL_STATE)
+    declared = recalibrate(CELL, (), {}, "linear")
+    assert 0.5 - OFF < found.soc0(0.5) < 0.5 - 0.5 * OFF
+    assert left_v(found, low["one"]) < 0.5 * left_v(declared, low["one"])
