@@ -43,13 +43,16 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
             "missing, or more; look again with the test part among the data."
         )
     tests = [f for f in files if f.part == "test"]
-    for state, words in OTHERS if tests else ():
-        after_v, other_v = _left_v(tests, "after"), _left_v(tests, state)
-        if after_v > WORSE_SHARE * other_v:
-            out.append(
-                f"on the test part the model with what was found leaves {MV_PER_V * after_v:.1f} mV, {words} "
-                f"{MV_PER_V * other_v:.1f} mV: do not use it there."
-            )
+    after_v = _left_v(tests, "after") if tests else 0.0
+    better = [(words, _left_v(tests, state)) for state, words in OTHERS if tests]
+    less = [
+        f"{words} {MV_PER_V * left_v:.1f} mV" for words, left_v in better if after_v > WORSE_SHARE * left_v
+    ]
+    if less:
+        out.append(
+            f"on the test part the model with what was found leaves {MV_PER_V * after_v:.1f} mV, {' and '.join(less)}: "
+            "do not use it there."
+        )
     return tuple(out)
 
 

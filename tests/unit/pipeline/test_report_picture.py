@@ -26,15 +26,12 @@ def picture():
     return module
 
 
-def _leaving_the_range(trace, model):
-    prediction = replace(trace.predictions[model], outside=trace.current_a > 40)
-    return replace(trace, predictions={**trace.predictions, model: prediction})
-
-
 @pytest.mark.parametrize("n", [600, 9000])
 def test_it_tells_the_error_that_the_run_had(picture, views, tmp_path, n):
     view = views.run_view(n)
-    view = replace(view, traces=tuple(_leaving_the_range(t, view.chosen) for t in view.traces))
+    chosen = {t.name: replace(t.predictions[view.chosen], outside=t.current_a > 40) for t in view.traces}
+    traces = (replace(t, predictions={**t.predictions, view.chosen: chosen[t.name]}) for t in view.traces)
+    view = replace(view, traces=tuple(traces))
     write_run_report(tmp_path / "report.html", view)
     picture.main(str(tmp_path / "report.html"), str(tmp_path / "out.svg"))
     text = "".join(ET.parse(tmp_path / "out.svg").getroot().itertext())

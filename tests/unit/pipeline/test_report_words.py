@@ -116,6 +116,13 @@ def test_a_wrong_parameter_and_a_fault_are_not_called_missing_physics(views, eff
     assert discoveries.discovery_finding(found).startswith(phrase)
 
 
+def test_a_finding_that_the_test_part_contradicts_says_so_at_once(views):
+    view = views.discovery_view(200)
+    text = discoveries.discovery_finding(replace(view, discovery={**view.discovery, "contradicted": True}))
+    assert text.startswith(discoveries.discovery_finding(view)[:-1])
+    assert text.endswith("; the test part contradicts it.")
+
+
 def test_the_cell_is_named_once(views):
     view = views.discovery_view(200)
     found = replace(view, discovery={**view.discovery, "effects": ["self_heating", "ambient_temperature"]})
@@ -195,7 +202,7 @@ def test_the_range_that_the_data_cover_is_told(views):
 
 def test_look_alikes_stand_next_to_the_verdict(views):
     text = discoveries.look_alike_finding(views.discovery_view(200))
-    assert text == "These data cannot tell self-heating from ambient temperature."
+    assert text == "These data cannot tell apart self-heating and ambient temperature."
     assert discoveries.look_alike_finding(views.discovery_view(200, verdict="none")) == ""
 
 

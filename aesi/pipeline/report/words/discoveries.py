@@ -19,7 +19,13 @@ CERTAIN = 0.99
 
 
 def discovery_finding(view: DiscoveryView) -> str:
-    """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such."""
+    """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
+    a test part that contradicts it."""
+    text = _verdict(view)
+    return f"{text[:-1]}; the test part contradicts it." if view.discovery.get("contradicted") else text
+
+
+def _verdict(view: DiscoveryView) -> str:
     verdict, effects = view.discovery["verdict"], view.discovery["effects"]
     if verdict == "none":
         return f"Nothing is missing from the declared model of {view.cell} that these data could show."
@@ -156,7 +162,7 @@ def look_alike_finding(view: DiscoveryView) -> str:
     ]
     if not groups:
         return ""
-    return f"These data cannot tell {'; nor '.join(' from '.join(group) for group in groups)}."
+    return f"These data cannot tell apart {'; nor '.join(listed(group) for group in groups)}."
 
 
 def rest_finding(discovery: Mapping[str, Any]) -> str:
