@@ -64,6 +64,7 @@ class DataConfig(Section):
 
     files: paths of measurement files; catalogue: names of records of the data set `set`; virtual: the paper's
     profiles, which have their roles already. `repeats` cuts the one file or record `record`.
+    hold : how the current runs between the rows of a run; a discovery has its own, see `DiscoverConfig`.
     columns, units, sign, state_words, duplicates : what files do not say themselves, see `aesi.data.reading.Reading`;
     `columns: {state: NAME}` is the column that gives a current its sign.
     """
@@ -278,6 +279,8 @@ class DiscoverConfig(Section):
     fit_until_s : record -> time up to which fits see it.  until_s : what comes later is left out of every test record.
     good : records of the cell that are known to be good; what is sought is what those in `fit` have beside them.
     holdout : the last share of each record, kept back where there are no test records.
+    hold : how the current runs between rows (of `data.kind: virtual` it is known); None takes it of each record as its
+    rows show, like `aesi discover` of a file.
     """
 
     fit: tuple[str, ...] = ()
@@ -286,6 +289,7 @@ class DiscoverConfig(Section):
     fit_until_s: dict[str, Positive] = {}
     until_s: Positive | None = None
     holdout: Share = 0.3
+    hold: Hold | None = None
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
 
 

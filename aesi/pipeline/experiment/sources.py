@@ -88,7 +88,10 @@ def discovery_records(
     where = _locator(config)
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
-        return tuple(read(where(name), config.data.reading.but(stop_s=stop_s.get(name))) for name in names)
+        reading = config.data.reading
+        return tuple(
+            read(where(name), reading.but(stop_s=stop_s.get(name))).held(wanted.hold) for name in names
+        )
 
     return (
         until(wanted.fit, wanted.fit_until_s),

@@ -24,6 +24,18 @@ def test_the_measured_case_is_judged_where_its_fit_ends(shared_data, monkeypatch
     assert case.tests[0].time_s[-1] == 8000
 
 
+def test_how_the_current_runs_between_rows_is_as_records_show_or_as_the_discovery_says(
+    shared_data, monkeypatch
+):
+    monkeypatch.setenv("AESI_DATA", str(shared_data / "measured"))
+    shown, said = (
+        case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
+        for overrides in ([], ["discover.hold=backward"])
+    )
+    assert {m.hold for m in shown.records} == {None}
+    assert {m.hold for m in (*said.records, *said.tests)} == {"backward"}
+
+
 def test_a_discovery_starts_from_a_cell_at_its_state_of_health(tmp_path):
     record = write_record(tmp_path)
     whole, aged = (case_of_files(BPX, [record], soh=soh).declared().cell for soh in (None, 0.9))
