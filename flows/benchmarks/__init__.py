@@ -20,6 +20,7 @@ BENCHMARKS = OF_THE_PACKAGE | {
     "left_out": "flows.benchmarks.left_out",
     "tracking": "flows.benchmarks.tracking",
     "scale": "flows.benchmarks.scale",
+    "search": "flows.benchmarks.search",
 }
 """Name -> module."""
 

@@ -66,6 +66,7 @@ WATCHED = {
         lower={"after_worse_pct": RATE},
     ),
     "tracking": Watch(("rows", "terms", "resamples", "artifact_kb"), lower={"overhead_pct": TIMING}),
+    "search": Watch(("storage", "terms", "candidates"), higher={"ratio": TIMING}),
     "scale": Watch(("runner", "rows", "terms", "workers"), higher={"ratio_by_processor": RESULT}),
 }
 

@@ -5,7 +5,7 @@ and mutating whole words of bits loses the single term. Here Optuna keeps six pa
 tau, p_c, d, feedback), visible to its dashboard, and the mask travels as one user attribute of the trial,
 packed in hexadecimal. Optuna does what it is good at (ranking under constraints, crowding, generations,
 storage); crossover and mutation of the mask are ten lines of numpy. A trial is written once, when it is
-finished, instead of attribute by attribute. tests/flows/search/test_nsga2.py measures what this costs.
+finished, instead of attribute by attribute. `aesi bench search` measures what this costs beside it.
 
 Every candidate has an index in the search, stored with its trial. Random numbers come from (seed, index): a
 search is the same whether it was interrupted or not, and workers that share a study draw different points.

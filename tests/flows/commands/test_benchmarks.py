@@ -19,6 +19,14 @@ from flows.benchmarks.history import (
 from flows.tracking.store import KIND, Store
 
 
+def test_a_search_costs_less_than_one_with_a_parameter_for_every_term(workspace):
+    memory, shared = benchmarks.run("search", terms=200, candidates=4, population=2)
+    assert memory["storage"] == "memory"
+    assert shared["storage"] == "SQLite"
+    assert memory["candidates"] == shared["candidates"] == 4
+    assert min(memory["ratio"], shared["ratio"]) > 1
+
+
 def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
     small = {"terms": 12, "n": 4000, "resamples": 10, "candidates": 2, "rounds": 1, "artifact_kb": 5.0}
     (line,) = benchmarks.run("tracking", **small)

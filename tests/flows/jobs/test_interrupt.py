@@ -52,11 +52,9 @@ def interrupted(arguments, at, after_s=1.0):
     family = psutil.Process(process.pid).children(recursive=True)
     assert family  # Prefect's temporary server at least
     os.killpg(process.pid, signal.SIGINT)
-    began = time.monotonic()
     with process.stderr:
         rest = process.stderr.read()
     process.wait(timeout=30)
-    assert time.monotonic() - began < 10.0  # 2 s on a machine that does nothing else
     assert process.returncode == 130
     psutil.wait_procs(family, timeout=1.0)
     assert not [one for one in family if one.is_running() and one.status() != psutil.STATUS_ZOMBIE]

@@ -23,7 +23,7 @@ def test_a_stage_that_takes_too_long_is_interrupted_in_one_sentence(said):
         StageOverdue, match=r"'rest' took longer than .* \(runner\.stage_timeout_s\)"
     ) as caught:
         PlainStages(said.append, timeout_s=0.2)("rest", lambda: time.sleep(30))
-    assert time.monotonic() - started < 5
+    assert time.monotonic() - started < 20
     assert "\n" not in str(caught.value)
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
 

@@ -1,6 +1,4 @@
-"""The search: deterministic, resumable, shared, and cheap beside its candidates."""
-
-import time
+"""The search: deterministic, resumable and shared."""
 
 import numpy as np
 import optuna
@@ -9,7 +7,6 @@ import pytest
 from aesi.errors import FitError
 from aesi.records import Failed
 from aesi.sparse import FitnessWeights, Genome, evaluate
-from aesi.sparse.search.genome_space import GenomeSpace
 from flows.search.nsga2 import Constraints, search
 
 
@@ -152,40 +149,6 @@ def test_what_another_worker_evaluates_now_is_left_alone(problem, tmp_path):
 
     both = search(problem, 6, seed=0, storage=journal, population=4, shared=True, evaluate_one=meanwhile)
     assert [trial.number for trial in both.trials] == [0, 1, 2, 3, 4, 5]
-
-
-@pytest.mark.parametrize(("journal", "limit_ms"), [(False, 10.0), (True, 40.0)])
-def test_the_genome_of_626_terms_costs_little(tmp_path, journal, limit_ms):
-    # A journal waits for the disk once a trial, which on a busy machine takes what it takes.
-    space = GenomeSpace(626)
-
-    class Sized:
-        library = range(626)
-
-    rng = np.random.default_rng(0)
-    spent = 0.0
-
-    def no_work(p, genome):
-        nonlocal spent
-        started = time.perf_counter()
-        losses = tuple(rng.random(3))
-        outcome = _outcome(genome, losses)
-        spent += time.perf_counter() - started
-        return outcome
-
-    started = time.perf_counter()
-    search(Sized(), 60, 0, tmp_path / "j.log" if journal else None, evaluate_one=no_work, space=space)
-    per_trial_ms = 1e3 * (time.perf_counter() - started - spent) / 60
-    assert per_trial_ms < limit_ms
-
-
-def _outcome(genome, losses):
-    from types import SimpleNamespace
-
-    return SimpleNamespace(
-        genome=genome, losses=losses, fitness=0.0, pearson_train=1.0, pearson_valid=1.0,
-        free_run_valid_mser_pct=0.0, one_step_valid_rmse_v=0.0,
-    )  # fmt: skip
 
 
 def test_the_fittest_are_a_share_of_all_and_begin_with_the_pick(problem):

@@ -1,7 +1,5 @@
 """The study outlives the process, under names that a person reads."""
 
-import time
-
 import optuna
 import pytest
 
@@ -65,11 +63,3 @@ def test_a_storage_that_fails_is_said_once_and_stops_nothing(publish, candidate,
         study.add(number, candidate.genome, ScoredCandidate(candidate))
     assert len(said) == 1
     assert "the search goes on without" in said[0]
-
-
-def test_a_candidate_costs_milliseconds(publish, candidate):
-    study = publish()
-    started = time.process_time()
-    for number in range(100):
-        study.add(number, candidate.genome, ScoredCandidate(candidate))
-    assert time.process_time() - started < 2.0

@@ -1,0 +1,107 @@
+"""What the search itself costs a candidate, against Optuna's NSGA-II with one parameter a term.
+
+Both ask and tell the same number of candidates that cost nothing to evaluate, so what is left is the search:
+selection, crossover, and the storage of the trials. Processor milliseconds a candidate, of one run; `ratio` is
+the peer's over ours. `storage` is "memory", where an experiment keeps its own search, or "SQLite", which workers
+can share.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import optuna
+
+from aesi.sparse import Candidate, Genome, Problem
+from aesi.sparse.search.genome_space import GenomeSpace
+from flows.search.nsga2 import search
+
+SHARED_CANDIDATES = 10
+"""On SQLite, where the peer takes seconds for one."""
+SHARED = "SQLite"
+
+
+def run(
+    terms: int = 626, candidates: int = 60, population: int = 20, seed: int = 0
+) -> Iterator[dict[str, Any]]:
+    """One line a storage."""
+    _ours(
+        terms, population, population, seed, None
+    )  # what loads at the first call is loaded before the clock starts
+    for storage, number in (("memory", candidates), (SHARED, min(candidates, SHARED_CANDIDATES))):
+        with tempfile.TemporaryDirectory(prefix="aesi-bench-") as folder:
+            ours = _ours(terms, number, population, seed, _url(storage, folder, "ours"))
+            peer = _peer(terms, number, population, seed, _url(storage, folder, "peer"))
+        yield {
+            "bench": "search",
+            "storage": storage,
+            "terms": terms,
+            "candidates": number,
+            "ours_ms": ours,
+            "peer_ms": peer,
+            "ratio": peer / ours,
+        }
+
+
+def _url(storage: str, folder: str, name: str) -> str | None:
+    return f"sqlite:///{folder}/{name}.db" if storage == SHARED else None
+
+
+def _ours(terms: int, candidates: int, population: int, seed: int, url: str | None) -> float:
+    rng = np.random.default_rng(seed)
+
+    def evaluate_many(genomes: Sequence[Genome]) -> list[tuple[int, Candidate]]:
+        return [(k, _free_of_charge(genome, rng)) for k, genome in enumerate(genomes)]
+
+    problem = cast(Problem, SimpleNamespace(library=range(terms)))
+    started = time.process_time()
+    search(
+        problem,
+        candidates,
+        seed,
+        url,
+        evaluate_many=evaluate_many,
+        space=GenomeSpace(terms),
+        population=population,
+    )
+    return 1e3 * (time.process_time() - started) / candidates
+
+
+def _free_of_charge(genome: Genome, rng: np.random.Generator) -> Candidate:
+    """An outcome with losses at random."""
+    figures = {
+        "genome": genome,
+        "losses": tuple(rng.random(3)),
+        "fitness": 0.0,
+        "pearson_train": 1.0,
+        "pearson_valid": 1.0,
+        "free_run_valid_mser_pct": 0.0,
+        "one_step_valid_rmse_v": 0.0,
+    }
+    return cast(Candidate, SimpleNamespace(**figures))
+
+
+def _peer(terms: int, candidates: int, population: int, seed: int, url: str | None) -> float:
+    rng = np.random.default_rng(seed)
+
+    def losses(trial: optuna.Trial) -> tuple[float, ...]:
+        for k in range(terms):
+            trial.suggest_categorical(f"term_{k}", [False, True])
+        for gene in ("lambda1", "lambda2", "tau"):
+            trial.suggest_float(gene, 1e-6, 1.0, log=True)
+        return tuple(rng.random(3))
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        sampler = optuna.samplers.NSGAIISampler(population_size=population, seed=seed)
+    started = time.process_time()
+    study = optuna.create_study(storage=url, directions=["minimize"] * 3, sampler=sampler)
+    study.optimize(losses, n_trials=candidates)
+    return 1e3 * (time.process_time() - started) / candidates
