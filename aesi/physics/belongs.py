@@ -18,6 +18,7 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array, IntArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
+from aesi.records.checked import row_words
 
 VOLTAGE_MARGIN_V = 0.3
 """Beyond the voltage limits of the file that a record may go: fast pulses and old cells do."""
@@ -63,9 +64,9 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
     if len(outside):
         row = int(outside[0])
         raise DataError(
-            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s (row {row}) is outside the range of "
-            f"{cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to another cell, "
-            "or the voltage is not in volts."
+            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s ({row_words(row)}) is "
+            f"outside the range of {cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data "
+            "belong to another cell, or the voltage is not in volts."
         )
 
 

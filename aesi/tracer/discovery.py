@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -70,8 +70,9 @@ class Discovery:
     written : ids of the effects that `after` has beside the declared model; not those of the verdict where these do not
     carry over.
     own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
-    soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
-    part.  before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
+    soc0, hold : of the first record, fitted.  effects : by id, all that may be tried or moved.  tried : ids of those
+    that competed, none where none may be added.  files : errors by file and part.
+    before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
     tell them apart.  choice : of the model of the cell.  contradicted : whether what explains the data leaves more of
     the test part than a right explanation may.  warnings : that, and where the written model does worse on the test
     part than another one.
@@ -95,6 +96,7 @@ class Discovery:
     warnings: tuple[str, ...] = ()
     written: tuple[str, ...] = ()
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
+    tried: tuple[str, ...] = ()
     seconds: float = 0.0
     simulations: int = 0
 
@@ -153,9 +155,10 @@ def discover(
         return Archive(archive, context_of(one), beside)
 
     evidence, choice = with_model(problem, model, search, kept, max_effects)
-    return _told(
+    found = _told(
         evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )
+    return found if max_effects else replace(found, tried=())
 
 
 def inverse_problem(
@@ -246,6 +249,7 @@ def _told(
         warnings=warnings(files, verdict),
         written=tuple(evidence.after.hypothesis),
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
+        tried=problem.competing(),
         seconds=seconds,
         simulations=simulations,
     )

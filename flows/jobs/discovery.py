@@ -146,7 +146,7 @@ def _track_case(tracker: Tracker | None, case: Case) -> None:
             **({"without": ", ".join(case.without)} if case.without else {}),
             "soc0": case.soc0,
             "soh": case.soh,
-            "holdout": case.holdout,
+            "holdout": case.kept_back,
             "max_effects": case.max_effects,
             "seed": case.seed,
         }

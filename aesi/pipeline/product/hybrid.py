@@ -23,7 +23,7 @@ from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
-from aesi.records.checked import numbers
+from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
 
 
@@ -78,8 +78,8 @@ class HybridModel:
         if voltage_v is not None and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
             raise DataError(
-                f"voltage_v has no value in row {row} ({record.time_s[row]:g} s); predict the parts before and after "
-                "the gap as records of their own, or leave voltage_v out for a free run."
+                f"voltage_v has no value at {record.time_s[row]:g} s ({row_words(row)}); predict the parts before "
+                "and after the gap as records of their own, or leave voltage_v out for a free run."
             )
         soc0 = self._soc0(record, soc0, voltage_v is not None)
         even = self._even(record)

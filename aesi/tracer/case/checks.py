@@ -12,6 +12,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
+from aesi.records.checked import row_words
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord
 
@@ -63,8 +64,8 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
         at, soc, start = record.data.time_s[row], 100.0 * charge[row], 100.0 * record.soc0
         raise DataError(
             f"{record.name}: the charge moved takes the cell to a state of charge of {soc:.0f} % at {at:g} s "
-            f"(row {row}), from {start:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; check the cell file, "
-            "soc0 and the sign and unit of the current."
+            f"({row_words(row)}), from {start:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; check the cell "
+            "file, soc0 and the sign and unit of the current."
         )
 
 

@@ -91,7 +91,7 @@ def test_inputs_beyond_the_trained_range_are_flagged_and_the_band_is_wider_there
 def test_a_missing_voltage_is_refused_with_its_row(model, data):
     voltage_v = data.voltage_v.copy()
     voltage_v[7] = np.nan
-    with pytest.raises(DataError, match=r"no value in row 7 \(7 s\)"):
+    with pytest.raises(DataError, match=r"no value at 7 s \(row 8, counted from 1\)"):
         model.predict(data.time_s, data.current_a, SOC0, voltage_v)
 
 

@@ -63,6 +63,16 @@ def test_a_wave_that_no_effect_makes_is_unknown(cell, few, make):
     assert found.verdict.structured_v == pytest.approx(8e-3, rel=0.3)
 
 
+def test_an_unknown_without_an_effect_to_add_does_not_say_that_the_catalogue_was_tried(cell, few, make):
+    data = make()
+    wave = 8e-3 * np.sign(np.sin(data.time_s / 90.0 + np.sin(data.time_s / 310.0)))
+    waved = replace(data, voltage_v=data.voltage_v + wave)
+    found = discover(cell, [waved], soc0=0.9, effects=few, max_effects=0)
+    assert (found.verdict.word, found.tried, found.candidates) == ("unknown", (), ())
+    assert "with no effect added" in found.verdict.reason
+    assert discover(cell, [waved], soc0=0.9, effects=few).tried == tuple(few)
+
+
 def test_the_same_seed_gives_the_same_answer_and_the_archive_spares_the_fits(cell, few, make, tmp_path):
     data = make((CATALOGUE["current_sensor_gain"].activate(gain=1.03),))
     archive = tmp_path / "fits.jsonl"
