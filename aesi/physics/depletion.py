@@ -68,11 +68,16 @@ def sentence(
             f"Check soc0, the capacity and the sign of the current, {tail}"
         )
     slower = rate_factor(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
-    cause = f"{head}{surface}, while its particles hold {100 * mean:.1f} % in the mean: solid diffusion cannot follow "
-    cause += f"{abs(current_a[at]):.3g} A"
+    cause = (
+        f"{head}{surface}, at a state of charge of {100 * soc:.1f} %, while its particles hold {100 * mean:.1f} % "
+        f"in the mean: solid diffusion cannot follow {abs(current_a[at]):.3g} A"
+    )
     if slower < 0.9:
         cause += f" at {degc:.3g} degC, where it is {1.0 / slower:.2g} times slower than at the reference temperature"
-    return f"{cause}. Check the diffusivity, its activation energy and the unit of the current, {tail}"
+    return (
+        f"{cause}. Check soc0, the capacity, the diffusivity with its activation energy and the unit of the current, "
+        f"{tail}"
+    )
 
 
 def carried_a(model: EspmModel, kelvin: float) -> float:

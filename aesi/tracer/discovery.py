@@ -27,7 +27,7 @@ from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
-from aesi.tracer.report.outcome import FileOutcome, State, States, outcomes, test_rmse_v
+from aesi.tracer.report.outcome import FileOutcome, State, States, emptied, outcomes, test_rmse_v
 from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.warning import contradicted_by_v, warnings
@@ -244,7 +244,7 @@ def _told(
         effects=problem.effects,
         experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,
-        notes=(choice.sentence, *_notes(evidence, tested)),
+        notes=(choice.sentence, *_notes(evidence, tested), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=warnings(files, verdict),
         written=tuple(evidence.after.hypothesis),

@@ -8,15 +8,12 @@ import numpy as np
 
 from aesi.constants import MV_PER_V
 from aesi.tracer.decide.verdict import Verdict, beyond
-from aesi.tracer.report.outcome import FileOutcome, State
+from aesi.tracer.report.outcome import NAMES, FileOutcome, State
 
 WORSE_SHARE = 1.05
 """Where the written model leaves so many times as much of the test part as another one, the warning is against using it
 there. A convention, as in `decide.carry_over`; it decides these words alone."""
-OTHERS: tuple[tuple[State, str], ...] = (
-    ("before", "the declared model"),
-    ("recalibrated", "the recalibrated model"),
-)
+OTHERS: tuple[State, ...] = ("before", "recalibrated")
 
 
 def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float | None:
@@ -44,9 +41,9 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
         )
     tests = _tests(files)
     after_mv = _left_mv(tests, "after")
-    less = {words: left_mv for state, words in OTHERS if (left_mv := _left_mv(tests, state)) < after_mv}
+    less = {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(tests, state)) < after_mv}
     if less:
-        model = "the model with what was found" if verdict.effects else "the written model"
+        model = "the model with what was found" if verdict.effects else NAMES["after"]
         others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
         advice = ": do not use it there." if after_mv > WORSE_SHARE * min(less.values()) else "."
         out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")

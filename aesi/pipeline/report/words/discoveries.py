@@ -87,11 +87,11 @@ WITH_FINDING = "with the finding added"
 
 
 def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
-    """The states of the model worth showing, in words: the last one where it is more than a refit."""
+    """The states of the model worth showing, in words: the last one where it is more than a refit, or a worse one."""
     shown = {"before": "as declared", "recalibrated": "recalibrated"}
     effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
-    if effects or written:
-        shown["after"] = WITH_FINDING if written == effects else "as written"
+    if effects or written or _worse_on_test(discovery):
+        shown["after"] = WITH_FINDING if effects and written == effects else "as written"
     return shown
 
 
