@@ -6,6 +6,8 @@ diffusion cannot follow, and one that the electrolyte cannot carry; the latter t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, ZERO_CELSIUS_K
@@ -77,6 +79,18 @@ def sentence(
     return (
         f"{cause}. Check soc0, the capacity, the diffusivity with its activation energy and the unit of the current, "
         f"{tail}"
+    )
+
+
+def ran_out(name: str, at_s: Mapping[str, float]) -> str:
+    """A sentence on a record that simulations which go on regardless ran out on: errors mean nothing from there on.
+
+    at_s : what was simulated, in words, to when it ran out, s.
+    """
+    where = ", ".join(f"in {model} at {when:g} s" for model, when in at_s.items())
+    return (
+        f"{name}: a particle's surface or the electrolyte runs empty or full {where}, and is held there: from then on "
+        "an error says that it ran out, not by how much the model is off."
     )
 
 

@@ -49,6 +49,11 @@ class TriedHypothesis:
     simulations: int
 
 
+NO_YARDSTICK = (
+    "the data are too short, or too little varies in them, for a flexible correction: what one could still explain is "
+    "not known."
+)
+
 Progress = Callable[[TriedHypothesis], None]
 
 
@@ -223,6 +228,7 @@ def _told(
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
     cell, model_effects, soc0 = evidence.after.settled()
+    left = _left(records, evidence.after)
 
     def test_error(one: Explanation) -> float | None:
         try:
@@ -237,14 +243,14 @@ def _told(
         files=files,
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in records]))),
         before=_left(records, declared),
-        after=_left(records, evidence.after),
+        after=left,
         model_effects=model_effects,
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,
         experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,
-        notes=(choice.sentence, *_notes(evidence, tested), *emptied(files)),
+        notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=warnings(files, verdict),
         written=tuple(evidence.after.hypothesis),
@@ -255,7 +261,7 @@ def _told(
     )
 
 
-def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, ...]:
+def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: Left) -> tuple[str, ...]:
     records = evidence.path.problem.records
     known = [
         f"{r.name} is known to be good: what was found is what the others have beside it."
@@ -265,6 +271,8 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, .
     notes = [*known, *(note for record in (*records, *tested) for note in record.notes)]
     notes += [note for path in evidence.paths.values() for note in path.notes]
     notes += [*evidence.verdict.alike_too, *evidence.limits]
+    if left.yardstick.explained_v is None:
+        notes.append(NO_YARDSTICK)
     if evidence.fault is not None:
         notes.append(f"not adopted: {evidence.fault}.")
     return tuple(dict.fromkeys(notes))

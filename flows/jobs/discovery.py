@@ -183,7 +183,8 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
         for part in ("fit", "test")
         if content[state].get(part)
     }
-    figures = {k: content[k] for k in ("confidence", "noise_floor_mv", "explainable_mv", "structured_mv")}
+    names = ("confidence", "noise_floor_mv", "explainable_mv", "structured_mv")
+    figures = {name: content[name] for name in names if content[name] is not None}
     tracker.metrics(errors | figures | {"seconds": content["seconds"]})
     for name in ("discovery.json", "report.html"):
         tracker.files(out / name)

@@ -88,8 +88,8 @@ class Case:
         )
         said = {
             "no effect is tried (at most 0 are added), so that none can be found.": self.max_effects == 0,
-            f"tried alone: {only}; nothing is said about other effects.": bool(only),
-            f"not tried: {without}.": bool(without),
+            f"tried alone: {only}; nothing is said about other effects.": bool(only and self.max_effects),
+            f"not tried: {without}.": bool(without and self.max_effects),
             f"test records are given, so that the holdout of {self.holdout or 0.0:g} is not used: all rows of the data "
             "are looked at.": bool(self.tests and self.holdout),
         }
@@ -159,7 +159,7 @@ def found_model(found: Discovery) -> HybridModel:
 
 def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, Any]:
     """The content of discovery.json.  asked : what was not tried or not used, and what a reader did to the files."""
-    verdict = found.verdict
+    verdict, explained_v = found.verdict, found.after.yardstick.explained_v
     return {
         "schema": SCHEMA,
         "verdict": verdict.word,
@@ -172,7 +172,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
         "model": _model(found),
         **{state: {part: _errors(found, state, part) for part in ("fit", "test")} for state in STATES},
         "noise_floor_mv": MV_PER_V * found.noise_floor_v,
-        "explainable_mv": MV_PER_V * found.after.yardstick.explained_v,
+        "explainable_mv": None if explained_v is None else MV_PER_V * explained_v,
         "structured_mv": MV_PER_V * verdict.structured_v,
         "tolerance_mv": MV_PER_V * verdict.tolerance_v,
         "margin": verdict.margin,
@@ -253,7 +253,10 @@ def _dependence(found: Discovery) -> list[dict[str, Any]]:
 
 
 def _pointers(found: Discovery) -> list[dict[str, Any]]:
+    """None where there was too little for a correction, before or after."""
     before, after = found.before.yardstick.pointers, found.after.yardstick.pointers
+    if not before or not after:
+        return []
     none = Pointer(0.0)
     return [
         {

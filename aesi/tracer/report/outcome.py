@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from aesi.numerics.typing import Array
+from aesi.physics.depletion import ran_out
 from aesi.records import Run
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.model_state import ModelState
@@ -126,9 +127,7 @@ def emptied(files: Sequence[FileOutcome]) -> tuple[str, ...]:
         for state, at_s in f.emptied_s.items():
             first.setdefault(f.name, {}).setdefault(state, at_s)
     return tuple(
-        f"{name}: a particle's surface or the electrolyte runs empty or full "
-        + ", ".join(f"in {NAMES[state]} at {at_s:g} s" for state, at_s in states.items())
-        + ", and is held there: from then on an error says that it ran out, not by how much the model is off."
+        ran_out(name, {NAMES[state]: at_s for state, at_s in states.items()})
         for name, states in first.items()
     )
 

@@ -195,6 +195,7 @@ def test_a_rest_that_several_hypotheses_explain_names_the_best(views):
 def test_a_rest_that_follows_nothing_is_not_called_little(views):
     unknown = views.discovery_view(200, verdict="unknown").discovery
     assert "follows none of the model's variables" in discoveries.rest_finding(unknown)
+    assert "is not known" in discoveries.rest_finding({**unknown, "explainable_mv": None})
     assert "much structure" in discoveries.rest_finding({**unknown, "explainable_mv": 0.9})
     assert "little structure" in discoveries.rest_finding(views.discovery_view(200).discovery)
 

@@ -199,6 +199,8 @@ def look_alike_finding(view: DiscoveryView) -> str:
 def rest_finding(discovery: Mapping[str, Any]) -> str:
     """What a data-driven correction could still explain."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")
+    if rest is None:
+        return "What a flexible correction could still explain is not known: these data are too few for one."
     text = f"A flexible correction learnt on what is left could still explain {rest:.1f} mV"
     if not after:
         return text + "."
