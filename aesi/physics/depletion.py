@@ -14,7 +14,6 @@ from aesi.constants import FARADAY_C_MOL, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.physics.espm.plain import rate_factor, stack_of
 from aesi.physics.model import EspmModel
-from aesi.records.checked import row_words
 
 LAYERS = {1: "negative electrode", 2: "positive electrode"}
 SALT, NO_SOLUTION = 3, 4
@@ -29,7 +28,7 @@ def sentence(
     4, no reaction carries the current."""
     cell = model.cell
     head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
-    where = f"at {time_s[at]:.6g} s ({row_words(at)})"
+    where = f"at {time_s[at]:.6g} s"  # of a row the file may know nothing: models run on rows of their own
     degc = kelvin - ZERO_CELSIUS_K
     tail = 'or, in Python, let it run on with on_depletion="clip".'
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3

@@ -48,10 +48,10 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
     duration = float(until - thin.time_s[0])
     if (record.n_fit < FEWEST_SAMPLES and duration < 10 * SHORTEST_S) or duration < SHORTEST_S:
         kept_back = len(thin) - record.n_fit
-        beside = f" ({kept_back} more are kept back for the test)" if kept_back else ""
+        beside = f" ({kept_back} more kept back for the test)" if kept_back else ""
         raise DataError(
-            f"{record.name}: {record.n_fit} samples over {duration:.0f} s{beside} are too little to decide anything; "
-            f"give at least {FEWEST_SAMPLES} samples over {SHORTEST_S:.0f} s for the fit."
+            f"{record.name}: {duration:.0f} s and {record.n_fit} rows to fit{beside} are too little to decide; "
+            f"give at least {FEWEST_SAMPLES} rows over {SHORTEST_S:.0f} s for the fit."
         )
     rate = float(np.max(np.abs(thin.current_a[: record.n_fit]))) / cell.nominal_capacity_ah
     if rate < LEAST_C_RATE:

@@ -95,6 +95,13 @@ def test_a_missing_voltage_is_refused_with_its_row(model, data):
         model.predict(data.time_s, data.current_a, SOC0, voltage_v)
 
 
+def test_a_first_voltage_that_no_such_cell_has_started_a_prediction_without_a_word(model, data):
+    voltage_v = data.voltage_v.copy()
+    voltage_v[0] = 1.5
+    with pytest.raises(DataError, match=r"1.500 V at 0 s \(row 1, counted from 1\) is outside the range of"):
+        model.predict(data.time_s, data.current_a, SOC0, voltage_v)
+
+
 def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
     effect = CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)
     folder = HybridModel(model.cell, (effect,), hold="backward").save(tmp_path / "physics")
