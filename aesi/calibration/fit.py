@@ -31,6 +31,7 @@ from aesi.errors import DataError, FitError
 from aesi.numerics.typing import Array
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
+from aesi.physics.depletion import ran_out
 from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
 
@@ -90,7 +91,7 @@ def calibrate(
             for r, *three in zip(model.records, declared, fitted, simulated, strict=True)
         ),
         capacities=capacities(model, x),
-        notes=(*notes, *_told(model, x), *warmth),
+        notes=(*notes, *_told(model, x), *_ran_out(cell, model, x), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
@@ -155,6 +156,22 @@ def _declared_errors(cell: Cell, model: Model) -> list[float]:
     x = np.zeros(model.layout.size)
     runs = [model.run(i, cell, x)[0] for i in range(len(model.records))]
     return [_rms(r.rows.voltage_v - v) for r, v in zip(model.records, runs, strict=True)]
+
+
+def _ran_out(cell: Cell, model: Model, x: Array) -> tuple[str, ...]:
+    """A sentence for each record that a state of the cell runs out on."""
+    as_simulated = model.as_simulated(x)
+    states = {
+        "the declared cell": (cell, np.zeros(model.layout.size)),
+        "the fitted cell": (model.cell_at(x), x),
+        "the file as simulated": (model.cell_at(as_simulated), as_simulated),
+    }
+    out = []
+    for i, record in enumerate(model.records):
+        found = {words: model.ran_out_s(i, *state) for words, state in states.items()}
+        if at_s := {words: at for words, at in found.items() if at is not None}:
+            out.append(ran_out(record.name, at_s))
+    return tuple(out)
 
 
 def _rms(error_v: Array) -> float:

@@ -143,6 +143,15 @@ class Model:
 
         more : factor on the active material that its cell has.
         """
+        return self._solved(index, cell, x, more)[0]
+
+    def ran_out_s(self, index: int, cell: Cell, x: Array) -> float | None:
+        """When a record's simulation runs out of charge or salt, s; None where it does not."""
+        at = self._solved(index, cell, x, 1.0)[1]
+        return None if at < 0 else float(self.records[index].rows.time_s[at])
+
+    def _solved(self, index: int, cell: Cell, x: Array, more: float) -> tuple[Array, int]:
+        """Rows of a record's simulation, and the first that has no charge or no salt left; -1 where all have."""
         self.simulations += 1
         record = self.records[index]
         model = EspmModel(
@@ -156,7 +165,8 @@ class Model:
         if record.slow:
             current = current - self.zero.at(float(x[self.layout.zero])) * record.flows
         solve = solver(self.physics)
-        return solve(model, record.rows.time_s, current, record.kelvin, soc, record.hold)[0]
+        rows, _, at, _ = solve(model, record.rows.time_s, current, record.kelvin, soc, record.hold)
+        return rows, at
 
     def as_simulated(self, x: Array) -> Array:
         """The working vector with nothing that a record has of its own: the file's state, currents as measured.

@@ -78,10 +78,11 @@ def to_even(measurement: Measurement, dt_s: float) -> Measurement:
     """
     time = measurement.time_s
     length = float(time[-1] - time[0])
-    if not 0 < dt_s <= length:
+    if not dt_s > 0:
+        raise DataError(f"{measurement.name}: a step of {dt_s:g} s is not possible; give one above 0.")
+    if dt_s > length:
         raise DataError(
-            f"{measurement.name}: a step of {dt_s:g} s is not possible; "
-            f"give one above 0 and up to {length:g} s."
+            f"{measurement.name} lasts {length:g} s, which is less than a step of {dt_s:g} s; give a longer record."
         )
     if length / dt_s > MOST_EVEN_ROWS:
         raise DataError(

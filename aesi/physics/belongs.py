@@ -18,6 +18,7 @@ from aesi.errors import DataError
 from aesi.numerics.typing import Array, IntArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
+from aesi.records.checked import row_words
 
 VOLTAGE_MARGIN_V = 0.3
 """Beyond the voltage limits of the file that a record may go: fast pulses and old cells do."""
@@ -50,10 +51,14 @@ BEYOND_SOC = 0.1
 
 @dataclass(frozen=True)
 class CapacityBounds:
-    """low_ah, high_ah : between them lies the capacity of any cell with these open-circuit potentials."""
+    """low_ah, high_ah : between them lies the capacity of any cell with these open-circuit potentials.
+    low_rows, high_rows : the two rows, the fuller first, whose voltages and charge bound it from there, if any do.
+    """
 
     low_ah: float
     high_ah: float
+    low_rows: tuple[int, int] | None = None
+    high_rows: tuple[int, int] | None = None
 
 
 def check_voltage(cell: Cell, data: Measurement) -> None:
@@ -63,9 +68,9 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
     if len(outside):
         row = int(outside[0])
         raise DataError(
-            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s (row {row}) is outside the range of "
-            f"{cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data belong to another cell, "
-            "or the voltage is not in volts."
+            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s ({row_words(row)}) is "
+            f"outside the range of {cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data "
+            "belong to another cell, or the voltage is not in volts."
         )
 
 
@@ -92,40 +97,65 @@ def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
     at_most = np.maximum(high[:, None] - low[None, :], FEWEST_SOC)
     telling = moved > TELLING_SHARE * float(np.ptp(charge))
     most = telling & (at_least > TELLING_SOC)
-    largest = float(np.min(moved[most] / at_least[most], initial=np.inf))
-    smallest = float(np.max(moved[telling] / at_most[telling], initial=0.0))
-    return CapacityBounds(smallest, largest)
+    largest = np.divide(moved, at_least, out=np.full_like(moved, np.inf), where=most)
+    smallest = np.divide(moved, at_most, out=np.zeros_like(moved), where=telling)
+    return CapacityBounds(
+        float(smallest.max()),
+        float(largest.min()),
+        _pair(rows, int(smallest.argmax())) if telling.any() else None,
+        _pair(rows, int(largest.argmin())) if most.any() else None,
+    )
+
+
+def _pair(rows: IntArray, entry: int) -> tuple[int, int]:
+    """Rows of the record of an entry of the table of pairs."""
+    return int(rows[entry // len(rows)]), int(rows[entry % len(rows)])
 
 
 def _check_window(cell: Cell, record: Measurement) -> None:
     calm = np.abs(record.current_a) < SMALL_C_RATE * cell.nominal_capacity_ah
     full_v = max(float(cell.rest_voltage_v(np.array([1.0]))[0]), cell.upper_voltage_v)
+    first_v = float(record.voltage_v[0])
+    if calm[0] and first_v < cell.lower_voltage_v - VOLTAGE_MARGIN_V:
+        raise DataError(
+            f"{record.name} starts at {first_v:.3f} V at {record.current_a[0]:.3g} A, but {cell.name} is empty at "
+            f"{cell.lower_voltage_v:g} V: leave rows out that are no measurement of the cell (--from-s), or take the "
+            "file of this cell."
+        )
     above = calm & (record.voltage_v > full_v + ABOVE_FULL_V)
     if np.any(above):
         row = int(np.argmax(above))
         raise DataError(
             f"{record.name}, {record.time_s[row]:.6g} s: {record.voltage_v[row]:.3f} V at "
             f"{record.current_a[row]:.3g} A, but {cell.name} is full at {full_v:.3f} V: the record and the "
-            "cell file are of different cells."
+            "cell file are of different cells, or the row is no measurement of the cell."
         )
 
 
 def _check_capacity(cell: Cell, record: Measurement) -> None:
     bounds = capacity_bounds(cell, record)
     declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
-    moved = float(np.ptp(_charge_ah(record)))
-    low_v, high_v = float(np.min(record.voltage_v)), float(np.max(record.voltage_v))
-    said = f"{record.name}: {moved:.4g} Ah move between {low_v:.3f} and {high_v:.3f} V, as in a cell of"
-    if bounds.low_ah > TOO_SMALL * declared:
+    if bounds.low_rows is not None and bounds.low_ah > TOO_SMALL * declared:
         raise DataError(
-            f"{said} {bounds.low_ah:.3g} Ah or more, but {cell.name} has {declared:.3g} Ah: "
-            f"{_cause(bounds.low_ah / declared, record)}."
+            f"{_moved(record, bounds.low_rows)}, as in a cell of {bounds.low_ah:.3g} Ah or more, but {cell.name} has "
+            f"{declared:.3g} Ah: {_cause(bounds.low_ah / declared, record)}."
         )
-    if declared > TOO_LARGE * bounds.high_ah:
+    if bounds.high_rows is not None and declared > TOO_LARGE * bounds.high_ah:
         raise DataError(
-            f"{said} {bounds.high_ah:.3g} Ah or less, but {cell.name} has {declared:.3g} Ah: "
-            f"{_cause(bounds.high_ah / declared, record)}."
+            f"{_moved(record, bounds.high_rows)}, as in a cell of {bounds.high_ah:.3g} Ah or less, but {cell.name} has "
+            f"{declared:.3g} Ah: {_cause(bounds.high_ah / declared, record)}."
         )
+
+
+def _moved(record: Measurement, rows: tuple[int, int]) -> str:
+    """What flows between two rows, the fuller first, and the voltages there: one of them may be what is wrong."""
+    first, last = sorted(rows)
+    charge = _charge_ah(record)
+    amount, way = abs(charge[last] - charge[first]), "leave" if rows[0] == first else "enter"
+    ends = " and ".join(
+        f"{record.time_s[row]:.6g} s ({record.voltage_v[row]:.3f} V)" for row in (first, last)
+    )
+    return f"{record.name}: {amount:.4g} Ah {way} the cell between {ends}"
 
 
 def _cause(ratio: float, record: Measurement) -> str:

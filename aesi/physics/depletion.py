@@ -6,6 +6,8 @@ diffusion cannot follow, and one that the electrolyte cannot carry; the latter t
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, ZERO_CELSIUS_K
@@ -26,7 +28,7 @@ def sentence(
     4, no reaction carries the current."""
     cell = model.cell
     head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
-    where = f"at {time_s[at]:.6g} s (row {at})"
+    where = f"at {time_s[at]:.6g} s"  # of a row the file may know nothing: models run on rows of their own
     degc = kelvin - ZERO_CELSIUS_K
     tail = 'or, in Python, let it run on with on_depletion="clip".'
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
@@ -67,11 +69,28 @@ def sentence(
             f"Check soc0, the capacity and the sign of the current, {tail}"
         )
     slower = rate_factor(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
-    cause = f"{head}{surface}, while its particles hold {100 * mean:.1f} % in the mean: solid diffusion cannot follow "
-    cause += f"{abs(current_a[at]):.3g} A"
+    cause = (
+        f"{head}{surface}, at a state of charge of {100 * soc:.1f} %, while its particles hold {100 * mean:.1f} % "
+        f"in the mean: solid diffusion cannot follow {abs(current_a[at]):.3g} A"
+    )
     if slower < 0.9:
         cause += f" at {degc:.3g} degC, where it is {1.0 / slower:.2g} times slower than at the reference temperature"
-    return f"{cause}. Check the diffusivity, its activation energy and the unit of the current, {tail}"
+    return (
+        f"{cause}. Check soc0, the capacity, the diffusivity with its activation energy and the unit of the current, "
+        f"{tail}"
+    )
+
+
+def ran_out(name: str, at_s: Mapping[str, float]) -> str:
+    """A sentence on a record that simulations which go on regardless ran out on: errors mean nothing from there on.
+
+    at_s : what was simulated, in words, to when it ran out, s.
+    """
+    where = ", ".join(f"in {model} at {when:g} s" for model, when in at_s.items())
+    return (
+        f"{name}: a particle's surface or the electrolyte runs empty or full {where}, and is held there: from then on "
+        "an error says that it ran out, not by how much the model is off."
+    )
 
 
 def carried_a(model: EspmModel, kelvin: float) -> float:

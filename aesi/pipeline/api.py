@@ -23,6 +23,7 @@ from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
 from aesi.pipeline.product.declared import Declared, declared_model
 from aesi.records import Hold, Measurement
+from aesi.records.checked import row_words
 from aesi.tracer.discovery import Progress
 
 FileOrRecord = str | PathLike[str] | Measurement
@@ -38,7 +39,7 @@ def discover(
     tests: Data = (),
     *,
     soc0: float | None = None,
-    holdout: float = 0.3,
+    holdout: float | None = None,
     max_effects: int = 3,
     seed: int = 0,
     hold: Hold | None = None,
@@ -52,7 +53,8 @@ def discover(
     """Find what a cell's model lacks to explain measurements.
 
     cell : a BPX file, the folder of a saved model, a Cell or a HybridModel.
-    data : measurements that may be looked at, less the last `holdout` share of each where there are no `tests`.
+    data : measurements that may be looked at, less the last `holdout` share of each (None: 0.3) where
+    there are no `tests`.
     tests : measurements that choose nothing.
     soc0 : state of charge at the first sample; None takes it from the voltage.
     hold : how the current runs between rows; None takes what the records say.
@@ -117,10 +119,10 @@ def calibrate(
     )
 
 
-def _check_asked(soc0: float | None, holdout: float, max_effects: int, seed: int) -> None:
+def _check_asked(soc0: float | None, holdout: float | None, max_effects: int, seed: int) -> None:
     """Raises InputError for a number that no search can be run with."""
     check_soc(soc0)
-    if not 0.0 <= holdout <= MOST_HOLDOUT:
+    if holdout is not None and not 0.0 <= holdout <= MOST_HOLDOUT:
         raise InputError(
             f"holdout = {holdout!r} is not a share of the record, from 0 to {MOST_HOLDOUT:g}, to be kept back; 30 % "
             "is 0.3."
@@ -171,7 +173,7 @@ def _read(record: FileOrRecord, rows: int | None, hold: Hold | None) -> Measurem
     if unknown.any():
         row = int(np.argmax(unknown))
         raise DataError(
-            f"{found.name}: voltage_v is nan in row {row} ({found.time_s[row]:g} s); drop the row, or give the parts "
-            "before and after it as records of their own."
+            f"{found.name}: voltage_v is nan at {found.time_s[row]:g} s ({row_words(row)}); drop the row, or give "
+            "the parts before and after it as records of their own."
         )
     return found if hold is None else found.held(hold)

@@ -20,6 +20,7 @@ from aesi.errors import DataError
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_belongs
 from aesi.physics.simulation import MODEL_WORDS, ModelName
+from aesi.pipeline.digits import resolving
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
@@ -30,6 +31,8 @@ from aesi.tracer.case.checks import SHORTEST_S
 SCHEMA = "aesi.calibration/2"
 NAMED_OPEN = 3
 """Parameters that the sentence on what is left open names: it is a line on a console, and the report has all."""
+ROUND_OFF = 1e-9
+"""Share of a quantity: an interval narrower than this is none, since no parameter of the fit moves the quantity."""
 
 
 @dataclass(frozen=True)
@@ -179,12 +182,15 @@ def calibration_content(
     }  # fmt: skip
 
 
-def _health_rows(found: Calibration) -> dict[str, dict[str, float]]:
+def _health_rows(found: Calibration) -> dict[str, dict[str, float | None]]:
+    """Each quantity with its interval; without one where no parameter of the fit moves it."""
     intervals = health_intervals(found)
-    return {
-        name: {"value": value, "low": intervals[name][0], "high": intervals[name][1]}
-        for name, value in asdict(health_of(found.cell)).items()
-    }
+    rows: dict[str, dict[str, float | None]] = {}
+    for name, value in asdict(health_of(found.cell)).items():
+        low, high = intervals[name]
+        fitted = high - low > ROUND_OFF * abs(value)
+        rows[name] = {"value": value, "low": low if fitted else None, "high": high if fitted else None}
+    return rows
 
 
 def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, float]:
@@ -226,13 +232,10 @@ def to_text(content: dict[str, Any]) -> str:
         "",
     ]
     lines += ["| state of health | value | 95 % interval |", "|---|---|---|"]
-    lines += [
-        f"| {HEALTH_WORDS[name]} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} |"
-        for name, p in content["health"].items()
-    ]
+    lines += [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
     lines += ["", "| parameter | value | 95 % interval | unit | prior from |", "|---|---|---|---|---|"]
     lines += [
-        f"| {name} | {p['value']:.4g} | {p['low']:.4g} to {p['high']:.4g} | {p['unit']} | {p['prior_from']} |"
+        f"| {name} | {_with_interval(p)} | {p['unit']} | {p['prior_from']} |"
         for name, p in content["parameters"].items()
     ]
     if content["impedance"]:
@@ -255,6 +258,15 @@ def to_text(content: dict[str, Any]) -> str:
         if texts:
             lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
     return "\n".join(lines) + "\n"
+
+
+def _with_interval(row: Mapping[str, Any]) -> str:
+    """'14.298 | 14.293 to 14.303'."""
+    value, low, high = (row[key] for key in ("value", "low", "high"))
+    if low is None or high is None:
+        return f"{value:.4g} | not fitted; the notes say what it rests on"
+    n = resolving(value, low, high, least=4)
+    return f"{value:.{n}g} | {low:.{n}g} to {high:.{n}g}"
 
 
 def _number(value: float | None) -> str:

@@ -35,7 +35,9 @@ def check_row(values: Array, name: str) -> None:
     wrong = ~np.isfinite(values)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise DataError(f"{name} is {values[row]:g} in row {row}; drop or fill what is not finite first.")
+        raise DataError(
+            f"{name} is {values[row]:g} in {row_words(row)}; drop or fill what is not finite first."
+        )
 
 
 def check_increasing(time_s: Array, name: str) -> None:
@@ -44,8 +46,16 @@ def check_increasing(time_s: Array, name: str) -> None:
     if still.any():
         row = int(np.argmax(still)) + 1
         raise DataError(
-            f"{name} does not increase at row {row} ({time_s[row]:g} s); sort or drop duplicate stamps."
+            f"{name} does not increase at {time_s[row]:g} s ({row_words(row)}); sort or drop duplicate stamps."
         )
+
+
+def row_words(row: int) -> str:
+    """How a sentence calls a row: as readers and tables do, not as an index.
+
+    row : from 0.
+    """
+    return f"row {row + 1}, counted from 1"
 
 
 def _first_other(values: object) -> object:

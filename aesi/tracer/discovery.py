@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 
 import numpy as np
@@ -27,7 +27,7 @@ from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
-from aesi.tracer.report.outcome import FileOutcome, State, States, outcomes, test_rmse_v
+from aesi.tracer.report.outcome import FileOutcome, State, States, emptied, outcomes, test_rmse_v
 from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.warning import contradicted_by_v, warnings
@@ -48,6 +48,11 @@ class TriedHypothesis:
     values: Mapping[str, Mapping[str, float]]
     simulations: int
 
+
+NO_YARDSTICK = (
+    "the data are too short, or too little varies in them, for a flexible correction: what one could still explain is "
+    "not known."
+)
 
 Progress = Callable[[TriedHypothesis], None]
 
@@ -70,8 +75,9 @@ class Discovery:
     written : ids of the effects that `after` has beside the declared model; not those of the verdict where these do not
     carry over.
     own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
-    soc0, hold : of the first record, fitted.  effects : what was tried, by id.  files : errors by file and
-    part.  before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
+    soc0, hold : of the first record, fitted.  effects : by id, all that may be tried or moved.  tried : ids of those
+    that competed, none where none may be added.  files : errors by file and part.
+    before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
     tell them apart.  choice : of the model of the cell.  contradicted : whether what explains the data leaves more of
     the test part than a right explanation may.  warnings : that, and where the written model does worse on the test
     part than another one.
@@ -95,6 +101,7 @@ class Discovery:
     warnings: tuple[str, ...] = ()
     written: tuple[str, ...] = ()
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
+    tried: tuple[str, ...] = ()
     seconds: float = 0.0
     simulations: int = 0
 
@@ -153,9 +160,10 @@ def discover(
         return Archive(archive, context_of(one), beside)
 
     evidence, choice = with_model(problem, model, search, kept, max_effects)
-    return _told(
+    found = _told(
         evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )
+    return found if max_effects else replace(found, tried=())
 
 
 def inverse_problem(
@@ -220,6 +228,7 @@ def _told(
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
     cell, model_effects, soc0 = evidence.after.settled()
+    left = _left(records, evidence.after)
 
     def test_error(one: Explanation) -> float | None:
         try:
@@ -234,24 +243,25 @@ def _told(
         files=files,
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in records]))),
         before=_left(records, declared),
-        after=_left(records, evidence.after),
+        after=left,
         model_effects=model_effects,
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,
         experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,
-        notes=(choice.sentence, *_notes(evidence, tested)),
+        notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=warnings(files, verdict),
         written=tuple(evidence.after.hypothesis),
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
+        tried=problem.competing(),
         seconds=seconds,
         simulations=simulations,
     )
 
 
-def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, ...]:
+def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: Left) -> tuple[str, ...]:
     records = evidence.path.problem.records
     known = [
         f"{r.name} is known to be good: what was found is what the others have beside it."
@@ -261,6 +271,8 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord]) -> tuple[str, .
     notes = [*known, *(note for record in (*records, *tested) for note in record.notes)]
     notes += [note for path in evidence.paths.values() for note in path.notes]
     notes += [*evidence.verdict.alike_too, *evidence.limits]
+    if left.yardstick.explained_v is None:
+        notes.append(NO_YARDSTICK)
     if evidence.fault is not None:
         notes.append(f"not adopted: {evidence.fault}.")
     return tuple(dict.fromkeys(notes))

@@ -217,8 +217,11 @@ def discover(
     soc0: options.Soc0 = None,
     soh: options.Soh = None,
     holdout: Annotated[
-        float, typer.Option(min=0.0, max=0.9, help="Last share of the data kept back, without --test.")
-    ] = 0.3,
+        float | None,
+        typer.Option(
+            min=0.0, max=0.9, show_default="0.3", help="Last share of the data kept back, without --test."
+        ),
+    ] = None,
     max_effects: Annotated[int, typer.Option(min=0, max=10, help="Most effects that are added.")] = 3,
     seed: Annotated[int, typer.Option(min=0, help="Of what is drawn at random.")] = 0,
     effect_file: options.EffectFiles = None,

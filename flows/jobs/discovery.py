@@ -146,7 +146,7 @@ def _track_case(tracker: Tracker | None, case: Case) -> None:
             **({"without": ", ".join(case.without)} if case.without else {}),
             "soc0": case.soc0,
             "soh": case.soh,
-            "holdout": case.holdout,
+            "holdout": case.kept_back,
             "max_effects": case.max_effects,
             "seed": case.seed,
         }
@@ -183,7 +183,8 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
         for part in ("fit", "test")
         if content[state].get(part)
     }
-    figures = {k: content[k] for k in ("confidence", "noise_floor_mv", "explainable_mv", "structured_mv")}
+    names = ("confidence", "noise_floor_mv", "explainable_mv", "structured_mv")
+    figures = {name: content[name] for name in names if content[name] is not None}
     tracker.metrics(errors | figures | {"seconds": content["seconds"]})
     for name in ("discovery.json", "report.html"):
         tracker.files(out / name)

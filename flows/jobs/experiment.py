@@ -106,6 +106,7 @@ def _stages(
         failed=len(found.result.trials) - len(rows),
     )
     summary = run("report", lambda: write_outputs(folder, result))
+    console.say(summary["finding"])
     tracker.json("comparison.json", comparison(result))
     track_result(tracker, folder, summary, found.number, fitted, config.note)
     slug = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")

@@ -161,8 +161,8 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ),
         ({"current_a": ["rest"] * len(TIME)}, "current_a holds 'rest', which is not a number"),
         ({"current_a": 1j * TIME}, "current_a holds complex numbers"),
-        ({"current_a": np.full(len(TIME), np.nan)}, "current_a is nan in row 0"),
-        ({"time_s": TIME[::-1]}, r"time_s does not increase at row 1 \(1798 s\)"),
+        ({"current_a": np.full(len(TIME), np.nan)}, "current_a is nan in row 1, counted from 1"),
+        ({"time_s": TIME[::-1]}, r"time_s does not increase at 1798 s \(row 2, counted from 1\)"),
         ({"time_s": 3.0}, r"time_s and current_a have shapes \(\) and \(1800,\)"),
     ],
 )
@@ -186,9 +186,12 @@ def test_lists_and_columns_of_a_table_are_arrays_of_floats():
     [
         (([0.0, 1.0], [1.0, 1.0], [3.9]), "m: voltage_v has 1 rows, time_s has 2 rows"),
         (([[0.0], [1.0]], [1.0, 1.0], [3.9, 3.9]), r"m: time_s has the shape \(2, 1\); give one row"),
-        (([1.0, 0.0], [1.0, 1.0], [3.9, 3.9]), r"m: time_s does not increase at row 1 \(0 s\)"),
-        (([0.0, 1.0], [1.0, np.nan], [3.9, 3.9]), "m: current_a is nan in row 1"),
-        (([0.0, 1.0], [1.0, 1.0], [3.9, 3.9], [25.0, np.nan]), "m: temperature_degc is nan in row 1"),
+        (
+            ([1.0, 0.0], [1.0, 1.0], [3.9, 3.9]),
+            r"m: time_s does not increase at 0 s \(row 2, counted from 1\)",
+        ),
+        (([0.0, 1.0], [1.0, np.nan], [3.9, 3.9]), "m: current_a is nan in row 2"),
+        (([0.0, 1.0], [1.0, 1.0], [3.9, 3.9], [25.0, np.nan]), "m: temperature_degc is nan in row 2"),
     ],
 )
 def test_columns_that_are_no_measurement_are_refused(columns, sentence):
@@ -212,7 +215,7 @@ def test_columns_that_are_no_measurement_are_refused(columns, sentence):
         ({"data": aesi.Measurement([], [], [])}, r"too few rows \(0\)"),
         (
             {"data": aesi.Measurement([0.0, 1.0], [1.0, 1.0], [3.9, np.nan])},
-            r"voltage_v is nan in row 1 \(1 s\)",
+            r"voltage_v is nan at 1 s \(row 2, counted from 1\)",
         ),
         ({"effect_files": "mine.py"}, "there is no effect file .*mine.py"),
         ({"out": __file__}, "cannot be a folder"),

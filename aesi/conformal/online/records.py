@@ -8,6 +8,7 @@ import numpy as np
 
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
+from aesi.records.checked import row_words
 
 
 def checked_record(residuals: Array) -> Array:
@@ -27,7 +28,7 @@ def checked_current(current_a: Array, n: int) -> Array:
         )
     missing = np.flatnonzero(~np.isfinite(current))
     if missing.size:
-        raise InputError(f"current_a has no value at sample {missing[0]}; split the record there.")
+        raise InputError(f"current_a has no value in {row_words(int(missing[0]))}; split the record there.")
     return current
 
 

@@ -74,7 +74,7 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         job.tests,
         settings.reading,
         job.soc0,
-        settings.holdout,
+        None if job.tests else settings.holdout,
         settings.max_effects,
         settings.seed,
         soh=job.soh,

@@ -76,6 +76,11 @@ def _csv(rows: Sequence[CellRow]) -> str:
     return stream.getvalue()
 
 
+def _apart(upper: float | None, lower: float | None) -> float | None:
+    """Length of one half of an error bar; None where a quantity was not fitted."""
+    return None if upper is None or lower is None else upper - lower
+
+
 def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
     """One panel a quantity, one line a specimen."""
     from plotly.subplots import make_subplots
@@ -96,8 +101,8 @@ def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
                 y=[row[key] for row in each],
                 error_y={
                     "type": "data",
-                    "array": [row[f"{key}_high"] - row[key] for row in each],
-                    "arrayminus": [row[key] - row[f"{key}_low"] for row in each],
+                    "array": [_apart(row[f"{key}_high"], row[key]) for row in each],
+                    "arrayminus": [_apart(row[key], row[f"{key}_low"]) for row in each],
                     "thickness": 1,
                 },
                 name=name,

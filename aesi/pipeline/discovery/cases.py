@@ -26,7 +26,7 @@ def case_of_files(
     tests: Sequence[Path] = (),
     reading: Reading | None = None,
     soc0: float | None = None,
-    holdout: float = 0.3,
+    holdout: float | None = None,
     max_effects: int = 3,
     seed: int = 0,
     effect_files: Sequence[Path] = (),
@@ -39,7 +39,8 @@ def case_of_files(
 ) -> Case:
     """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
 
-    soh : share of the file's capacity that the cell had then; None takes all of it.  good : files of records that are
+    holdout : as `Case` has it.  soh : share of the file's capacity that the cell had then; None takes all of it.
+    good : files of records that are
     known to be good.
     Raises DataError where a file cannot be of the cell.
     """

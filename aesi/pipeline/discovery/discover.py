@@ -30,6 +30,8 @@ from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
 ARCHIVE = "hypotheses.jsonl"
+HOLDOUT = 0.3
+"""Last share of the data that is kept back where there are no test records and nothing else is said."""
 ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
 """Words of effect ids that a title writes in another way."""
 
@@ -41,6 +43,7 @@ class Case:
     cell : a BPX file, or a saved model or its folder, whose cell and effects are what is declared.
     only, without : ids of the effects that are tried, or are not; all where neither names one.
     model : "espm" or "dfn" for every hypothesis; None: that of a saved porous electrode, else what the data ask for.
+    holdout : last share of each record that is kept back where there are no tests; None takes `HOLDOUT`.
     soh : share of the cell's capacity that it had then; None takes all of it.
     good : records of the same cell that are known to be good.
     """
@@ -49,7 +52,7 @@ class Case:
     measurements: tuple[Measurement, ...]
     tests: tuple[Measurement, ...] = ()
     soc0: float | None = None
-    holdout: float = 0.3
+    holdout: float | None = None
     max_effects: int = 3
     seed: int = 0
     effect_files: tuple[Path, ...] = ()
@@ -69,22 +72,32 @@ class Case:
         return (*self.measurements, *self.good, *self.tests)
 
     @property
+    def kept_back(self) -> float:
+        """The last share of each record that nothing is chosen by."""
+        if self.tests:
+            return 0.0
+        return HOLDOUT if self.holdout is None else self.holdout
+
+    @property
     def restrictions(self) -> tuple[str, ...]:
-        """Sentences on effects that are not tried, so that nobody reads the verdict as one about them."""
+        """Sentences on effects that are not tried, so that nobody reads the verdict as one about them, and on what was
+        asked and is not used."""
         only, without = (
             ", ".join(name.strip() for names in given for name in names.split(","))
             for given in (self.only, self.without)
         )
         said = {
             "no effect is tried (at most 0 are added), so that none can be found.": self.max_effects == 0,
-            f"tried alone: {only}; nothing is said about other effects.": bool(only),
-            f"not tried: {without}.": bool(without),
+            f"tried alone: {only}; nothing is said about other effects.": bool(only and self.max_effects),
+            f"not tried: {without}.": bool(without and self.max_effects),
+            f"test records are given, so that the holdout of {self.holdout or 0.0:g} is not used: all rows of the data "
+            "are looked at.": bool(self.tests and self.holdout),
         }
         return tuple(sentence for sentence, holds in said.items() if holds)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was not tried, and what a reader dropped, mapped or averaged in the files."""
+        """What was not tried or not used, and what a reader dropped, mapped or averaged in the files."""
         return (*self.restrictions, *(note for m in self.records for note in m.notes))
 
     def declared(self) -> HybridModel:
@@ -106,7 +119,7 @@ def run_case(case: Case, out: Path | None = None, progress: Progress | None = No
         case.measurements,
         case.tests,
         soc0=case.soc0,
-        holdout=case.holdout,
+        holdout=case.kept_back,
         max_effects=case.max_effects,
         seed=case.seed,
         effects=case.tried(),
@@ -145,20 +158,21 @@ def found_model(found: Discovery) -> HybridModel:
 
 
 def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, Any]:
-    """The content of discovery.json.  asked : what was not tried, and what a reader did to the files."""
-    verdict = found.verdict
+    """The content of discovery.json.  asked : what was not tried or not used, and what a reader did to the files."""
+    verdict, explained_v = found.verdict, found.after.yardstick.explained_v
     return {
         "schema": SCHEMA,
         "verdict": verdict.word,
         "effects": list(verdict.effects),
         "written": list(found.written),
+        "tried": list(found.tried),
         "indistinguishable": [list(group) for group in verdict.groups],
         "confidence": round(verdict.confidence, 4),
         "reason": verdict.reason,
         "model": _model(found),
         **{state: {part: _errors(found, state, part) for part in ("fit", "test")} for state in STATES},
         "noise_floor_mv": MV_PER_V * found.noise_floor_v,
-        "explainable_mv": MV_PER_V * found.after.yardstick.explained_v,
+        "explainable_mv": None if explained_v is None else MV_PER_V * explained_v,
         "structured_mv": MV_PER_V * verdict.structured_v,
         "tolerance_mv": MV_PER_V * verdict.tolerance_v,
         "margin": verdict.margin,
@@ -239,7 +253,10 @@ def _dependence(found: Discovery) -> list[dict[str, Any]]:
 
 
 def _pointers(found: Discovery) -> list[dict[str, Any]]:
+    """None where there was too little for a correction, before or after."""
     before, after = found.before.yardstick.pointers, found.after.yardstick.pointers
+    if not before or not after:
+        return []
     none = Pointer(0.0)
     return [
         {

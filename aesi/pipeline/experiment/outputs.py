@@ -21,6 +21,7 @@ from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import tables, write_figures, write_run_report
 from aesi.pipeline.report.figures import paper_figures
 from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
+from aesi.pipeline.report.words.runs import run_finding
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
@@ -68,12 +69,14 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     shown = published_by(result.loaded.model)
     rows = [finite({**row, "name": shown(row["name"])}) for row in result.evaluation.rows]
+    view = run_view(result, rows)
     summary = {
         "schema": SCHEMA,
         "experiment": result.config.name,
         "mlflow_run_id": result.run_id,
         "candidates": len(result.candidates) + result.failed,
         "chosen": shown(result.best),
+        "finding": run_finding(view),
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
         "data": result.loaded.config.data.kind,
@@ -84,7 +87,6 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     hybrid(result).save(folder / "model")
     for format in ("md", "tex"):
         (folder / f"tables.{format}").write_text(tables.render(rows, format), encoding="utf-8")
-    view = run_view(result, rows)
     write_run_report(folder / "report.html", view)
     write_figures(folder / "figures" / "paper.html", f"{view.experiment}: figures", paper_figures(view))
     text = json.dumps(summary, indent=1, allow_nan=False)

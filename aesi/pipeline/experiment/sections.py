@@ -278,7 +278,7 @@ class DiscoverConfig(Section):
     fit, test : names of records (kind: virtual has them by role); a record in both goes on where the fit ends.
     fit_until_s : record -> time up to which fits see it.  until_s : what comes later is left out of every test record.
     good : records of the cell that are known to be good; what is sought is what those in `fit` have beside them.
-    holdout : the last share of each record, kept back where there are no test records.
+    holdout : the last share of each record, kept back where there are no test records; None takes 0.3.
     hold : how the current runs between rows (of `data.kind: virtual` it is known); None takes it of each record as its
     rows show, like `aesi discover` of a file.
     """
@@ -288,7 +288,7 @@ class DiscoverConfig(Section):
     good: tuple[str, ...] = ()
     fit_until_s: dict[str, Positive] = {}
     until_s: Positive | None = None
-    holdout: Share = 0.3
+    holdout: Annotated[float, Field(ge=0, le=0.9)] | None = None
     hold: Hold | None = None
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
 

@@ -17,13 +17,14 @@ from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
+from aesi.physics.belongs import check_voltage
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
-from aesi.records.checked import numbers
+from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
 
 
@@ -70,7 +71,7 @@ class HybridModel:
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
 
-        Raises DataError where the record cannot be simulated or soc0 is unknown.
+        Raises DataError where the record cannot be simulated, its first voltage is no such cell's, or soc0 is unknown.
         """
         measured = np.full(np.shape(time_s), np.nan) if voltage_v is None else numbers(voltage_v, "voltage_v")
         warm = _each_row(temperature_degc, np.shape(time_s))
@@ -78,9 +79,11 @@ class HybridModel:
         if voltage_v is not None and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
             raise DataError(
-                f"voltage_v has no value in row {row} ({record.time_s[row]:g} s); predict the parts before and after "
-                "the gap as records of their own, or leave voltage_v out for a free run."
+                f"voltage_v has no value at {record.time_s[row]:g} s ({row_words(row)}); predict the parts before "
+                "and after the gap as records of their own, or leave voltage_v out for a free run."
             )
+        if voltage_v is not None:
+            check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
         soc0 = self._soc0(record, soc0, voltage_v is not None)
         even = self._even(record)
         series = self._series(even, soc0)

@@ -6,10 +6,10 @@ import json
 import re
 import textwrap
 from collections.abc import Mapping
-from math import floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aesi.pipeline.digits import resolving
 from aesi.pipeline.report.arrays.embed import ArrayStore, Embedded, embed
 from aesi.pipeline.report.table_formats import ABSENT
 
@@ -140,10 +140,7 @@ def _significant(value: Any, digits: int = 3) -> str:
 def _resolving(interval: Mapping[str, Any]) -> int:
     """Significant digits of a parameter that show its interval's width to two, at least three and at most six."""
     low, high, value = (interval.get(key) for key in ("low", "high", "value"))
-    if low is None or high is None or not high > low:
-        return 3
-    largest = max(abs(low), abs(high), abs(value or 0.0))
-    return min(6, max(3, 2 + floor(log10(largest)) - floor(log10(high - low))))
+    return 3 if low is None or high is None else resolving(value or 0.0, low, high)
 
 
 def _known(value: Any) -> bool:

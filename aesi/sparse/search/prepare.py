@@ -9,6 +9,7 @@ import numpy as np
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import ErrorSeries, Split
+from aesi.records.checked import row_words
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.library import Library
 
@@ -50,7 +51,9 @@ def _check(record: ErrorSeries, dt_s: float) -> None:
     for name, column in zip(("error_v", *record.input_names), variables(record).T, strict=True):
         if not np.isfinite(column).all():
             k = int(np.flatnonzero(~np.isfinite(column))[0])
-            raise DataError(f"{record.name}: {name} is not a number at sample {k}; cut or repair the record.")
+            raise DataError(
+                f"{record.name}: {name} is not a number in {row_words(k)}; cut or repair the record."
+            )
 
 
 def _useful_inputs(train: Sequence[ErrorSeries]) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -86,4 +89,4 @@ def not_finite(library: Library, theta: Array) -> str:
     j = int(np.flatnonzero(~np.isfinite(theta).all(axis=0))[0])
     k = int(np.flatnonzero(~np.isfinite(theta[:, j]))[0])
     name = (*library.names, "the target")[j]
-    return f"{name} is not a number at training row {k}; keep scaled inputs within [-1, 1] (outside='clip')."
+    return f"{name} is not a number at training {row_words(k)}; keep scaled inputs within [-1, 1] (outside='clip')."

@@ -12,6 +12,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
+from aesi.records.checked import row_words
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord
 
@@ -46,9 +47,11 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
     until = min(record.fit_until_s, thin.time_s[-1])
     duration = float(until - thin.time_s[0])
     if (record.n_fit < FEWEST_SAMPLES and duration < 10 * SHORTEST_S) or duration < SHORTEST_S:
+        kept_back = len(thin) - record.n_fit
+        beside = f" ({kept_back} more kept back for the test)" if kept_back else ""
         raise DataError(
-            f"{record.name}: {record.n_fit} samples over {duration:.0f} s are too little to decide "
-            f"anything; give at least {FEWEST_SAMPLES} samples over {SHORTEST_S:.0f} s for the fit."
+            f"{record.name}: {duration:.0f} s and {record.n_fit} rows to fit{beside} are too little to decide; "
+            f"give at least {FEWEST_SAMPLES} rows over {SHORTEST_S:.0f} s for the fit."
         )
     rate = float(np.max(np.abs(thin.current_a[: record.n_fit]))) / cell.nominal_capacity_ah
     if rate < LEAST_C_RATE:
@@ -63,8 +66,8 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
         at, soc, start = record.data.time_s[row], 100.0 * charge[row], 100.0 * record.soc0
         raise DataError(
             f"{record.name}: the charge moved takes the cell to a state of charge of {soc:.0f} % at {at:g} s "
-            f"(row {row}), from {start:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; check the cell file, "
-            "soc0 and the sign and unit of the current."
+            f"({row_words(row)}), from {start:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; check the cell "
+            "file, soc0 and the sign and unit of the current."
         )
 
 

@@ -140,8 +140,8 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     if left > allowed:
         margin = float(np.log(left / allowed))
         reason = (
-            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, whichever effects of "
-            f"the catalogue are added ({1e3 * allowed:.2f} mV would be within what a right model leaves)"
+            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, {_beside(path)} "
+            f"({1e3 * allowed:.2f} mV would be within what a right model leaves)"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
     if not path.chosen.hypothesis:
@@ -164,6 +164,11 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
 
 
+def _beside(path: Path) -> str:
+    tried = path.steps or path.beyond_reach_v is not None
+    return "whichever effects that were tried are added" if tried else "with no effect added"
+
+
 def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
     """An `unknown` with the names that hold beyond what models of measured cells are off by.
 
@@ -174,7 +179,7 @@ def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
     reason = (
         f"what is named takes the error on data that the fit has not seen from {1e3 * before:.1f} to "
         f"{1e3 * left:.1f} mV beyond the noise, by more than a model of a measured cell is usually off; the rest is "
-        "not explained by any effect of the catalogue"
+        "not explained by any effect that was tried"
     )
     return replace(
         verdict,

@@ -64,7 +64,8 @@ class Parent:
 class Grown:
     """A parent and one effect: its parameters fitted, the rest to first order.
 
-    free, point : the movable parameters and the linear form in them.  on_bounds : values of the others.
+    free, point : the movable parameters and the linear form in them.  on_bounds : values of the effect's others.
+    held : values of the parent's others.
     u : (k,) coordinates of the effect's own parameters.  slopes_v : (n, k) V, their sensitivities there.
     """
 
@@ -74,6 +75,7 @@ class Grown:
     score: PredictiveScore
     simulations: int
     on_bounds: Mapping[tuple[str, str], float]
+    held: Mapping[tuple[str, str], float]
     u: Array
     slopes_v: Array
 
@@ -173,6 +175,15 @@ class EffectGrowth:
             return None
         return np.vstack([self.projected(-jacobian, np.zeros((len(self.rest), len(u)))), np.eye(len(u))])
 
+    def held_on_bounds(self) -> dict[tuple[str, str], float]:
+        """(owner, name) -> value of what the parent has on a hard bound, and which stays there."""
+        movable, fit = set(self.parent.movable.tolist()), self.parent.fit
+        return {
+            f.key: f.value(float(x))
+            for j, (f, x) in enumerate(zip(fit.free, fit.point.x, strict=True))
+            if j not in movable and f.owner != self.effect
+        }
+
     def marks(self) -> Array:
         """(n, c) V: the slopes at each start, and what lies between the parent and it; none where it cannot be
         simulated."""
@@ -246,7 +257,8 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
     point = Linearised(x, e, slopes, bounds)
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
-    return Grown(hypothesis, free, point, best_over_sizes(out), growth.simulations, on_bounds, u, jacobian)
+    score, held = best_over_sizes(out), growth.held_on_bounds()
+    return Grown(hypothesis, free, point, score, growth.simulations, on_bounds, held, u, jacobian)
 
 
 Explanation = FittedHypothesis | Grown
@@ -258,6 +270,6 @@ def linear_values(one: Explanation) -> dict[str, dict[str, float]]:
     if isinstance(one, FittedHypothesis):
         return one.values
     out: dict[str, dict[str, float]] = {}
-    for (owner, name), value in one.placed.items():
+    for (owner, name), value in {**one.held, **one.placed}.items():
         out.setdefault(owner, {})[name] = value
     return out

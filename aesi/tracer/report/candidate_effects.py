@@ -5,11 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
+from aesi.tracer.case.free_parameter import of_effect
 from aesi.tracer.decide.verdict import Verdict
+from aesi.tracer.likelihood.credible import reaches
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.growth import Explanation
+from aesi.tracer.likelihood.gaussian import Linearised, Posterior, block_sums
+from aesi.tracer.likelihood.growth import Explanation, Grown
+from aesi.tracer.likelihood.model_error import whitened
 from aesi.tracer.search.path import Path
-from aesi.tracer.search.wrong_parameters import NINETY
+
+SHARE = 0.9
+"""Of the posterior density of a parameter, that its interval covers."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +67,7 @@ def ranking(
                 str(effect.kind),
                 path.gain(best),
                 test_rmse_v(best),
-                estimates(best, effect.id),
+                estimates(path, best, effect.id),
                 tuple(best.hypothesis),
                 remark,
             )
@@ -76,18 +84,37 @@ def _remark(path: Path, one: Explanation) -> str:
     return f"{abs(gained):.1f} nats {'better' if gained > 0.0 else 'worse'} on unseen data than {chosen}"
 
 
-def estimates(one: Explanation, effect: str) -> dict[str, Estimate]:
-    """The parameters of one effect of a hypothesis."""
-    out = {}
-    placed = one.placed
-    for index, free in enumerate(one.free):
-        if free.owner == effect:
-            x = free.coordinate(placed[free.key])
-            reach = NINETY * float(one.score.covariance[index, index]) ** 0.5
-            out[free.name] = Estimate(
-                placed[free.key], free.value(x - reach), free.value(x + reach), free.unit
-            )
-    for (owner, name), value in placed.items():
-        if owner == effect and name not in out:
-            out[name] = Estimate(value, value, value, "")
+def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
+    """The parameters of one effect of a hypothesis, each with what 90 % of its posterior density covers: to both sides
+    of one inside its bounds, from the bound inwards of one that the data push onto it."""
+    problem = path.problem
+    known = of_effect(effect, problem.effects[effect].parameters, problem.cell.nominal_capacity_ah)
+    reach, placed, out = _reach(path, one), one.placed, {}
+    for free in known:
+        if free.key not in placed:  # stays where the hypothesis had it that this one grew from
+            parent = next(e for e in path.explanations() if set(e.hypothesis) == set(one.hypothesis[:-1]))
+            out[free.name] = estimates(path, parent, effect)[free.name]
+            continue
+        x, (below, above) = free.coordinate(placed[free.key]), reach[free.key]
+        out[free.name] = Estimate(placed[free.key], free.value(x - below), free.value(x + above), free.unit)
     return out
+
+
+def _reach(path: Path, one: Explanation) -> dict[tuple[str, str], tuple[float, float]]:
+    """(owner, name) -> how far below and above a parameter its interval reaches, in deviations of its prior."""
+    point, keys = one.point, [free.key for free in one.free]
+    if isinstance(one, Grown):  # a score leaves out what a descent left on a bound
+        known = path.problem.effects[one.hypothesis[-1]].parameters
+        added = of_effect(one.hypothesis[-1], known, path.problem.cell.nominal_capacity_ah)
+        further = [j for j, free in enumerate(added) if free.key in one.on_bounds]
+        keys += [added[j].key for j in further]
+        point = Linearised(
+            np.append(point.x, one.u[further]),
+            point.residual_v,
+            np.column_stack([point.jacobian_v, one.slopes_v[:, further]]),
+            np.vstack([point.bounds, np.array([added[j].bounds for j in further]).reshape(-1, 2)]),
+        )
+    white, log_det = whitened(path.problem, path.blocks, point.table(), one.score.delta_v)
+    posterior = Posterior(block_sums(path.blocks, white, log_det), point.x, ())
+    ends = reaches(posterior, point.bounds, SHARE)
+    return {key: (float(below), float(above)) for key, (below, above) in zip(keys, ends, strict=True)}

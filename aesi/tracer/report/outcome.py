@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 
 from aesi.numerics.typing import Array
+from aesi.physics.depletion import ran_out
 from aesi.records import Run
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.model_state import ModelState
@@ -16,6 +17,11 @@ from aesi.tracer.likelihood.model_state import ModelState
 State = Literal["before", "recalibrated", "after"]
 Part = Literal["fit", "test"]
 States = Mapping[State, ModelState]
+NAMES: Mapping[State, str] = {
+    "before": "the declared model",
+    "recalibrated": "the recalibrated model",
+    "after": "the written model",
+}
 
 RESAMPLES = 400
 """The ends of a 95 % interval are then known to about a percentile."""
@@ -43,7 +49,7 @@ class FileOutcome:
     """One part of one file.
 
     voltages : state -> (n,) V.  noise_v : of the measured voltage.  gain_v : RMSE recalibrated minus after, with its
-    95 % block-bootstrap interval.
+    95 % block-bootstrap interval.  emptied_s : state -> s, where its simulation ran out of charge or salt, if it did.
     """
 
     name: str
@@ -55,6 +61,7 @@ class FileOutcome:
     noise_v: float
     voltages: Mapping[State, Array]
     gain_v: tuple[float, float, float]
+    emptied_s: Mapping[State, float] = field(default_factory=dict)
 
     def residual_v(self, state: State) -> Array:
         """(n,) V, measured - model."""
@@ -94,6 +101,11 @@ def _outcome(
         data.voltage_v - voltages["recalibrated"], data.voltage_v - voltages["after"], data.time_s, rng
     )
     soc = runs["after"].series["soc"][rows]
+    emptied_s = {
+        state: float(data.time_s[np.argmax(empty)])
+        for state, run in runs.items()
+        if np.any(empty := run.series["depleted"][rows] > 0.0)
+    }
     return FileOutcome(
         record.name,
         part,
@@ -104,6 +116,19 @@ def _outcome(
         record.noise_full_v,
         voltages,
         gain,
+        emptied_s,
+    )
+
+
+def emptied(files: Sequence[FileOutcome]) -> tuple[str, ...]:
+    """A sentence for each file on which a model ran out before the end: its voltage means nothing from there on."""
+    first: dict[str, dict[State, float]] = {}
+    for f in files:
+        for state, at_s in f.emptied_s.items():
+            first.setdefault(f.name, {}).setdefault(state, at_s)
+    return tuple(
+        ran_out(name, {NAMES[state]: at_s for state, at_s in states.items()})
+        for name, states in first.items()
     )
 
 

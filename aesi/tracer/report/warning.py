@@ -8,21 +8,18 @@ import numpy as np
 
 from aesi.constants import MV_PER_V
 from aesi.tracer.decide.verdict import Verdict, beyond
-from aesi.tracer.report.outcome import FileOutcome, State
+from aesi.tracer.report.outcome import NAMES, FileOutcome, State
 
 WORSE_SHARE = 1.05
-"""The model that is written is said to do worse on the test part where it leaves so many times as much. A convention,
-as in `decide.carry_over`; it decides a warning alone."""
-OTHERS: tuple[tuple[State, str], ...] = (
-    ("before", "the declared model"),
-    ("recalibrated", "the recalibrated model"),
-)
+"""Where the written model leaves so many times as much of the test part as another one, the warning is against using it
+there. A convention, as in `decide.carry_over`; it decides these words alone."""
+OTHERS: tuple[State, ...] = ("before", "recalibrated")
 
 
 def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float | None:
     """V beyond the noise that an explanation of the data leaves of the test part, where that is more than a right one
     may leave; else None."""
-    tests = [f for f in files if f.part == "test"]
+    tests = _tests(files)
     if verdict.word == "unknown" or not tests:
         return None
     noise_v = np.repeat([f.noise_v for f in tests], [len(f.time_s) for f in tests])
@@ -42,18 +39,24 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
             f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. Something else is "
             "missing, or more; look again with the test part among the data."
         )
-    tests = [f for f in files if f.part == "test"]
-    after_v = _left_v(tests, "after") if tests else 0.0
-    better = [(words, _left_v(tests, state)) for state, words in OTHERS if tests]
-    less = [
-        f"{words} {MV_PER_V * left_v:.1f} mV" for words, left_v in better if after_v > WORSE_SHARE * left_v
-    ]
+    tests = _tests(files)
+    after_mv = _left_mv(tests, "after")
+    less = {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(tests, state)) < after_mv}
     if less:
-        out.append(
-            f"on the test part the model with what was found leaves {MV_PER_V * after_v:.1f} mV, {' and '.join(less)}: "
-            "do not use it there."
-        )
+        model = "the model with what was found" if verdict.effects else NAMES["after"]
+        others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
+        advice = ": do not use it there." if after_mv > WORSE_SHARE * min(less.values()) else "."
+        out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
     return tuple(out)
+
+
+def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:
+    return [f for f in files if f.part == "test"]
+
+
+def _left_mv(tests: Sequence[FileOutcome], state: State) -> float:
+    """To the hundredth of a mV that is shown; 0 where there is no test part."""
+    return round(MV_PER_V * _left_v(tests, state), 2) if tests else 0.0
 
 
 def _left_v(files: Sequence[FileOutcome], state: State) -> float:

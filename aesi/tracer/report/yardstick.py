@@ -51,14 +51,15 @@ class Pointer:
 
 @dataclass(frozen=True)
 class Yardstick:
-    """explained_v : V, root mean square that the correction explains of pieces that it has not seen."""
+    """explained_v : V, root mean square that the correction explains of pieces that it has not seen; None where the
+    data are too few for one, or too little varies in them."""
 
-    explained_v: float = 0.0
+    explained_v: float | None = None
     pointers: Mapping[str, Pointer] = field(default_factory=dict)
 
 
 def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
-    """What a sparse correction explains of the residuals of some records.
+    """What a sparse correction explains of the residuals of some records; of those whose sampling gives enough for one.
 
     runs, residuals : one a record, (n,) V measured - model.  Records of different sampling are learnt apart.
     """
@@ -66,11 +67,16 @@ def measure(runs: Sequence[Run], residuals: Sequence[Array]) -> Yardstick:
     for run, residual in zip(runs, residuals, strict=True):
         series = _even(run, residual)
         groups.setdefault(round(np.log2(series.dt_s)), []).append(series)
-    parts = [_measured([_at(s, group[0].dt_s) for s in group]) for group in groups.values()]
-    rows = np.array([sum(map(len, group)) for group in groups.values()], dtype=float)
-    square = float(np.sum(rows * [part.explained_v**2 for part in parts]) / rows.sum())
-    most = max(parts, key=lambda part: part.explained_v)
-    return Yardstick(float(np.sqrt(square)), most.pointers)
+    parts = [
+        (part.explained_v, sum(map(len, group)), part)
+        for group in groups.values()
+        if (part := _measured([_at(s, group[0].dt_s) for s in group])).explained_v is not None
+    ]
+    if not parts:
+        return Yardstick()
+    explained, rows, told = zip(*parts, strict=True)
+    square = float(np.average(np.square(explained), weights=rows))
+    return Yardstick(float(np.sqrt(square)), told[int(np.argmax(explained))].pointers)
 
 
 def _even(run: Run, residual: Array) -> ErrorSeries:
@@ -126,6 +132,8 @@ def _measured(records: Sequence[ErrorSeries]) -> Yardstick:
     without = max((_candidate(problem, every, ridge, False) for ridge in RIDGES), key=_share)
     whole = _candidate(problem, every, RIDGES[-1], True)
     best = max(without, whole, key=_share)
+    if best is None:
+        return Yardstick()
     square = float(np.mean(np.concatenate([r.error_v for r in records]) ** 2))
     shares = {
         text: _share(whole) - _share(without)

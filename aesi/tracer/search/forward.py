@@ -64,7 +64,7 @@ def searched(
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
     first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
-    if np.isfinite(allowed_v):
+    if max_effects and np.isfinite(allowed_v):
         marks = list(side_by_side(EffectGrowth.marks, first))
         least_v = least_left_v(base, marks, problem.white_v)
         if least_v > REACH * allowed_v:

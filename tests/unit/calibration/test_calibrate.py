@@ -11,6 +11,7 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import sampled
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
+from aesi.records import Measurement
 
 
 @pytest.fixture(scope="module")
@@ -125,3 +126,13 @@ def test_a_posterior_of_too_few_steps_is_refused(found):
     pytest.importorskip("emcee")
     with pytest.raises(InputError, match="four steps"):
         sampled(found, 2)
+
+
+def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of_half_a_volt(start):
+    time = np.arange(0.0, 5200.0, 2.0)
+    current = np.where(time < 60, 0.0, 0.75 * start.nominal_capacity_ah)
+    voltage = simulate(start.with_soh(1.12), time, current, 1.0, (), None, "backward").voltage_v
+    found = calibrate(start, [Measurement(time, current, voltage, name="longer", hold="backward")], soc0=1.0)
+    (note,) = (n for n in found.notes if "runs empty" in n)
+    assert note.startswith("longer: ")
+    assert "in the declared cell at" in note

@@ -63,6 +63,22 @@ def test_what_cannot_be_of_this_cell_is_told_with_the_likely_cause(m50, record, 
     assert "\n" not in message
 
 
+def test_a_first_voltage_that_no_such_cell_has_was_taken_for_another_capacity(m50, record):
+    voltage = record.voltage_v.copy()
+    voltage[0] = 1.2
+    with pytest.raises(DataError, match=r"^drive starts at 1.200 V at 0 A, but .* is empty at 2.5 V"):
+        check_belongs(m50, [replace(record, voltage_v=voltage)])
+
+
+def test_two_rows_say_where_the_charge_contradicts_the_voltage(m50, record):
+    voltage = record.voltage_v.copy()
+    voltage[0] = 2.45
+    with pytest.raises(
+        DataError, match=r"^drive: \d.\d+ Ah leave the cell between 0 s \(2.450 V\) and \d+ s \(\d"
+    ):
+        check_belongs(m50, [replace(record, voltage_v=voltage)])
+
+
 def test_a_record_of_a_cell_thirty_times_smaller_is_not_taken_for_one_in_minutes_alone(m50, record):
     with pytest.raises(DataError, match=r"--unit time_s=min or h.*or the cell file is another's"):
         check_belongs(m50, [replace(record, current_a=record.current_a / 30.0)])

@@ -158,7 +158,7 @@ def test_a_voltmeters_offset_is_taken_off_the_rest_voltage(lg_m50):
 @pytest.mark.parametrize(
     ("time", "current", "words"),
     [
-        ([0, 1, 1], [0, 0, 0], "row 2"),
+        ([0, 1, 1], [0, 0, 0], "row 3, counted from 1"),
         ([0, 1], [0, 0, 0], "shapes"),
         ([0, 1], [0, np.nan], "not finite"),
         ([], [], "shapes"),

@@ -1,6 +1,6 @@
 """What a calibration says of parameters that its records do not tell."""
 
-from aesi.pipeline.calibrate import open_line
+from aesi.pipeline.calibrate import _with_interval, open_line
 
 
 def content(weights: list[dict[str, float]], total: int) -> dict[str, object]:
@@ -20,3 +20,13 @@ def test_many_open_combinations_are_one_sentence_that_names_the_heaviest():
 
 def test_nothing_open_is_no_sentence():
     assert open_line(content([], 3)) == ""
+
+
+def test_a_capacity_that_was_not_fitted_has_no_interval_without_a_width():
+    said = _with_interval({"value": 14.2999, "low": None, "high": None})
+    assert said == "14.3 | not fitted; the notes say what it rests on"
+
+
+def test_an_interval_is_told_with_the_digits_that_show_its_width():
+    assert _with_interval({"value": 14.2999, "low": 14.297, "high": 14.3028}) == "14.2999 | 14.297 to 14.3028"
+    assert _with_interval({"value": 1.061, "low": 1.044, "high": 1.077}) == "1.061 | 1.044 to 1.077"

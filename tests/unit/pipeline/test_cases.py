@@ -88,6 +88,18 @@ def test_what_was_not_tried_is_said_so_that_no_verdict_is_read_as_one_about_it(t
     assert none.startswith("no effect is tried")
 
 
+def test_a_holdout_beside_test_records_was_passed_over_in_silence(tmp_path):
+    record, test = write_record(tmp_path), tmp_path / "test.csv"
+    test.write_text(record.read_text().replace("3.7", "3.71"))
+    case = case_of_files(BPX, [record], [test], holdout=0.4)
+    (note,) = case.notes
+    assert note.startswith("test records are given, so that the holdout of 0.4 is not used")
+    assert case.kept_back == 0.0
+    assert case_of_files(BPX, [record], [test]).notes == ()
+    assert case_of_files(BPX, [record], [test], holdout=0.0).notes == ()
+    assert case_of_files(BPX, [record]).kept_back == 0.3
+
+
 def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_path):
     record = read_measurement(write_record(tmp_path))
     with pytest.raises(DataError, match="twice among the data"):

@@ -91,7 +91,14 @@ def test_inputs_beyond_the_trained_range_are_flagged_and_the_band_is_wider_there
 def test_a_missing_voltage_is_refused_with_its_row(model, data):
     voltage_v = data.voltage_v.copy()
     voltage_v[7] = np.nan
-    with pytest.raises(DataError, match=r"no value in row 7 \(7 s\)"):
+    with pytest.raises(DataError, match=r"no value at 7 s \(row 8, counted from 1\)"):
+        model.predict(data.time_s, data.current_a, SOC0, voltage_v)
+
+
+def test_a_first_voltage_that_no_such_cell_has_started_a_prediction_without_a_word(model, data):
+    voltage_v = data.voltage_v.copy()
+    voltage_v[0] = 1.5
+    with pytest.raises(DataError, match=r"1.500 V at 0 s \(row 1, counted from 1\) is outside the range of"):
         model.predict(data.time_s, data.current_a, SOC0, voltage_v)
 
 

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.report.words import discoveries, runs
+from aesi.pipeline.report.words.sizes import finding_line
 
 
 def test_a_gain_is_told_with_both_errors_and_the_regime(views):
@@ -123,6 +125,20 @@ def test_a_finding_that_the_test_part_contradicts_says_so_at_once(views):
     assert text.endswith("; the test part contradicts it.")
 
 
+def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_sentence(views):
+    view = views.discovery_view(200, verdict="unknown")
+    worse = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 9.3}}})
+    assert discoveries.discovery_finding(worse).endswith(
+        "; on the test part the written model does worse, 9.30 mV against 6.20 mV recalibrated."
+    )
+    worst = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 9.5}}})
+    assert "9.50 mV against 9.40 mV as declared and 6.20 mV recalibrated." in discoveries.discovery_finding(
+        worst
+    )
+    same = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 6.2004}}})
+    assert "worse" not in discoveries.discovery_finding(same)
+
+
 def test_the_cell_is_named_once(views):
     view = views.discovery_view(200)
     found = replace(view, discovery={**view.discovery, "effects": ["self_heating", "ambient_temperature"]})
@@ -179,6 +195,7 @@ def test_a_rest_that_several_hypotheses_explain_names_the_best(views):
 def test_a_rest_that_follows_nothing_is_not_called_little(views):
     unknown = views.discovery_view(200, verdict="unknown").discovery
     assert "follows none of the model's variables" in discoveries.rest_finding(unknown)
+    assert "is not known" in discoveries.rest_finding({**unknown, "explainable_mv": None})
     assert "much structure" in discoveries.rest_finding({**unknown, "explainable_mv": 0.9})
     assert "little structure" in discoveries.rest_finding(views.discovery_view(200).discovery)
 
@@ -226,3 +243,21 @@ def test_an_error_is_said_to_be_with_the_finding_only_where_that_is_what_is_writ
     shown = discoveries.states_of({"effects": effects, "written": written})
     assert shown.get("after") == after
     assert list(shown)[:2] == ["before", "recalibrated"]
+
+
+@pytest.mark.parametrize(
+    ("tried", "phrase"),
+    [
+        ([], "misses something real; no effect was tried on it."),
+        (["clock_skew"], "that clock skew, which alone was tried, does not explain beyond doubt."),
+        (["clock_skew", "film_growth"], "that none of the 2 effects that were tried explains beyond doubt."),
+        (list(CATALOGUE), "that no effect of the catalogue explains beyond doubt."),
+    ],
+)
+def test_an_unknown_says_which_effects_were_tried(views, tried, phrase):
+    view = views.discovery_view(200, verdict="unknown")
+    view = replace(view, discovery={**view.discovery, "tried": tried})
+    assert discoveries.discovery_finding(view).endswith(phrase)
+    rest = phrase.removeprefix("misses something real").removesuffix(".").removesuffix(" beyond doubt")
+    assert finding_line(view.discovery).endswith(rest.strip())
+    assert ("list of hypotheses" in discoveries.reason_finding(view.discovery)) == bool(tried)

@@ -224,7 +224,7 @@ def test_nan_is_refused_with_its_place():
         column[17] = np.nan
         return column
 
-    with pytest.raises(DataError, match="soc is not a number at sample 17"):
+    with pytest.raises(DataError, match="soc is not a number in row 18, counted from 1"):
         Problem.build(with_column(broken), SMALL)
 
 

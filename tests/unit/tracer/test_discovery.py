@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from aesi.errors import DataError, SimulationError
+from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content
+from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.case.checks import FOREIGN_CELL_V, check_same_cell
 from aesi.tracer.discovery import inverse_problem
@@ -61,6 +63,34 @@ def test_a_wave_that_no_effect_makes_is_unknown(cell, few, make):
     assert found.verdict.word == "unknown"
     assert found.verdict.effects == ()
     assert found.verdict.structured_v == pytest.approx(8e-3, rel=0.3)
+
+
+def test_an_unknown_without_an_effect_to_add_does_not_say_that_the_catalogue_was_tried(cell, few, make):
+    data = make()
+    wave = 8e-3 * np.sign(np.sin(data.time_s / 90.0 + np.sin(data.time_s / 310.0)))
+    waved = replace(data, voltage_v=data.voltage_v + wave)
+    found = discover(cell, [waved], soc0=0.9, effects=few, max_effects=0)
+    assert (found.verdict.word, found.tried, found.candidates) == ("unknown", (), ())
+    assert "with no effect added" in found.verdict.reason
+    assert discover(cell, [waved], soc0=0.9, effects=few).tried == tuple(few)
+
+
+def test_errors_of_a_model_that_ran_empty_were_told_without_a_word(cell, few):
+    time = np.arange(0.0, 5200.0, 2.0)
+    current = np.where(time < 60, 0.0, 22.5 + 8.0 * np.sign(np.sin(time / 50.0)))
+    larger = cell.with_soh(1.1)
+    voltage = simulate(larger, time, current, 0.97).voltage_v
+    noisy = voltage + 1e-3 * np.random.default_rng(0).normal(size=len(time))
+    data = Measurement(time, current, noisy, name="longer")
+    found = discover(cell, [data], soc0=0.97, effects=few, max_effects=0)
+    (note,) = (n for n in found.notes if "runs empty" in n)
+    assert note.startswith(
+        "longer: a particle's surface or the electrolyte runs empty or full in the declared model at "
+    )
+    at_s = next(f for f in found.files if f.part == "test").emptied_s["before"]
+    assert f"{at_s:g} s" in note
+    with pytest.raises(SimulationError, match=f"at {at_s:g} s"):
+        simulate(cell, time, current, 0.97)
 
 
 def test_the_same_seed_gives_the_same_answer_and_the_archive_spares_the_fits(cell, few, make, tmp_path):

@@ -45,7 +45,9 @@ def test_nothing_contradicts_an_unknown_or_a_discovery_without_a_test_part():
 
 def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them():
     (one,) = warnings([outcome(7e-3)], verdict("unknown"))
-    assert "leaves 7.0 mV, the recalibrated model 5.0 mV: do not use it there." in one
+    assert "leaves 7.00 mV, the recalibrated model 5.00 mV: do not use it there." in one
     (both,) = warnings([outcome(12e-3)], verdict("unknown"))
-    assert "the declared model 9.0 mV and the recalibrated model 5.0 mV" in both
+    assert "the declared model 9.00 mV and the recalibrated model 5.00 mV" in both
     assert warnings([outcome(5e-3)], verdict("unknown")) == ()
+    (hardly,) = warnings([outcome(5.02e-3)], verdict("unknown"))
+    assert hardly == "on the test part the written model leaves 5.02 mV, the recalibrated model 5.00 mV."

@@ -10,7 +10,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
 from aesi.pipeline.report.views import DiscoveryView
-from aesi.pipeline.report.words.sizes import refit_does_as_well, with_size
+from aesi.pipeline.report.words.sizes import refit_does_as_well, unexplained_by, with_size
 
 LARGE_SHARE = 0.5
 """Of the remaining error: where a sparse correction could still explain more, a sentence says so. A convention."""
@@ -20,9 +20,33 @@ CERTAIN = 0.99
 
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
-    a test part that contradicts it."""
-    text = _verdict(view)
-    return f"{text[:-1]}; the test part contradicts it." if view.discovery.get("contradicted") else text
+    a test part that contradicts it, or on which the written model does worse than another."""
+    against = [
+        "the test part contradicts it" if view.discovery.get("contradicted") else "",
+        _worse_on_test(view.discovery),
+    ]
+    return "; ".join([_verdict(view)[:-1], *filter(None, against)]) + "."
+
+
+def _worse_on_test(discovery: Mapping[str, Any]) -> str:
+    """Where the written model leaves more of the test part than the declared or the recalibrated one, with the figures,
+    to the hundredth of a mV; '' where it does not."""
+    left = {
+        state: round(discovery[state]["test"]["rmse_mv"], 2)
+        for state in ("before", "recalibrated", "after")
+        if discovery.get(state, {}).get("test")
+    }
+    words = {"before": "as declared", "recalibrated": "recalibrated"}
+    less = [
+        f"{left[state]:.2f} mV {said}"
+        for state, said in words.items()
+        if state in left and left[state] < left.get("after", 0.0)
+    ]
+    if not less:
+        return ""
+    return (
+        f"on the test part the written model does worse, {left['after']:.2f} mV against {' and '.join(less)}"
+    )
 
 
 def _verdict(view: DiscoveryView) -> str:
@@ -30,10 +54,10 @@ def _verdict(view: DiscoveryView) -> str:
     if verdict == "none":
         return f"Nothing is missing from the declared model of {view.cell} that these data could show."
     if verdict == "unknown":
-        rest = "that no effect of the catalogue explains beyond doubt"
+        rest = unexplained_by(view.discovery) + (" beyond doubt" if _tried(view.discovery) else "")
         if not effects:
-            return f"The declared model of {view.cell} misses something real {rest}."
-        return f"{_named(view, effects)}; and something real is left {rest}."
+            return f"The declared model of {view.cell} misses something real{rest}."
+        return f"{_named(view, effects)}; and something real is left{rest}."
     sure = name_confidence(view.discovery)
     if refit_does_as_well(view.discovery):
         return (
@@ -41,6 +65,11 @@ def _verdict(view: DiscoveryView) -> str:
             "since a refit of them does as well on data that chose nothing."
         )
     return f"{_named(view, effects)}{sure}."
+
+
+def _tried(discovery: Mapping[str, Any]) -> bool:
+    """Whether any effect was tried."""
+    return bool(discovery.get("tried", True))
 
 
 def name_confidence(discovery: Mapping[str, Any]) -> str:
@@ -58,11 +87,11 @@ WITH_FINDING = "with the finding added"
 
 
 def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
-    """The states of the model worth showing, in words: the last one where it is more than a refit."""
+    """The states of the model worth showing, in words: the last one where it is more than a refit, or a worse one."""
     shown = {"before": "as declared", "recalibrated": "recalibrated"}
     effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
-    if effects or written:
-        shown["after"] = WITH_FINDING if written == effects else "as written"
+    if effects or written or _worse_on_test(discovery):
+        shown["after"] = WITH_FINDING if effects and written == effects else "as written"
     return shown
 
 
@@ -79,10 +108,12 @@ def reason_finding(discovery: Mapping[str, Any]) -> str:
         return f"Why: with the finding added {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed:
         found = "with what was found added, " if discovery["effects"] else ""
+        why = f"Why: {found}{amount} on the data looked at, and no more than {allowed:.2f} mV would count as explained."
+        if not _tried(discovery):
+            return why
         return (
-            f"Why: {found}{amount} on the data looked at, and no more than {allowed:.2f} mV would count as explained. "
-            "The list of hypotheses says what came nearest, and why it was not accepted; data of another kind (a slow "
-            "discharge, pulses with rests, another temperature) would narrow it down."
+            f"{why} The list of hypotheses says what came nearest, and why it was not accepted; data of another kind "
+            "(a slow discharge, pulses with rests, another temperature) would narrow it down."
         )
     return f"Why: {discovery['reason']}."
 
@@ -168,6 +199,8 @@ def look_alike_finding(view: DiscoveryView) -> str:
 def rest_finding(discovery: Mapping[str, Any]) -> str:
     """What a data-driven correction could still explain."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")
+    if rest is None:
+        return "What a flexible correction could still explain is not known: these data are too few for one."
     text = f"A flexible correction learnt on what is left could still explain {rest:.1f} mV"
     if not after:
         return text + "."

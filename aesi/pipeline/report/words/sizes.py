@@ -73,11 +73,23 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
     if verdict == "none":
         return "none: nothing is missing that these data could show"
     if verdict == "unknown":
-        left = "something real is left that no effect of the catalogue explains"
-        return f"unknown: {left}" + (f"; so far {', '.join(effects)}" if effects else "")
+        left = f"unknown: something real is left{unexplained_by(discovery)}"
+        return left + (f"; so far {', '.join(effects)}" if effects else "")
     if refit_does_as_well(discovery):
         return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit does as well"
     return f"found: {', '.join(effects)}"
+
+
+def unexplained_by(discovery: Mapping[str, Any]) -> str:
+    """What goes on after 'something real': ' that no effect of the catalogue explains', or which of them were tried."""
+    tried = discovery.get("tried", CATALOGUE)
+    if not tried:
+        return "; no effect was tried on it"
+    if set(tried) >= {name for name, effect in CATALOGUE.items() if effect.refines is None}:
+        return " that no effect of the catalogue explains"
+    if len(tried) == 1:
+        return f" that {tried[0].replace('_', ' ')}, which alone was tried, does not explain"
+    return f" that none of the {len(tried)} effects that were tried explains"
 
 
 def refit_does_as_well(discovery: Mapping[str, Any]) -> bool:

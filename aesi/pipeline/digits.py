@@ -1,0 +1,13 @@
+"""How many digits of a number say something."""
+
+from __future__ import annotations
+
+from math import floor, log10
+
+
+def resolving(value: float, low: float, high: float, least: int = 3, most: int = 6) -> int:
+    """Significant digits that show the width of an interval to two, between `least` and `most`."""
+    if not high > low:
+        return least
+    largest = max(abs(low), abs(high), abs(value))
+    return min(most, max(least, 2 + floor(log10(largest)) - floor(log10(high - low))))

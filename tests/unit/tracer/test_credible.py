@@ -1,0 +1,68 @@
+"""Intervals of parameters inside their bounds and on them, against densities worked out by quadrature."""
+
+import numpy as np
+import pytest
+
+from aesi.physics.effects import CATALOGUE
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.records import prepare_all
+from aesi.tracer.decide.verdict import Thresholds, judged
+from aesi.tracer.likelihood.credible import reaches
+from aesi.tracer.likelihood.gaussian import BlockSums, Posterior
+from aesi.tracer.report.candidate_effects import ranking
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.forward import searched
+
+
+def posterior(gram, moment, x):
+    sums = BlockSums(np.ones(1), np.array([moment]), np.array([gram]), np.zeros(1), np.ones(1))
+    return Posterior(sums, np.asarray(x, dtype=float), ())
+
+
+GRAM = np.array([[4.0, 1.5], [1.5, 3.0]])
+
+
+def test_inside_the_bounds_an_interval_is_that_of_a_normal():
+    one = posterior(GRAM, [0.5, -0.2], [0.1, 0.2])
+    below_above = reaches(one, np.tile([-9.0, 9.0], (2, 1)), 0.9)
+    half = 1.6448536 * np.sqrt(np.diagonal(np.linalg.inv(GRAM + np.eye(2))))
+    assert below_above == pytest.approx(np.column_stack([half, half]))
+
+
+@pytest.mark.parametrize("pushed", [-1.0, -20.0])
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_on_a_bound_an_interval_begins_there_and_holds_its_share_of_the_density(pushed, side):
+    moment = np.array([side * pushed, 0.7])
+    bounds = np.array([sorted([0.0, side * 5.0]), [-9.0, 9.0]])
+    below_above = reaches(posterior(GRAM, moment, np.zeros(2)), bounds, 0.9)
+    inward = below_above[0, 0 if side < 0 else 1]
+    assert below_above[0].min() == 0.0
+
+    d, other = np.linspace(0.0, 5.0, 20001), np.linspace(-6.0, 6.0, 601)[:, None]
+    a = GRAM + np.eye(2)
+    z = side * d[None, :]
+    log_p = (
+        moment[0] * z
+        + moment[1] * other
+        - 0.5 * (a[0, 0] * z**2 + 2 * a[0, 1] * z * other + a[1, 1] * other**2)
+    )
+    density = np.exp(log_p).sum(axis=0)
+    share = np.cumsum(density) / density.sum()
+    assert inward == pytest.approx(np.interp(0.9, share, d), rel=5e-3, abs=5e-4)
+
+
+def test_a_parameter_that_ended_at_nought_has_an_interval_with_a_width_and_a_unit(cell, few, make):
+    data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
+    problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
+    path = searched(problem, 2, lambda blocks, fit: True, Archive(None, ""))
+    rows = ranking(path, judged(path, Thresholds()), lambda one: None)
+    assert {row.effect for row in rows} == set(few)
+    for row in rows:
+        assert set(row.parameters) == set(few[row.effect].parameters)
+        for name, told in row.parameters.items():
+            assert told.low <= told.value <= told.high
+            assert told.low < told.high, (row.effect, name)
+            assert told.unit == few[row.effect].parameters[name].unit
+    resistance = next(row for row in rows if row.effect == "series_resistance").parameters["resistance_ohm"]
+    assert resistance.value == resistance.low == 0.0
+    assert 1e-6 < resistance.high < 1e-2
