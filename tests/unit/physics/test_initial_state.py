@@ -144,12 +144,35 @@ def test_an_instrument_fault_is_taken_off_the_reading():
     assert found.soc == pytest.approx(0.5, abs=1e-3)
 
 
-def test_a_voltage_that_still_moves_is_doubtful_and_said():
+@pytest.mark.parametrize("flowed_s", [30, 600])
+@pytest.mark.parametrize("current_a", [7.0, -5.0])
+@pytest.mark.parametrize("stopped_s", [1, 15, 120])
+def test_a_rest_after_a_current_that_nobody_saw_is_read_as_what_it_relaxes_to(flowed_s, current_a, stopped_s):
+    time = np.arange(flowed_s + stopped_s + 61.0)
+    current = np.where(time <= flowed_s, current_a, 0.0)
+    run = simulate(
+        LG_M50, time, current, soc0=0.55, hold="backward", model="dfn"
+    )  # another model than reads it
+    start = flowed_s + stopped_s
+    cut = record(time[start:] - time[start], current[start:], run.voltage_v[start:])
+    found, soc = initial_state(LG_M50, cut), float(run.series["soc"][-1])
+    as_it_stands = float(np.interp(run.voltage_v[-1], *_ocv()))
+    assert abs(found.soc - soc) < 2.0 * found.sd
+    assert abs(found.soc - soc) < max(abs(as_it_stands - soc), 2e-3)
+    if abs(found.rest_voltage_v - cut.voltage_v[-15:].mean()) > READING_V:
+        assert "relaxing to" in found.sentence
+
+
+def test_a_rest_is_read_as_it_is_where_it_does_not_move_or_says_too_little():
     data = resting(3.7, rows=60)
-    moving = replace(data, voltage_v=3.7 + 0.02 * np.exp(-np.arange(60.0) / 20.0))
+    moving = replace(data, voltage_v=3.7 - 0.02 * np.exp(-np.arange(60.0) / 20.0))
     still, drifting = initial_state(LG_M50, data), initial_state(LG_M50, moving)
-    assert drifting.sd > 2.0 * still.sd
-    assert "still moves" in drifting.sentence
+    assert "relaxing" not in still.sentence
+    assert still.rest_voltage_v == pytest.approx(3.7, abs=1e-4)
+    assert "relaxing to" in drifting.sentence
+    assert drifting.rest_voltage_v > moving.voltage_v[-1] + READING_V
+    few = initial_state(LG_M50, moving.take(slice(0, 5)))
+    assert few.rest_voltage_v == pytest.approx(moving.voltage_v[:5].mean())
 
 
 def test_a_voltage_of_another_cell_is_refused():
