@@ -18,12 +18,14 @@ OTHERS: tuple[State, ...] = ("before", "recalibrated")
 
 def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float | None:
     """V beyond the noise that an explanation of the data leaves of the test part, where that is more than a right one
-    may leave; else None."""
+    may leave; else None.  The initial state of a test record is as uncertain as it is read: what it explains is no
+    contradiction."""
     tests = _tests(files)
     if verdict.word == "unknown" or not tests:
         return None
     noise_v = np.repeat([f.noise_v for f in tests], [len(f.time_s) for f in tests])
-    over_v = beyond(_left_v(tests, "after"), float(np.sqrt(np.mean(noise_v**2))))
+    left_v = float(np.sqrt(np.mean(np.concatenate([f.beyond_start_v() for f in tests]) ** 2)))
+    over_v = beyond(left_v, float(np.sqrt(np.mean(noise_v**2))))
     return over_v if over_v > verdict.tolerance_v else None
 
 
