@@ -182,6 +182,7 @@ def impedance(
         effect_file or [],
         model,
         soh,
+        options.say_notes,
     )
     typer.echo(
         f"{out}: {len(z):,} frequencies, {1e3 * z.real.min():.4g} to {1e3 * z.real.max():.4g} mOhm", err=True
