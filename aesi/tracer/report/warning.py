@@ -38,8 +38,7 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
         said = "what was found" if verdict.effects else "that nothing is missing"
         out.append(
             f"the test part contradicts {said}: {MV_PER_V * over_v:.2f} mV beyond the noise are left there, and "
-            f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. Something else is "
-            "missing, or more; look again with the test part among the data."
+            f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. {_advice(files)}"
         )
     tests = _tests(files)
     after_mv = _left_mv(tests, "after")
@@ -50,6 +49,15 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
         advice = ": do not use it there." if after_mv > WORSE_SHARE * min(less.values()) else "."
         out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
     return tuple(out)
+
+
+def _advice(files: Sequence[FileOutcome]) -> str:
+    """What to look at first where the test part contradicts a verdict."""
+    ran_out = [f"{f.name} at {f.emptied_s['after']:g} s" for f in _tests(files) if "after" in f.emptied_s]
+    if ran_out:
+        where = ", ".join(ran_out)
+        return f"The model runs empty or full on {where}: check capacity (soh), soc0 and temperature first."
+    return "Something else is missing, or more; look again with the test part among the data."
 
 
 def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:

@@ -60,6 +60,13 @@ def test_a_test_record_that_started_under_load_contradicted_what_was_right():
     assert contradicted_by_v([wrong], found) == pytest.approx(3e-3 / np.sqrt(2.0), rel=0.1)
 
 
+def test_a_test_part_on_which_the_model_runs_empty_is_not_said_to_lack_physics():
+    emptied = replace(outcome(0.9), emptied_s={"after": 320.0})
+    first, *_ = warnings([emptied], verdict("found", "series_resistance"))
+    assert "The model runs empty or full on drive at 320 s: check capacity" in first
+    assert "Something else" not in first
+
+
 def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them():
     (one,) = warnings([outcome(7e-3)], verdict("unknown"))
     assert "leaves 7.00 mV, the recalibrated model 5.00 mV: do not use it there." in one
