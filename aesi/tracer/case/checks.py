@@ -97,7 +97,7 @@ def check_same_cell(problem: InverseProblem, record: PreparedRecord, declared: R
         if _typical_v(record, run.voltage_v) <= FOREIGN_CELL_V:
             return
     empty = declared.series["depleted"] > 0.0
-    ends = f" and runs empty or full at {record.thin.time_s[np.argmax(empty)]:g} s" if empty.any() else ""
+    ends = f", and runs empty or full at {record.thin.time_s[np.argmax(empty)]:g} s" if empty.any() else ""
     raise DataError(
         f"{record.name}: the model of {problem.cell.name} is {1e3 * typical:.0f} mV off in the median, which no single "
         f"effect does{ends}; the file seems to come from another cell, or soc0 or the temperature is wrong."

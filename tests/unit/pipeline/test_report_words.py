@@ -58,6 +58,9 @@ def test_other_corrections_that_do_better_are_told(views):
         "2 of 3 other corrections learnt on the same records err less there, ESPM + constant least: 3.2 mV."
     )
     assert runs.others_finding(replace(view, models=(view.models[0], rows[0], rows[3]))) == ""
+    assert runs.others_finding(replace(view, models=(view.models[0], rows[0], rows[1]))) == (
+        "The other correction learnt on the same records, ESPM + ridge, errs less there: 3.9 mV."
+    )
 
 
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
