@@ -138,6 +138,7 @@ def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_s
     assert "9.50 mV against 9.40 mV as declared and 6.20 mV recalibrated." in discoveries.discovery_finding(
         worst
     )
+    assert discoveries.short_finding(worse.discovery).endswith("9.30 mV against 6.20 mV recalibrated")
     same = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 6.2004}}})
     assert "worse" not in discoveries.discovery_finding(same)
 

@@ -10,7 +10,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
 from aesi.pipeline.report.views import DiscoveryView
-from aesi.pipeline.report.words.sizes import refit_does_as_well, unexplained_by, with_size
+from aesi.pipeline.report.words.sizes import finding_line, refit_does_as_well, unexplained_by, with_size
 
 LARGE_SHARE = 0.5
 """Of the remaining error: where a sparse correction could still explain more, a sentence says so. A convention."""
@@ -21,11 +21,18 @@ CERTAIN = 0.99
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
     a test part that contradicts it, or on which the written model does worse than another."""
-    against = [
-        "the test part contradicts it" if view.discovery.get("contradicted") else "",
-        _worse_on_test(view.discovery),
-    ]
-    return "; ".join([_verdict(view)[:-1], *filter(None, against)]) + "."
+    return "; ".join([_verdict(view)[:-1], *_against(view.discovery)]) + "."
+
+
+def short_finding(discovery: Mapping[str, Any]) -> str:
+    """The verdict in one line, with what the test part says against it: of a row of a table, of a tracked run."""
+    return "; ".join([finding_line(discovery), *_against(discovery)])
+
+
+def _against(discovery: Mapping[str, Any]) -> list[str]:
+    contradicted = ["the test part contradicts it"] if discovery.get("contradicted") else []
+    worse = _worse_on_test(discovery)
+    return [*contradicted, worse] if worse else contradicted
 
 
 def _worse_on_test(discovery: Mapping[str, Any]) -> str:
