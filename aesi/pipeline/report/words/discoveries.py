@@ -102,20 +102,24 @@ def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
     return shown
 
 
+UNSEEN = "pieces of the data that were left out of the fit in turn"
+"""By which hypotheses are judged: their errors are larger than those of the fit."""
+
+
 def reason_finding(discovery: Mapping[str, Any]) -> str:
     """What the verdict rests on: the error left beyond the noise against what any such model may leave."""
     left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
-    amount = f"{left:.2f} mV of voltage error are left beyond the noise of the sensors"
+    amount = f"{left:.2f} mV of voltage error beyond the noise of the sensors are left on {UNSEEN}"
     if discovery["verdict"] == "none":
         return (
-            f"Why: on the data looked at, {amount}. Up to {allowed:.2f} mV are what the noise and the accuracy of any "
+            f"Why: {amount}. Up to {allowed:.2f} mV are what the noise and the accuracy of any "
             "such model leave open, so these data give no reason to change it."
         )
     if discovery["verdict"] == "found":
         return f"Why: with the finding added {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed:
         found = "with what was found added, " if discovery["effects"] else ""
-        why = f"Why: {found}{amount} on the data looked at, and no more than {allowed:.2f} mV would count as explained."
+        why = f"Why: {found}{amount}, and no more than {allowed:.2f} mV would count as explained."
         if not _tried(discovery):
             return why
         return (
