@@ -180,7 +180,11 @@ def test_a_refit_that_does_as_well_is_said_to(views):
     [
         (
             "none",
-            ("0.30 mV of voltage error are left beyond the noise", "Up to 0.80 mV", "no reason to change"),
+            (
+                "0.30 mV of voltage error beyond the noise of the sensors are left on pieces",
+                "Up to 0.80 mV",
+                "no reason to change",
+            ),
         ),
         ("found", ("with the finding added 0.30 mV", "up to 0.80 mV count as explained")),
         ("unknown", ("4.00 mV of voltage error", "no more than 0.80 mV", "a slow discharge")),
