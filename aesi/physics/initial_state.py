@@ -27,7 +27,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.load import FLOWED_S, LoadedStart
 from aesi.physics.start.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
-from aesi.physics.start.relaxing import relaxed, resting_rows
+from aesi.physics.start.relaxing import resting_rows, settled_voltage
 from aesi.physics.start.rest import freed_of_instruments
 from aesi.physics.start.state import Basis, InitialState
 from aesi.records import Hold, Measurement
@@ -88,11 +88,6 @@ def initial_state(
     return start.read()
 
 
-def _charge_ah(data: Measurement) -> float:
-    """Ah that have flowed, positive out of the cell."""
-    return float(np.trapezoid(data.current_a, data.time_s)) / SECONDS_PER_HOUR
-
-
 def _read_instead(read: InitialState, soc0: float) -> InitialState:
     """The reading, with a sentence that says why what was given for several records is not believed for this one."""
     words = f"{read.sentence[:-1]}; not the {soc0:.4g} that was given, which its voltage contradicts."
@@ -138,11 +133,12 @@ class _Start:
         read = freed_of_instruments(self.model, self.effects, last)
         if self.open_circuit.charged(read):
             return self._full(read, f"rests at {last:.3f} V", last)
-        voltage, sd_v = relaxed(self.open_circuit, rest, self.physics)
+        voltage, sd_v = settled_voltage(self.open_circuit, rest, self.physics)
         true = freed_of_instruments(self.model, self.effects, voltage)
         spread = float(np.hypot(READING_V, sd_v))
         soc, sd = self.open_circuit.reading(true, spread)
-        soc += _charge_ah(rest) / self.cell.capacity_ah
+        flowed_ah = float(np.trapezoid(rest.current_a, rest.time_s)) / SECONDS_PER_HOUR
+        soc += flowed_ah / self.cell.capacity_ah
         words = f"{self.record.name} rests at {last:.3f} V"
         if abs(voltage - last) > READING_V:
             words += f", relaxing to {voltage:.3f} +/- {sd_v:.3f} V"

@@ -14,12 +14,20 @@ from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import activated
+from aesi.physics.simulation import model_with
 from aesi.pipeline.product.declared import declared_model
-from aesi.pipeline.simulation import write_table
+from aesi.pipeline.simulation import SayNotes, write_table
 from aesi.records import Spectrum
 
 BAND_HZ = (0.01, 100.0)
 """Between them spectra are judged: above, leads and sensors; below, an open-circuit potential's slope."""
+
+INSTANT_HZ = 10.0
+"""Above it double layers carry a notable part of the current in most cells."""
+NO_DOUBLE_LAYER = (
+    f"neither the cell's file nor an effect brings double layers (--effect double_layer does), so that kinetics answer "
+    f"at once: above some {INSTANT_HZ:g} Hz there is no arc, and |Z| is too large."
+)
 
 ASSUMED_DEGC = 25.0
 """Of a spectrum whose temperature was not measured; it is said."""
@@ -35,20 +43,30 @@ def impedance_file(
     effect_files: Sequence[Path] = (),
     model: ModelName | None = None,
     soh: float | None = None,
+    say_notes: SayNotes | None = None,
 ) -> ComplexArray:
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
 
     cell : a BPX file, or a folder of a saved model, whose effects are taken.  frequencies : LOW:HIGH:N in Hz,
     log-spaced, or a CSV with a column frequency_hz.  model : "espm" or "dfn"; None takes that of a saved model, or that
     the cell's file was fitted with, else "espm".
-    soh : share of the file's capacity that the cell had then; None takes all of it.
+    soh : share of the file's capacity that the cell had then; None takes all of it.  say_notes : is given a sentence
+    where the model has no double layer, and frequencies at which that shows.
     """
     declared = declared_model(cell).with_soh(soh)
     hz = read_frequencies(frequencies)
     active = (*declared.effects, *activated(effects, effect_files))
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
+    if say_notes is not None and hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
+        say_notes([NO_DOUBLE_LAYER])
     return z
+
+
+def _has_double_layer(cell: Cell, effects: Sequence[ActiveEffect]) -> bool:
+    model = model_with(cell, effects)
+    layers = (model.cell.negative, model.cell.positive, model.negative, model.positive)
+    return any(layer.double_layer_f_m2 > 0.0 for layer in layers)
 
 
 def read_frequencies(text: str) -> Array:

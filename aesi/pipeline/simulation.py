@@ -149,7 +149,7 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
         (window, f"a voltage outside the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"),
     ):
         if np.any(rows):
-            said.append(f"{record.name}: {_percent(rows)} of the rows have {words}.")
+            said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")
     return said
 
 

@@ -149,7 +149,7 @@ def discover(
     declared = ModelState(problem)
     for index, record in enumerate((*records, *tested)):
         run = declared.simulated(record, index if index < len(records) else None, thin=True)
-        check_same_cell(problem, record, run.voltage_v)
+        check_same_cell(problem, record, run)
     spent = _Spent(progress)
 
     def search(one: InverseProblem, kept: Archive, most: int) -> Evidence:

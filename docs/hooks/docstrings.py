@@ -11,7 +11,7 @@ from typing import Any
 
 from griffe import Extension
 
-NAMES = r"\w+(?:, \w+)*"
+NAMES = r"\w+(?:(?:, | to )\w+)*"
 STARTS = re.compile(rf"^{NAMES} : ")
 BETWEEN = re.compile(rf"  (?={NAMES} : )")
 ENDS = re.compile(r"^(Returns?|Raises?|Yields?) ")
@@ -50,5 +50,5 @@ def as_lists(text: str) -> str:
 
 def _item(text: str) -> str:
     names, _, what = text.partition(" : ")
-    code = ", ".join(f"`{name}`" for name in names.split(", "))
+    code = re.sub(r"\b(?!to\b)\w+", r"`\g<0>`", names)
     return f"- {code}: {what.strip()}"

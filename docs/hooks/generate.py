@@ -49,7 +49,7 @@ def _effect(effect: Any) -> str:
     lines = [
         f"### {effect.id}\n",
         f"{effect.summary}.\n",
-        "```text",
+        "```{ .text .no-copy }",  # the button would lie over the end of a line
         textwrap.dedent(effect.equation),
         "```\n",
     ]

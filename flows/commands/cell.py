@@ -182,6 +182,7 @@ def impedance(
         effect_file or [],
         model,
         soh,
+        options.say_notes,
     )
     typer.echo(
         f"{out}: {len(z):,} frequencies, {1e3 * z.real.min():.4g} to {1e3 * z.real.max():.4g} mOhm", err=True
@@ -219,7 +220,9 @@ def discover(
     holdout: Annotated[
         float | None,
         typer.Option(
-            min=0.0, max=0.9, show_default="0.3", help="Last share of the data kept back, without --test."
+            min=0.0,
+            max=0.9,
+            help="Last share of the data kept back, without --test: 0.3 where none is given.",
         ),
     ] = None,
     max_effects: Annotated[int, typer.Option(min=0, max=10, help="Most effects that are added.")] = 3,

@@ -53,8 +53,8 @@ HoldOption = Annotated[
     Literal["linear", "backward"] | None,
     typer.Option(
         "--hold",
-        help="How the current runs between rows: straight, or as loggers write, constant since the row before. "
-        "Without it: backward where rows come more than 5 s apart; what was taken is said.",
+        help="How the current runs between rows. linear: straight; backward: constant since the row before, as loggers "
+        "write. Without it: backward where rows come more than 5 s apart; what was taken is said.",
     ),
 ]
 

@@ -157,9 +157,8 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
     """What came of it."""
     if tracker is None:
         return
-    from aesi.pipeline.report.words.discoveries import reason_finding
+    from aesi.pipeline.report.words.discoveries import reason_finding, short_finding
     from aesi.pipeline.report.words.moved import moved_summary
-    from aesi.pipeline.report.words.sizes import finding_line
     from flows.tracking.view import NOTE
 
     tracker.parameters(
@@ -167,8 +166,8 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
         {
             "verdict": content["verdict"],
             "effects": ", ".join(content["effects"]),
-            "finding": finding_line(content),
-            NOTE: f"{finding_line(content)}\n\n{reason_finding(content)}",
+            "finding": short_finding(content),
+            NOTE: f"{short_finding(content)}\n\n{reason_finding(content)}",
             **{
                 f"moved_{state}": moved_summary(rows)
                 for state, rows in content["own_parameters"].items()

@@ -115,6 +115,21 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert found.model.cell.contact_resistance_ohm == pytest.approx(1e-3, rel=0.01), "a cell file can hold it"
     folder = found.save(tmp_path / "found")
     assert {path.name for path in folder.iterdir()} == {"discovery.json", "report.html", "model"}
+    assert found.warnings == ()
+    assert "tracking store" not in (folder / "report.html").read_text()
+
+
+def test_a_discovery_that_kept_nothing_back_showed_errors_that_are_no_number(
+    cell, record, monkeypatch, tmp_path
+):
+    few = {"series_resistance": CATALOGUE["series_resistance"]}
+    monkeypatch.setattr("aesi.pipeline.discovery.discover.known_effects", lambda files: few)
+    found = aesi.discover(cell, record, soc0=SOC0, holdout=0.0)
+    shown, page = repr(found), (found.save(tmp_path) / "report.html").read_text()
+    assert "RMSE, fit" in page
+    assert "RMSE, test" not in page
+    assert shown.endswith("mV after, on the data that were fitted)")
+    assert "nan" not in shown
 
 
 def test_every_key_of_a_discovery_is_explained(cell, record, monkeypatch):

@@ -22,7 +22,7 @@ PARAMETERS = {
         "V",
         bounds=(-0.1, 0.1),
         neutral=0.0,
-        source="a few mV (graphite, layered oxides) to 100 mV (silicon); negative would be unphysical",
+        source="a few mV (graphite, layered oxides) to 100 mV (silicon); no cell has a negative one",
         description="half the gap between the branches at half charge",
     ),
     "rate": Parameter(

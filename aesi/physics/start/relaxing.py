@@ -48,7 +48,7 @@ def resting_rows(record: Measurement, limit_a: float) -> slice:
     return slice(0, len(rests) if rests.all() else max(1, int(np.argmin(rests))))
 
 
-def relaxed(open_circuit: OpenCircuit, rest: Measurement, physics: ModelName) -> tuple[float, float]:
+def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, physics: ModelName) -> tuple[float, float]:
     """U of (1) and its standard deviation, V.
 
     rest : rows without a current; of too few, their mean and nought.  physics : the model that has g.

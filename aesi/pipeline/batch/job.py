@@ -14,7 +14,7 @@ from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
-from aesi.pipeline.report.words.sizes import finding_line
+from aesi.pipeline.report.words.discoveries import short_finding
 
 ROW = "row.json"
 
@@ -83,7 +83,7 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
     row = _about(job, "done") | {
         "verdict": content["verdict"],
         "effects": ", ".join(content["effects"]),
-        "finding": finding_line(content),
+        "finding": short_finding(content),
         **{
             f"{state}_test_mv": content[state]["test"].get("rmse_mv")
             for state in ("before", "recalibrated", "after")

@@ -26,10 +26,14 @@ class Finding:
     found: Discovery
 
     def __repr__(self) -> str:
-        after, before = self.rmse_mv("after"), self.rmse_mv("before")
+        kept_back = bool(self.content["before"]["test"])
+        part: Literal["fit", "test"] = "test" if kept_back else "fit"
+        where = "on data that chose nothing" if kept_back else "on the data that were fitted"
         named = f" {', '.join(self.effects)}" if self.effects else ""
-        errors = f"{before:.2f} mV as declared, {after:.2f} mV after, on data that chose nothing"
-        return f"Finding({self.verdict}{named}, {errors})"
+        errors = (
+            f"{self.rmse_mv('before', part):.2f} mV as declared, {self.rmse_mv('after', part):.2f} mV after"
+        )
+        return f"Finding({self.verdict}{named}, {errors}, {where})"
 
     @property
     def verdict(self) -> str:
@@ -50,6 +54,11 @@ class Finding:
     def reason(self) -> str:
         """What the verdict rests on, in a sentence."""
         return str(self.content["reason"])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Where the test part contradicts the verdict, or the written model does worse there than another one."""
+        return tuple(self.content["warnings"])
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -134,7 +134,11 @@ def _fixed(value: Any, digits: int = 1, unit: str = "") -> str:
 
 
 def _significant(value: Any, digits: int = 3) -> str:
-    return f"{value:.{digits}g}" if _known(value) else ABSENT
+    """To so many digits; what is up to a million is written out and not as a power of ten."""
+    if not _known(value):
+        return ABSENT
+    text = f"{value:.{digits}g}"
+    return f"{float(text):,.0f}" if "e+" in text and abs(value) < 1e6 else text
 
 
 def _resolving(interval: Mapping[str, Any]) -> int:

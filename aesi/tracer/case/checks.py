@@ -12,6 +12,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
+from aesi.records import Run
 from aesi.records.checked import row_words
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord
@@ -79,13 +80,13 @@ def _discharged_ah(record: PreparedRecord) -> Array:
     return np.concatenate([[0.0], np.cumsum(mean * np.diff(record.data.time_s))]) / SECONDS_PER_HOUR
 
 
-def check_same_cell(problem: InverseProblem, record: PreparedRecord, voltage_v: Array) -> None:
+def check_same_cell(problem: InverseProblem, record: PreparedRecord, declared: Run) -> None:
     """Raises DataError where the declared model is so far off that the data must come from another cell.
 
-    voltage_v : (n_thin,) V of the declared model.  Where an effect infers what the record does not hold (temperature),
-    the model has to be so far off over all of its range.
+    declared : (n_thin,) what the declared model gives.  Where an effect infers what the record does not hold
+    (temperature), the model has to be so far off over all of its range.
     """
-    typical = _typical_v(record, voltage_v)
+    typical = _typical_v(record, declared.voltage_v)
     if typical <= FOREIGN_CELL_V:
         return
     for condition in _unmeasured(problem, record):
@@ -95,9 +96,11 @@ def check_same_cell(problem: InverseProblem, record: PreparedRecord, voltage_v: 
             continue
         if _typical_v(record, run.voltage_v) <= FOREIGN_CELL_V:
             return
+    empty = declared.series["depleted"] > 0.0
+    ends = f", and runs empty or full at {record.thin.time_s[np.argmax(empty)]:g} s" if empty.any() else ""
     raise DataError(
         f"{record.name}: the model of {problem.cell.name} is {1e3 * typical:.0f} mV off in the median, which no single "
-        "effect does; the file seems to come from another cell, or soc0 is wrong."
+        f"effect does{ends}; the file seems to come from another cell, or soc0 or the temperature is wrong."
     )
 
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from aesi.errors import AesiError
+from aesi.numerics.typing import Array
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
@@ -15,6 +18,9 @@ from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
 from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.growth import Explanation, linear_values
+
+HALF_FULL = 0.5
+"""State of charge from which a smaller one is the safer to simulate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +64,17 @@ class ModelState:
             return run(data, None, effects, hold, rest_v)
         except AesiError:
             return run(data, record.soc0, effects, hold)
+
+    def start_slope_v(self, record: PreparedRecord) -> Array:
+        """(n,) V of a whole record that was not fitted: what one standard deviation of its initial state of charge is
+        worth.  Raises AesiError where it cannot be simulated there."""
+        run, effects = self.problem.run, self.effects(record.good)
+        inward = -record.soc0_sd if record.soc0 > HALF_FULL else record.soc0_sd
+        here, there = (
+            run(record.data, soc0, effects, record.hold).voltage_v
+            for soc0 in (record.soc0, record.soc0 + inward)
+        )
+        return np.asarray(there - here)
 
     def _full(self, otherwise: float) -> float:
         """State of charge that counts as full: the mean fitted start of the records that begin fully charged."""

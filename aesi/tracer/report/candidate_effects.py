@@ -92,12 +92,17 @@ def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
     reach, placed, out = _reach(path, one), one.placed, {}
     for free in known:
         if free.key not in placed:  # stays where the hypothesis had it that this one grew from
-            parent = next(e for e in path.explanations() if set(e.hypothesis) == set(one.hypothesis[:-1]))
-            out[free.name] = estimates(path, parent, effect)[free.name]
+            out[free.name] = estimates(path, _parent(path, one), effect)[free.name]
             continue
         x, (below, above) = free.coordinate(placed[free.key]), reach[free.key]
         out[free.name] = Estimate(placed[free.key], free.value(x - below), free.value(x + above), free.unit)
     return out
+
+
+def _parent(path: Path, one: Explanation) -> FittedHypothesis:
+    """What a hypothesis grew from."""
+    steps = (step for step in path.steps if any(grown is one for grown in step.grown))
+    return next(fit for step in steps for fit in step.parents if fit.hypothesis == one.hypothesis[:-1])
 
 
 def _reach(path: Path, one: Explanation) -> dict[tuple[str, str], tuple[float, float]]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 
+from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.physics.depletion import ran_out
 from aesi.records import Run
@@ -50,6 +51,7 @@ class FileOutcome:
 
     voltages : state -> (n,) V.  noise_v : of the measured voltage.  gain_v : RMSE recalibrated minus after, with its
     95 % block-bootstrap interval.  emptied_s : state -> s, where its simulation ran out of charge or salt, if it did.
+    start_slope_v : (n,) V of `after`, what one standard deviation of an initial state that was not fitted is worth.
     """
 
     name: str
@@ -62,10 +64,19 @@ class FileOutcome:
     voltages: Mapping[State, Array]
     gain_v: tuple[float, float, float]
     emptied_s: Mapping[State, float] = field(default_factory=dict)
+    start_slope_v: Array | None = None
 
     def residual_v(self, state: State) -> Array:
         """(n,) V, measured - model."""
         return self.measured_v - self.voltages[state]
+
+    def beyond_start_v(self) -> Array:
+        """(n,) V that `after` leaves once the initial state is where it fits best, as far as it is uncertain."""
+        left = self.residual_v("after")
+        if self.start_slope_v is None:
+            return left
+        known = float(self.start_slope_v @ self.start_slope_v) + self.noise_v**2
+        return np.asarray(left - self.start_slope_v * float(self.start_slope_v @ left) / known)
 
     def errors(self, state: State) -> Errors:
         """Errors of a state."""
@@ -88,7 +99,13 @@ def outcomes(
             out.append(_outcome(record, "test", slice(cut, len(record.data)), runs, rng))
     for record in tests:
         runs = {name: state.simulated(record, None, thin=False) for name, state in states.items()}
-        out.append(_outcome(record, "test", slice(record.lead_rows, len(record.data)), runs, rng))
+        rows = slice(record.lead_rows, len(record.data))
+        found = _outcome(record, "test", rows, runs, rng)
+        try:
+            slope_v = states["after"].start_slope_v(record)[rows]
+        except AesiError:
+            slope_v = None
+        out.append(replace(found, start_slope_v=slope_v))
     return tuple(out)
 
 

@@ -18,12 +18,14 @@ OTHERS: tuple[State, ...] = ("before", "recalibrated")
 
 def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float | None:
     """V beyond the noise that an explanation of the data leaves of the test part, where that is more than a right one
-    may leave; else None."""
+    may leave; else None.  The initial state of a test record is as uncertain as it is read: what it explains is no
+    contradiction."""
     tests = _tests(files)
     if verdict.word == "unknown" or not tests:
         return None
     noise_v = np.repeat([f.noise_v for f in tests], [len(f.time_s) for f in tests])
-    over_v = beyond(_left_v(tests, "after"), float(np.sqrt(np.mean(noise_v**2))))
+    left_v = float(np.sqrt(np.mean(np.concatenate([f.beyond_start_v() for f in tests]) ** 2)))
+    over_v = beyond(left_v, float(np.sqrt(np.mean(noise_v**2))))
     return over_v if over_v > verdict.tolerance_v else None
 
 
@@ -36,8 +38,7 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
         said = "what was found" if verdict.effects else "that nothing is missing"
         out.append(
             f"the test part contradicts {said}: {MV_PER_V * over_v:.2f} mV beyond the noise are left there, and "
-            f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. Something else is "
-            "missing, or more; look again with the test part among the data."
+            f"{MV_PER_V * verdict.tolerance_v:.2f} mV would be within what a right model leaves. {_advice(files)}"
         )
     tests = _tests(files)
     after_mv = _left_mv(tests, "after")
@@ -48,6 +49,15 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
         advice = ": do not use it there." if after_mv > WORSE_SHARE * min(less.values()) else "."
         out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
     return tuple(out)
+
+
+def _advice(files: Sequence[FileOutcome]) -> str:
+    """What to look at first where the test part contradicts a verdict."""
+    ran_out = [f"{f.name} at {f.emptied_s['after']:g} s" for f in _tests(files) if "after" in f.emptied_s]
+    if ran_out:
+        where = ", ".join(ran_out)
+        return f"The model runs empty or full on {where}: check capacity (soh), soc0 and temperature first."
+    return "Something else is missing, or more; look again with the test part among the data."
 
 
 def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:

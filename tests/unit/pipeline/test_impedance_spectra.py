@@ -7,7 +7,7 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
-from aesi.pipeline.impedance import held_against
+from aesi.pipeline.impedance import held_against, impedance_file
 from aesi.records import Spectrum
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -51,3 +51,18 @@ def test_an_assumed_temperature_is_said_and_a_state_is_not_assumed(cell):
     assert one.off == pytest.approx(0.0, abs=1e-12)
     with pytest.raises(DataError, match="s: the state of the cell is not known; give soc or discharged_ah"):
         held_against(cell, [spectrum(cell)])
+
+
+def test_a_spectrum_without_an_arc_was_written_without_a_word(tmp_path):
+    said = []
+    for effects, frequencies in (((), "1:1000:4"), ((), "0.01:1:4"), ([("double_layer", {})], "1:1000:4")):
+        impedance_file(
+            CELLS / "lg_m50_chen2020.bpx.json",
+            0.5,
+            frequencies,
+            tmp_path / "z.csv",
+            effects=effects,
+            say_notes=said.extend,
+        )
+    (note,) = said
+    assert "double layers (--effect double_layer does)" in note

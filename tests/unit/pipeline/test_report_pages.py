@@ -167,3 +167,8 @@ def test_a_further_section_is_a_file_a_line_and_a_test(views, monkeypatch, tmp_p
 )
 def test_an_interval_narrower_than_a_thousandth_was_shown_as_a_point(interval, digits):
     assert FILTERS["resolving"](interval) == digits
+
+
+def test_thousands_are_written_out():
+    shown = [FILTERS["significant"](value) for value in (2049.6, 0.000123, 98.76, 8.82e4, 3.2e7, None)]
+    assert shown == ["2,050", "0.000123", "98.8", "88,200", "3.2e+07", "–"]

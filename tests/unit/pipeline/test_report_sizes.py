@@ -64,6 +64,10 @@ def test_the_line_of_a_verdict():
     same = discovery("series_resistance", "physics", ohms, recalibrated=1.0)
     assert finding_line(same).startswith("one of two explanations: 8.00 mohm")
     assert finding_line({**found, "verdict": "none", "effects": []}).startswith("none: nothing is missing")
+    partly = finding_line({**found, "verdict": "unknown"})
+    assert partly.startswith(
+        "unknown: 8.00 mohm [7.90, 8.10] more series resistance explains a part; something real"
+    )
     unknown = finding_line({**found, "verdict": "unknown", "effects": []})
     assert unknown.startswith("unknown: something real is left")
     assert "%" not in unknown

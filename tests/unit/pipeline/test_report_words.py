@@ -58,6 +58,9 @@ def test_other_corrections_that_do_better_are_told(views):
         "2 of 3 other corrections learnt on the same records err less there, ESPM + constant least: 3.2 mV."
     )
     assert runs.others_finding(replace(view, models=(view.models[0], rows[0], rows[3]))) == ""
+    assert runs.others_finding(replace(view, models=(view.models[0], rows[0], rows[1]))) == (
+        "The other correction learnt on the same records, ESPM + ridge, errs less there: 3.9 mV."
+    )
 
 
 @pytest.mark.parametrize("figures", [{}, {"free_run": None}, {"free_run": {"test_rmse_mv": None}}])
@@ -135,6 +138,7 @@ def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_s
     assert "9.50 mV against 9.40 mV as declared and 6.20 mV recalibrated." in discoveries.discovery_finding(
         worst
     )
+    assert discoveries.short_finding(worse.discovery).endswith("9.30 mV against 6.20 mV recalibrated")
     same = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 6.2004}}})
     assert "worse" not in discoveries.discovery_finding(same)
 
@@ -176,7 +180,11 @@ def test_a_refit_that_does_as_well_is_said_to(views):
     [
         (
             "none",
-            ("0.30 mV of voltage error are left beyond the noise", "Up to 0.80 mV", "no reason to change"),
+            (
+                "0.30 mV of voltage error beyond the noise of the sensors are left on pieces",
+                "Up to 0.80 mV",
+                "no reason to change",
+            ),
         ),
         ("found", ("with the finding added 0.30 mV", "up to 0.80 mV count as explained")),
         ("unknown", ("4.00 mV of voltage error", "no more than 0.80 mV", "a slow discharge")),

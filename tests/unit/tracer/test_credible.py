@@ -9,7 +9,7 @@ from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.verdict import Thresholds, judged
 from aesi.tracer.likelihood.credible import reaches
 from aesi.tracer.likelihood.gaussian import BlockSums, Posterior
-from aesi.tracer.report.candidate_effects import ranking
+from aesi.tracer.report.candidate_effects import estimates, ranking
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.forward import searched
 
@@ -66,3 +66,19 @@ def test_a_parameter_that_ended_at_nought_has_an_interval_with_a_width_and_a_uni
     resistance = next(row for row in rows if row.effect == "series_resistance").parameters["resistance_ohm"]
     assert resistance.value == resistance.low == 0.0
     assert 1e-6 < resistance.high < 1e-2
+
+
+def test_what_a_growth_left_on_a_bound_of_its_parent_has_an_interval_too(cell, make):
+    names = ("series_resistance", "film_growth", "current_sensor_gain")
+    truth = [CATALOGUE[name].activate() for name in names[:2]]
+    tried = {name: CATALOGUE[name] for name in names}
+    problem = InverseProblem(cell, prepare_all(cell, [make(truth)], 0.9, 0.3), tried)
+    path = searched(problem, 2, lambda blocks, fit: False, Archive(None, ""))
+    grown = [
+        (one, owner) for step in path.steps for one in step.grown for owner, _ in one.held if owner in names
+    ]
+    assert grown
+    for one, owner in grown:
+        told = estimates(path, one, owner)
+        assert set(told) == set(CATALOGUE[owner].parameters)
+        assert all(t.low < t.high for t in told.values())

@@ -147,13 +147,13 @@ def test_a_cell_far_colder_than_its_file_is_not_taken_for_another_one(cell, make
     )
     for problem in (known, unknown):
         (record,) = problem.records
-        voltage = problem.run(record.thin, 0.9, (), record.thin_hold).voltage_v
-        assert np.median(np.abs(record.thin.voltage_v - voltage)) > FOREIGN_CELL_V
+        run = problem.run(record.thin, 0.9, (), record.thin_hold)
+        assert np.median(np.abs(record.thin.voltage_v - run.voltage_v)) > FOREIGN_CELL_V
         if problem is known:
             with pytest.raises(DataError, match="another cell"):
-                check_same_cell(problem, record, voltage)
+                check_same_cell(problem, record, run)
         else:
-            check_same_cell(problem, record, voltage)
+            check_same_cell(problem, record, run)
 
 
 def test_no_measurement_is_refused(cell, few):

@@ -1,5 +1,7 @@
 """What the test part says against a verdict: more than a right model leaves, or worse than another model."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,28 @@ def test_nothing_contradicts_an_unknown_or_a_discovery_without_a_test_part():
     assert contradicted_by_v([outcome(4e-3)], verdict("unknown")) is None
     assert contradicted_by_v([outcome(4e-3, part="fit")], verdict("found", "film_growth")) is None
     assert warnings([outcome(4e-3, part="fit")], verdict("found", "film_growth")) == ()
+
+
+def test_a_test_record_that_started_under_load_contradicted_what_was_right():
+    rng = np.random.default_rng(0)
+    noise_v, slope_v = (
+        NOISE_V * rng.normal(size=400),
+        np.full(400, 15e-3),
+    )  # of a state of charge read under load
+    found = verdict("found", "series_resistance")
+    started = replace(outcome(0.0), voltages={"after": -noise_v - 0.2 * slope_v}, start_slope_v=slope_v)
+    assert contradicted_by_v([replace(started, start_slope_v=None)], found) is not None
+    assert contradicted_by_v([started], found) is None
+    wave_v = 3e-3 * np.sin(np.arange(400.0))
+    wrong = replace(started, voltages={"after": -noise_v - 0.2 * slope_v - wave_v})
+    assert contradicted_by_v([wrong], found) == pytest.approx(3e-3 / np.sqrt(2.0), rel=0.1)
+
+
+def test_a_test_part_on_which_the_model_runs_empty_is_not_said_to_lack_physics():
+    emptied = replace(outcome(0.9), emptied_s={"after": 320.0})
+    first, *_ = warnings([emptied], verdict("found", "series_resistance"))
+    assert "The model runs empty or full on drive at 320 s: check capacity" in first
+    assert "Something else" not in first
 
 
 def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them():

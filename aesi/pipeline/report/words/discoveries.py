@@ -10,7 +10,7 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
 from aesi.pipeline.report.views import DiscoveryView
-from aesi.pipeline.report.words.sizes import refit_does_as_well, unexplained_by, with_size
+from aesi.pipeline.report.words.sizes import finding_line, refit_does_as_well, unexplained_by, with_size
 
 LARGE_SHARE = 0.5
 """Of the remaining error: where a sparse correction could still explain more, a sentence says so. A convention."""
@@ -21,11 +21,18 @@ CERTAIN = 0.99
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
     a test part that contradicts it, or on which the written model does worse than another."""
-    against = [
-        "the test part contradicts it" if view.discovery.get("contradicted") else "",
-        _worse_on_test(view.discovery),
-    ]
-    return "; ".join([_verdict(view)[:-1], *filter(None, against)]) + "."
+    return "; ".join([_verdict(view)[:-1], *_against(view.discovery)]) + "."
+
+
+def short_finding(discovery: Mapping[str, Any]) -> str:
+    """The verdict in one line, with what the test part says against it: of a row of a table, of a tracked run."""
+    return "; ".join([finding_line(discovery), *_against(discovery)])
+
+
+def _against(discovery: Mapping[str, Any]) -> list[str]:
+    contradicted = ["the test part contradicts it"] if discovery.get("contradicted") else []
+    worse = _worse_on_test(discovery)
+    return [*contradicted, worse] if worse else contradicted
 
 
 def _worse_on_test(discovery: Mapping[str, Any]) -> str:
@@ -95,20 +102,24 @@ def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
     return shown
 
 
+UNSEEN = "pieces of the data that were left out of the fit in turn"
+"""By which hypotheses are judged: their errors are larger than those of the fit."""
+
+
 def reason_finding(discovery: Mapping[str, Any]) -> str:
     """What the verdict rests on: the error left beyond the noise against what any such model may leave."""
     left, allowed = discovery["structured_mv"], discovery["tolerance_mv"]
-    amount = f"{left:.2f} mV of voltage error are left beyond the noise of the sensors"
+    amount = f"{left:.2f} mV of voltage error beyond the noise of the sensors are left on {UNSEEN}"
     if discovery["verdict"] == "none":
         return (
-            f"Why: on the data looked at, {amount}. Up to {allowed:.2f} mV are what the noise and the accuracy of any "
+            f"Why: {amount}. Up to {allowed:.2f} mV are what the noise and the accuracy of any "
             "such model leave open, so these data give no reason to change it."
         )
     if discovery["verdict"] == "found":
         return f"Why: with the finding added {amount}; up to {allowed:.2f} mV count as explained."
     if left > allowed:
         found = "with what was found added, " if discovery["effects"] else ""
-        why = f"Why: {found}{amount} on the data looked at, and no more than {allowed:.2f} mV would count as explained."
+        why = f"Why: {found}{amount}, and no more than {allowed:.2f} mV would count as explained."
         if not _tried(discovery):
             return why
         return (

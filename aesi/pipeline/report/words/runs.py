@@ -77,10 +77,13 @@ def others_finding(view: RunView) -> str:
     if not better or ours is None:
         return ""
     best = min(better, key=lambda name: better[name])
+    least = _told(better[best], ours)[0]
+    if len(left) == 1:
+        return f"The other correction learnt on the same records, {best}, errs less there: {least} mV."
     verb = "errs" if len(better) == 1 else "err"
     return (
         f"{len(better)} of {len(left)} other corrections learnt on the same records {verb} less there, "
-        f"{best} least: {_told(better[best], ours)[0]} mV."
+        f"{best} least: {least} mV."
     )
 
 

@@ -73,8 +73,9 @@ def finding_line(discovery: Mapping[str, Any]) -> str:
     if verdict == "none":
         return "none: nothing is missing that these data could show"
     if verdict == "unknown":
-        left = f"unknown: something real is left{unexplained_by(discovery)}"
-        return left + (f"; so far {', '.join(effects)}" if effects else "")
+        explain = "explains" if len(effects) == 1 else "explain"
+        named = f"{', '.join(effects)} {explain} a part; " if effects else ""
+        return f"unknown: {named}something real is left{unexplained_by(discovery)}"
     if refit_does_as_well(discovery):
         return f"one of two explanations: {', '.join(effects)}; or the model's own parameters, whose refit does as well"
     return f"found: {', '.join(effects)}"
