@@ -90,9 +90,8 @@ def _means(values: Array, starts: IntArray) -> Array:
 def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, physics: ModelName) -> Iterator[Array]:
     """(n,) V over C-rate, g of (1) at the rows of a rest, for each history."""
     cell = open_circuit.cell
-    rate = (
-        HISTORY_C_RATE if soc < 0.5 else -HISTORY_C_RATE
-    )  # from the middle of the range, never from beyond its end
+    # The history comes from the middle of the range, so that it does not begin beyond full or empty.
+    rate = HISTORY_C_RATE if soc < 0.5 else -HISTORY_C_RATE
     current_a = rate * cell.capacity_ah
     after = np.geomspace(0.1, STOPPED_S[-1] + max(float(time_s[-1]), 1.0), 60)
     for flowed_s in FLOWED_S[1:]:
