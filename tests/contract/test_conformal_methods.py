@@ -102,7 +102,7 @@ def test_a_current_that_was_calibrated_with_is_asked_for(driven: Calibrated) -> 
     with pytest.raises(InputError, match="interval\\(current_a\\)"):
         driven.stream().update(1e-4)
     current[7] = np.nan
-    with pytest.raises(InputError, match="sample 7"):
+    with pytest.raises(InputError, match="row 8, counted from 1"):
         driven.intervals(record, current)
     with pytest.raises(InputError, match="shape"):
         driven.intervals(record, current[:5])
