@@ -28,7 +28,7 @@ from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.load import FLOWED_S, LoadedStart
 from aesi.physics.start.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
 from aesi.physics.start.relaxing import resting_rows, settled_voltage
-from aesi.physics.start.rest import freed_of_instruments
+from aesi.physics.start.rest import first_minute_v, freed_of_instruments
 from aesi.physics.start.state import Basis, InitialState
 from aesi.records import Hold, Measurement
 
@@ -129,18 +129,18 @@ class _Start:
 
     def _at_rest(self) -> InitialState:
         rest = self.record.take(resting_rows(self.record, REST_C_RATE * self.cell.capacity_ah))
-        last = float(rest.voltage_v[-1 - len(rest) // 4 :].mean())
-        read = freed_of_instruments(self.model, self.effects, last)
+        begins = first_minute_v(rest.voltage_v)
+        read = freed_of_instruments(self.model, self.effects, begins)
         if self.open_circuit.charged(read):
-            return self._full(read, f"rests at {last:.3f} V", last)
+            return self._full(read, f"rests at {begins:.3f} V", begins)
         voltage, sd_v = settled_voltage(self.open_circuit, rest, self.physics)
         true = freed_of_instruments(self.model, self.effects, voltage)
         spread = float(np.hypot(READING_V, sd_v))
         soc, sd = self.open_circuit.reading(true, spread)
         flowed_ah = float(np.trapezoid(rest.current_a, rest.time_s)) / SECONDS_PER_HOUR
         soc += flowed_ah / self.cell.capacity_ah
-        words = f"{self.record.name} rests at {last:.3f} V"
-        if abs(voltage - last) > READING_V:
+        words = f"{self.record.name} rests at {begins:.3f} V"
+        if abs(voltage - begins) > READING_V:
             words += f", relaxing to {voltage:.3f} +/- {sd_v:.3f} V"
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
         low, high = self.open_circuit.ends(true, spread)
