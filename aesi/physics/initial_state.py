@@ -19,7 +19,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
@@ -28,7 +27,7 @@ from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.load import FLOWED_S, LoadedStart
 from aesi.physics.start.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
 from aesi.physics.start.relaxing import resting_rows, settled_voltage
-from aesi.physics.start.rest import first_minute_v, freed_of_instruments
+from aesi.physics.start.rest import first_rows_v, freed_of_instruments
 from aesi.physics.start.state import Basis, InitialState
 from aesi.records import Hold, Measurement
 
@@ -129,7 +128,7 @@ class _Start:
 
     def _at_rest(self) -> InitialState:
         rest = self.record.take(resting_rows(self.record, REST_C_RATE * self.cell.capacity_ah))
-        begins = first_minute_v(rest.voltage_v)
+        begins = first_rows_v(rest.voltage_v)
         read = freed_of_instruments(self.model, self.effects, begins)
         if self.open_circuit.charged(read):
             return self._full(read, f"rests at {begins:.3f} V", begins)
@@ -137,8 +136,7 @@ class _Start:
         true = freed_of_instruments(self.model, self.effects, voltage)
         spread = float(np.hypot(READING_V, sd_v))
         soc, sd = self.open_circuit.reading(true, spread)
-        flowed_ah = float(np.trapezoid(rest.current_a, rest.time_s)) / SECONDS_PER_HOUR
-        soc += flowed_ah / self.cell.capacity_ah
+        soc += rest.charge_ah / self.cell.capacity_ah
         words = f"{self.record.name} rests at {begins:.3f} V"
         if abs(voltage - begins) > READING_V:
             words += f", relaxing to {voltage:.3f} +/- {sd_v:.3f} V"

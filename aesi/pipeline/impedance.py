@@ -23,7 +23,9 @@ BAND_HZ = (0.01, 100.0)
 """Between them spectra are judged: above, leads and sensors; below, an open-circuit potential's slope."""
 
 INSTANT_HZ = 10.0
-"""Above it double layers carry a notable part of the current in most cells."""
+"""Above it a note says that a model has no double layers. A convention: at half charge and 25 degC the effect of that
+name lowers |Z| at 10 Hz by a factor of 1.08 (Panasonic NCR18650PF) to 6.4 (the virtual NMC cell), at 1 Hz of 1.01 to
+1.5."""
 NO_DOUBLE_LAYER = (
     f"neither the cell's file nor an effect brings double layers (--effect double_layer does), so that kinetics answer "
     f"at once: above some {INSTANT_HZ:g} Hz there is no arc, and |Z| is too large."

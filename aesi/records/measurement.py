@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.over_time import extent, over_time
@@ -88,6 +89,11 @@ class Measurement:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    @property
+    def charge_ah(self) -> float:
+        """Charge taken out over the record, its current in straight lines between rows."""
+        return float(np.trapezoid(self.current_a, self.time_s)) / SECONDS_PER_HOUR
 
     def __repr__(self) -> str:
         warm = "" if self.temperature_degc is None else ", with temperature"

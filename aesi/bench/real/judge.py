@@ -15,7 +15,7 @@ from aesi.bench.real.answers import initial_state_row, scored
 from aesi.bench.real.beside import capacity_row, course_row, witness_row
 from aesi.bench.real.case import RealCase, Take
 from aesi.bench.real.faults import declared_with_fault, soc0_with_fault, with_fault
-from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
 from aesi.data.spectra import read_spectra
@@ -105,9 +105,9 @@ def _known(case: RealCase, data: Measurement, declared: Cell) -> Known:
         reference_degc = declared.initial_temperature_k - ZERO_CELSIUS_K
         truth["ambient_temperature.shift_k"] = float(np.mean(course)) - reference_degc
     if case.against is not None:
-        other_ah = _charge_ah(record(case.against))
+        other_ah = record(case.against).charge_ah
         by_file = case.measured == "declared capacity"
-        lost = 1 - (other_ah / declared.capacity_ah if by_file else _charge_ah(data) / other_ah)
+        lost = 1 - (other_ah / declared.capacity_ah if by_file else data.charge_ah / other_ah)
     spectra = () if case.spectra is None else read_spectra(locate(case.take.set, case.spectra))
     return Known(truth, course, lost, spectra)
 
@@ -140,10 +140,6 @@ def record(take: Take) -> Measurement:
     if take.set in ("about_energy_nmc", "lg_m50t_w8"):
         columns = None  # these have no such column
     return read_measurement(path, columns, max_rows=MOST_ROWS, stop_s=take.stop_s)
-
-
-def _charge_ah(data: Measurement) -> float:
-    return float(np.trapezoid(data.current_a, data.time_s)) / SECONDS_PER_HOUR
 
 
 def _residual(found: Discovery) -> dict[str, list[float]]:

@@ -16,7 +16,7 @@ MOVING_V = 4e-3
 """A voltage that moves more over these is that of the last of them. A convention: a full cell falls by 6 to 30 mV."""
 
 
-def first_minute_v(rest_v: Array) -> float:
+def first_rows_v(rest_v: Array) -> float:
     """V at which a rest begins: the mean of its first rows, of their last quarter where it moves."""
     calm = rest_v[:CALM_ROWS]
     part = len(calm) // 4

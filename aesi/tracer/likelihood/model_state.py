@@ -20,7 +20,7 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.growth import Explanation, linear_values
 
 HALF_FULL = 0.5
-"""State of charge from which a smaller one is the safer to simulate."""
+"""State of charge from which a smaller one is the safer to simulate: the middle, whatever the cell."""
 
 
 @dataclass(frozen=True, eq=False)
