@@ -67,7 +67,7 @@ def bounds(name: str, text: str | None) -> tuple[float, float] | None:
 
 
 def record_name(path: str | Path) -> str:
-    """What the record of a file is called: `W8_0.5C` of `tests/W8_0.5C.csv.gz`."""
+    """What the record of a file is called: W8_0.5C of W8_0.5C.csv.gz."""
     path = Path(path)
     while path.suffix.lower() in SUFFIXES:
         path = path.with_suffix("")
