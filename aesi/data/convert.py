@@ -10,10 +10,13 @@ import numpy as np
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.read import read
 from aesi.data.reading import Reading
+from aesi.data.written import write_csv
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
+DIGITS = 10
+"""Of what is written, besides the time: more than any instrument has."""
 WrittenLayout = Literal["aesi", "bdf"]
 BDF_NAMES = {
     "time_s": "Test Time / s",
@@ -36,8 +39,7 @@ def convert_file(
         table["current_a"] = 0.0 - record.current_a
         table = table[[name for name in BDF_NAMES if name in table]].rename(columns=BDF_NAMES)
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        table.to_csv(out, index=False, float_format="%.10g")
+        write_csv(out, table, DIGITS)
     except OSError as error:
         raise DataError(f"{out} cannot be written: {error.strerror or error}.") from None
     return record

@@ -9,7 +9,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from aesi.data.convert import DIGITS
 from aesi.data.read import Sign, read_measurement
+from aesi.data.written import write_csv
 from aesi.errors import DataAway, DataError
 
 TIMEOUT_S = 30
@@ -47,7 +49,7 @@ def fetch(remote: Remote, folder: Path) -> Path:
                 shutil.copyfile(raw, ready)
             else:
                 record = read_measurement(raw, remote.columns, remote.sign, max_rows=None)
-                record.to_frame().to_csv(ready, index=False, float_format="%.10g")
+                write_csv(ready, record.to_frame(), DIGITS)
             os.replace(ready, target)
     except DataError:
         raise

@@ -15,6 +15,7 @@ from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
 from aesi.pipeline.product.declared import declared_model
+from aesi.whole_files import write_whole
 
 Target = Literal["bpx", "pybamm"]
 SUFFIX = {"bpx": ".json", "pybamm": ".py"}
@@ -142,8 +143,7 @@ def _said(effect: ActiveEffect) -> str:
 
 def _write(path: Path, text: str) -> Path:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
     return path

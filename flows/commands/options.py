@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
@@ -182,6 +182,7 @@ def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
         name, equals, value = pair.partition("=")
         if not equals:
             raise InputError(f"{option} {pair}: has to read name=value.")
+        _check_once(option, name.strip(), mapping)
         mapping[name.strip()] = value
     return mapping
 
@@ -195,14 +196,16 @@ def measurements(
     """
     from aesi.data.read import read
 
-    ends = dict(until or {})
-    out = []
-    for path in paths:
-        end = ends.pop(record_name(path), None)
-        out.append(read(path, reading if end is None else reading.but(stop_s=end)).held(hold))
-    if ends:
-        raise InputError(f"--until {next(iter(ends))}=...: no --data file has this name.")
-    return tuple(out)
+    ends = until or {}
+    names = [record_name(path) for path in paths]
+    for name in ends:
+        if names.count(name) != 1:
+            found = f"{names.count(name)} --data files have" if name in names else "no --data file has"
+            raise InputError(f"--until {name}=...: {found} this name.")
+    return tuple(
+        read(path, reading.but(stop_s=ends[name]) if name in ends else reading).held(hold)
+        for path, name in zip(paths, names, strict=True)
+    )
 
 
 def record_name(path: str | Path) -> str:
@@ -235,12 +238,20 @@ def _by_file(
     for pair in pairs or []:
         file, equals, text = pair.rpartition("=")
         try:
-            out[record_name(file)] = read(text)
+            value = read(text)
         except ValueError:
             equals = ""
         if not equals or not file:
             raise InputError(f"{option} {pair}: has to read FILE={form}.")
+        _check_once(option, record_name(file), out)
+        out[record_name(file)] = value
     return out
+
+
+def _check_once(option: str, name: str, said: Collection[str]) -> None:
+    """Raises InputError for a name of which an option has spoken before: one of the two would be lost."""
+    if name in said:
+        raise InputError(f"{option} {name}=...: it is given twice; leave one out.")
 
 
 def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:

@@ -26,6 +26,7 @@ from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
+from aesi.whole_files import write_whole
 from flows.base import codec
 from flows.tracking.experiment_log import DECLARED, INPUTS, RECORDS, candidate_metrics, coefficients
 from flows.tracking.store import KIND, PARENT, Store
@@ -109,7 +110,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         "tracked": dict(rebuilt.tracked),
         "coefficients": coefficients(rebuilt.candidate),
     }
-    (out / "candidate.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    write_whole(out / "candidate.json", json.dumps(content, indent=1))
     return out / "model"
 
 

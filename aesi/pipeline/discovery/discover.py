@@ -26,6 +26,7 @@ from aesi.tracer.discovery import Progress
 from aesi.tracer.report.outcome import Errors, Part, State
 from aesi.tracer.report.own_parameters import OwnParameter
 from aesi.tracer.report.yardstick import POINTS_TO, Pointer
+from aesi.whole_files import write_whole
 
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
@@ -136,9 +137,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     from aesi.pipeline.report import write_discovery_report
 
     content = discovery_content(found, case.notes)
-    out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(content, indent=1, allow_nan=False)
-    (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
+    write_whole(out / "discovery.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
     found_model(found).save(out / "model")
     title = ", ".join(m.name for m in case.measurements)
     write_discovery_report(out / "report.html", view(found, content, title, mlflow_run_id))

@@ -24,6 +24,7 @@ from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.pipeline.report.words.runs import run_finding
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
+from aesi.whole_files import write_whole
 
 SCHEMA = "aesi.summary/1"
 VERSIONS = ("aesi", "numpy", "scipy", "scikit-learn", "optuna", "mlflow", "prefect")
@@ -86,11 +87,10 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     }
     hybrid(result).save(folder / "model")
     for format in ("md", "tex"):
-        (folder / f"tables.{format}").write_text(tables.render(rows, format), encoding="utf-8")
+        write_whole(folder / f"tables.{format}", tables.render(rows, format))
     write_run_report(folder / "report.html", view)
     write_figures(folder / "figures" / "paper.html", f"{view.experiment}: figures", paper_figures(view))
-    text = json.dumps(summary, indent=1, allow_nan=False)
-    (folder / "summary.json").write_text(text, encoding="utf-8")
+    write_whole(folder / "summary.json", json.dumps(summary, indent=1, allow_nan=False))
     return summary
 
 
