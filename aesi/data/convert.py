@@ -13,6 +13,7 @@ from aesi.data.reading import Reading
 from aesi.data.written import write_csv
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
+from aesi.over_time import extent
 from aesi.records import Measurement
 
 DIGITS = 10
@@ -51,8 +52,7 @@ def record_lines(record: Measurement) -> list[str]:
     charge = record.current_a[1:] * step / SECONDS_PER_HOUR
     out, into = float(np.sum(charge[charge > 0])), float(np.sum(-charge[charge < 0]))
     lines = [
-        f"{len(record):,} rows over {(record.time_s[-1] - record.time_s[0]) / SECONDS_PER_HOUR:.4g} h, every "
-        f"{np.median(step):.4g} s in the median; {_range(record.voltage_v, 'V')}.",
+        f"{extent(record.time_s)}, every {np.median(step):.4g} s in the median; {_range(record.voltage_v, 'V')}.",
         f"Current {_range(record.current_a, 'A')}, positive on discharge: {out:.4g} Ah discharged, {into:.4g} Ah "
         "charged.",
     ]

@@ -16,7 +16,7 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_belongs
 from aesi.physics.simulation import MODEL_WORDS, ModelName
@@ -100,9 +100,16 @@ def calibrate_files(
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
-    """Raises DataError for a record that is given twice, is too short or holds no current, InputError for a temperature
-    that no cell has."""
+    """Raises DataError for a record that is given twice, is too short or holds no current, InputError for a name that
+    two records have and a temperature that no cell has."""
     check_distinct(measurements)
+    names = [record.name for record in measurements]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"two records are called {name}, by which a calibration tells them apart; rename one of the files, or "
+                "read it as aesi.read_measurement(FILE, name=...)."
+            )
     for record in measurements:
         span_s = float(record.time_s[-1] - record.time_s[0])
         if span_s < SHORTEST_S:

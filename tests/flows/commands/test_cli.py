@@ -13,10 +13,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aesi.data.reading import Reading
 from aesi.errors import InputError
 from flows import cli
-from flows.commands.options import by_file, dates, day, measurements
+from flows.commands.options import dates, day
 
 LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
 
@@ -56,6 +55,10 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         (["ui", "--storage", "sqlite:///s.db"], "give --optuna beside it"),
         (["ui", "--optuna", "--uri", "sqlite:///s.db"], "leave it out beside --optuna"),
         (["ui", "--optuna", "--prefect"], "start one at a time"),
+        (
+            ["data", "convert", "a.csv", "--out", "b.csv", "--unit", "time_s=h", "--unit", "time_s=min"],
+            "--unit is there twice for time_s",
+        ),
         (
             ["impedance", "--cell", LG_M50, "--soc", "0.5", "--frequencies", "1:10", "--out", "z.csv"],
             "--frequencies 1:10: has to read LOW:HIGH:N",
@@ -168,30 +171,13 @@ def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
 
 
 def test_days_of_records_are_read_by_record():
-    assert dates(["folder/pulses.csv.gz=2017-03-11"]) == {"pulses": date(2017, 3, 11)}
+    file = Path("folder/pulses.csv.gz")
+    assert dates([f"{file}=2017-03-11"], [file]) == {"pulses": date(2017, 3, 11)}
     with pytest.raises(InputError, match="has to read FILE=YYYY-MM-DD"):
-        dates(["pulses.csv=yesterday"])
+        dates(["pulses.csv=yesterday"], [file])
     assert day("--as-of", "2017-03-11") == date(2017, 3, 11)
     with pytest.raises(InputError, match="has to read YYYY-MM-DD"):
         day("--as-of", "yesterday")
-
-
-def test_what_is_said_twice_of_one_name_is_refused():
-    with pytest.raises(InputError, match=r"--date pulses=\.\.\.: it is given twice"):
-        dates(["cold/pulses.csv=2017-03-11", "warm/pulses.csv=2017-03-12"])
-    with pytest.raises(InputError, match=r"--temperature pulses=.*given twice"):
-        by_file("--temperature", ["pulses=10", "pulses.csv=25"])
-
-
-def test_an_end_that_two_records_of_one_name_could_have_is_refused(tmp_path):
-    paths = [tmp_path / place / "us06.csv" for place in ("cold", "warm")]
-    for path in paths:
-        path.parent.mkdir()
-        path.write_text("time_s,current_a,voltage_v\n" + "".join(f"{t},1,{4 - 0.01 * t}\n" for t in range(9)))
-    with pytest.raises(InputError, match=r"--until us06=\.\.\.: 2 --data files have this name"):
-        measurements(paths, Reading(), until={"us06": 3.0})
-    (short,) = measurements(paths[:1], Reading(), until={"us06": 3.0})
-    assert short.time_s[-1] == 3.0
 
 
 def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):
@@ -209,7 +195,7 @@ def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
         "simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o/run.csv", "--soc0", 0.6
     )
     assert code == 0, err
-    assert "run.csv: 600 rows over 0.1664 h, 3." in err  # a time in another unit is seen at once
+    assert "run.csv: 600 rows over 599 s, 3." in err  # a time in another unit is seen at once
     table = pd.read_csv(tmp_path / "o/run.csv")
     assert {"time_s", "current_a", "voltage_v", "c_sp", "c_sn", "c_e0", "c_eL", "soc"} <= set(table)
     assert len(table) == 600

@@ -311,7 +311,7 @@ def test_two_rows_at_a_change_of_step_are_one(tmp_path):
     path.write_text("\n".join(doubled))
     record = read_measurement(path)
     assert len(record) == N
-    assert any("1 rows of a stamp" in note for note in record.notes)
+    assert any("1 row was dropped" in note for note in record.notes)
     with pytest.raises(DataError, match="--duplicates"):
         read_measurement(path, duplicates="refuse")
 
