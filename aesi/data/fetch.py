@@ -9,9 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from aesi.data.convert import DIGITS
+from aesi.data.convert import write_csv
 from aesi.data.read import Sign, read_measurement
-from aesi.data.written import write_csv
 from aesi.errors import DataAway, DataError
 
 TIMEOUT_S = 30
@@ -49,7 +48,7 @@ def fetch(remote: Remote, folder: Path) -> Path:
                 shutil.copyfile(raw, ready)
             else:
                 record = read_measurement(raw, remote.columns, remote.sign, max_rows=None)
-                write_csv(ready, record.to_frame(), DIGITS)
+                write_csv(ready, record.to_frame())
             os.replace(ready, target)
     except DataError:
         raise

@@ -17,6 +17,7 @@ from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
 from aesi.errors import DataError, InputError
+from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_belongs
 from aesi.physics.simulation import MODEL_WORDS, ModelName
@@ -27,7 +28,6 @@ from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import Measurement, Spectrum
 from aesi.tracer.case.checks import SHORTEST_S
-from aesi.whole_files import write_whole
 
 SCHEMA = "aesi.calibration/2"
 NAMED_OPEN = 3

@@ -9,13 +9,13 @@ from typing import Any, Literal
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
+from aesi.numerics.files.whole import write_whole
 from aesi.physics import Cell
 from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.folded import folded
 from aesi.physics.model import PLAIN, EspmModel
 from aesi.pipeline.product.declared import declared_model
-from aesi.whole_files import write_whole
 
 Target = Literal["bpx", "pybamm"]
 SUFFIX = {"bpx": ".json", "pybamm": ".py"}

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
-from aesi.data.written import write_csv
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
-from aesi.whole_files import write_whole
+from aesi.numerics.files.whole import write_whole
 from flows.base import codec, environment, fingerprint
 
 T = TypeVar("T")

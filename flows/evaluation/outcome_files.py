@@ -7,7 +7,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from aesi.whole_files import write_whole
+from aesi.numerics.files.whole import write_whole
 
 
 class FileOutcomes:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import AesiError, FitError, InputError
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import weights
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
 from aesi.pipeline.experiment.fit import build_problem, final_models
@@ -26,7 +27,6 @@ from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
-from aesi.whole_files import write_whole
 from flows.base import codec
 from flows.tracking.experiment_log import DECLARED, INPUTS, RECORDS, candidate_metrics, coefficients
 from flows.tracking.store import KIND, PARENT, Store

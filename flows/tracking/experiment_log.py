@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.constants import MV_PER_V
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
@@ -16,7 +17,6 @@ from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ROLES, Failed
 from aesi.sparse import Candidate, Genome, Problem, SparseModel
-from aesi.whole_files import write_whole
 from flows.base import codec
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat

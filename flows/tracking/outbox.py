@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from aesi.whole_files import write_whole
+from aesi.numerics.files.whole import write_whole
 from flows.base.console import first_line
 
 Item = dict[str, Any]

@@ -13,7 +13,7 @@ from types import TracebackType
 
 from filelock import FileLock, Timeout
 
-from aesi.whole_files import READ_BY_OWNER, write_whole
+from aesi.numerics.files.whole import READ_BY_OWNER, write_whole
 from flows.base import environment
 
 

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.array_file import read_arrays
 from aesi.numerics.cache_folder import cache_folder
+from aesi.numerics.files.arrays import read_arrays
+from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
-from aesi.whole_files import write_whole
 
 CHECKSUM = "checksum"
 SHIPPED = Path(__file__).with_name("shipped")

@@ -10,12 +10,12 @@ from typing import Any
 
 from aesi.data.reading import Reading
 from aesi.errors import AesiError
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
 from aesi.pipeline.report.words.discoveries import short_finding
-from aesi.whole_files import write_whole
 
 ROW = "row.json"
 

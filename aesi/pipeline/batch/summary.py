@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.calibration.health import HEALTH_WORDS
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.report.page import write_page
-from aesi.whole_files import write_whole
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

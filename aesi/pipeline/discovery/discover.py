@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from aesi.constants import MV_PER_V
+from aesi.numerics.files.whole import write_whole
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
@@ -26,7 +27,6 @@ from aesi.tracer.discovery import Progress
 from aesi.tracer.report.outcome import Errors, Part, State
 from aesi.tracer.report.own_parameters import OwnParameter
 from aesi.tracer.report.yardstick import POINTS_TO, Pointer
-from aesi.whole_files import write_whole
 
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import InputError
-from aesi.numerics.array_file import read_arrays
+from aesi.numerics.files.arrays import read_arrays
+from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
-from aesi.whole_files import write_whole
 
 SCHEMA = "aesi.model/1"
 HEAD = "model.json"

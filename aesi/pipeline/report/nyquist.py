@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aesi.constants import MILLI
-from aesi.whole_files import write_whole
+from aesi.numerics.files.whole import write_whole
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

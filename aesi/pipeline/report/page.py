@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.digits import resolving
 from aesi.pipeline.report.arrays.embed import ArrayStore, Embedded, embed
 from aesi.pipeline.report.table_formats import ABSENT
-from aesi.whole_files import write_whole
 
 if TYPE_CHECKING:
     from jinja2 import Environment

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from aesi.whole_files import READ_BY_OWNER, write_whole
+from aesi.numerics.files.whole import READ_BY_OWNER, write_whole
 
 
 def test_text_and_bytes_are_written_into_a_folder_that_is_made(tmp_path):
