@@ -17,6 +17,7 @@ from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
 from aesi.errors import DataError, InputError
+from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_belongs
 from aesi.physics.simulation import MODEL_WORDS, ModelName
@@ -88,11 +89,9 @@ def calibrate_files(
     content = calibration_content(
         found, [*(note for m in measurements for note in m.notes), *told], posterior, spectra
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
-    report = out.with_suffix(".report.json")
-    report.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    out.with_suffix(".report.md").write_text(to_text(content), encoding="utf-8")
+    write_whole(out, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
+    write_whole(out.with_suffix(".report.json"), json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_whole(out.with_suffix(".report.md"), to_text(content))
     if spectra:
         from aesi.pipeline.report.nyquist import write_nyquist
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from aesi.constants import MV_PER_V
+from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
 from aesi.errors import DataError, InputError
@@ -28,6 +29,8 @@ from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
 if TYPE_CHECKING:
     import pandas as pd
 
+DIGITS = 9
+"""Of what is written, besides the time (or the frequency)."""
 SayNotes = Callable[[Iterable[str]], None]
 
 
@@ -235,7 +238,6 @@ def _silent(notes: Iterable[str]) -> None:
 
 def _write(path: Path, frame: pd.DataFrame) -> None:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        frame.to_csv(path, index=False, float_format="%.9g")
+        write_csv(path, frame, DIGITS)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None

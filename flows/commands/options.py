@@ -182,6 +182,8 @@ def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
         name, equals, value = pair.partition("=")
         if not equals:
             raise InputError(f"{option} {pair}: has to read name=value.")
+        if name.strip() in mapping:
+            raise InputError(f"{option} is there twice for {name.strip()}; give it once.")
         mapping[name.strip()] = value
     return mapping
 

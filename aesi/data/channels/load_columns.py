@@ -82,7 +82,7 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
         (words,) = table.read_text((mapped.position["state"],))
         way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
         if asked or np.any(way != 0):
-            data["current_a"] = np.where(way == 0, 0.0, way * np.abs(current))
+            data["current_a"] = way * np.abs(current)  # an empty cell stays one, at rest too
             notes.append(note)
             return
     if mapped.bdf_current and reading.sign == "discharge-positive":

@@ -51,6 +51,14 @@ def test_usage_errors_are_exit_code_2(call, arguments):
             "--set changes a key of an experiment file, and none is given",
         ),
         (["predict", "--model", "m", "--current", "d.csv", "--out", "o.xlsx"], "what is written is a CSV"),
+        (["batch", "cells", "--out", "found", "--address", "tcp://here:1"], "give --runner dask beside it"),
+        (["ui", "--storage", "sqlite:///s.db"], "give --optuna beside it"),
+        (["ui", "--optuna", "--uri", "sqlite:///s.db"], "leave it out beside --optuna"),
+        (["ui", "--optuna", "--prefect"], "start one at a time"),
+        (
+            ["data", "convert", "a.csv", "--out", "b.csv", "--unit", "time_s=h", "--unit", "time_s=min"],
+            "--unit is there twice for time_s",
+        ),
         (
             ["impedance", "--cell", LG_M50, "--soc", "0.5", "--frequencies", "1:10", "--out", "z.csv"],
             "--frequencies 1:10: has to read LOW:HIGH:N",

@@ -65,6 +65,8 @@ def assert_same(measurement):
         ),
         pytest.param(text(separator="\t", header='"time_s"\t"current_a"\t"voltage_v"').encode(), id="tabs"),
         pytest.param(b"# made by hand\n\n" + text().encode(), id="comment above"),
+        pytest.param(b"logger\x85 1\n" + text().encode("latin-1"), id="dots in Windows' letters above"),
+        pytest.param(b"page 1\x0c of 1\n" + text().encode(), id="form feed above"),
         pytest.param(text(header=" Time_s , CURRENT_A,voltage_v").encode(), id="other case"),
         pytest.param(gzip.compress(text().encode()), id="gzip"),
     ],
