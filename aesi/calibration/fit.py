@@ -13,6 +13,7 @@ from aesi.calibration.ageing import Ageing
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import Model
 from aesi.calibration.parameters import free_parameters, with_interfaces
+from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
 from aesi.calibration.records.zero import zero_of
 from aesi.calibration.result import (
@@ -67,7 +68,7 @@ def calibrate(
     charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
     of a full discharge.
     dates : days of the records, by name: what is of another day may be of another age.  as_of : of the file's state,
-    the last with a load without it.
+    the last with a load without it.  Records that share a name are numbered in what comes back.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
@@ -112,6 +113,7 @@ def problem(
     """What is fitted, and sentences on how it was set up."""
     if not records:
         raise DataError("give at least one record to calibrate with.")
+    records = named_apart(records, {"--temperature": temperatures_degc, "--date": dates or {}})
     for record in records:
         check_voltage(cell, record)
     start, notes = (cell, ()) if same_cell else sized(cell, records)

@@ -225,6 +225,8 @@ def _complete(name: str, folder: Path) -> bool:
 def _copy(source: Path, out: Path) -> Path:
     try:
         out.mkdir(parents=True, exist_ok=True)
+        if out.samefile(source):
+            return out
         for path in source.iterdir():
             if path.is_file():
                 shutil.copyfile(path, out / path.name)

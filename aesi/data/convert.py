@@ -1,9 +1,9 @@
-"""A measurement in any format that is read, written as CSV: in this project's columns, or in BDF."""
+"""Columns written as CSV; a measurement in any format that is read, in this project's columns or in BDF."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -11,9 +11,18 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.read import read
 from aesi.data.reading import Reading
 from aesi.errors import DataError
+from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
+from aesi.over_time import extent
 from aesi.records import Measurement
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+TIME_DIGITS = 15
+"""What a double holds of any decimal number: a stamp in seconds since 1970 needs ten for its whole seconds alone."""
+DIGITS = 10
+"""Of what is written, besides the time: more than any instrument has."""
 WrittenLayout = Literal["aesi", "bdf"]
 BDF_NAMES = {
     "time_s": "Test Time / s",
@@ -21,6 +30,17 @@ BDF_NAMES = {
     "current_a": "Current / A",
     "temperature_degc": "Surface Temperature T1 / degC",
 }
+
+
+def write_csv(path: Path, table: pd.DataFrame, digits: int = DIGITS) -> None:
+    """Write a table whole, its first column with all digits of its numbers, the others with so many.
+
+    table : the first column is the time in s, or another that rises.  digits : significant ones.
+    Raises OSError where the file cannot be written.
+    """
+    time = table.columns[0]
+    shown = table.assign(**{time: [f"{stamp:.{TIME_DIGITS}g}" for stamp in table[time]]})
+    write_whole(path, shown.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
 
 
 def convert_file(
@@ -36,8 +56,7 @@ def convert_file(
         table["current_a"] = 0.0 - record.current_a
         table = table[[name for name in BDF_NAMES if name in table]].rename(columns=BDF_NAMES)
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        table.to_csv(out, index=False, float_format="%.10g")
+        write_csv(out, table)
     except OSError as error:
         raise DataError(f"{out} cannot be written: {error.strerror or error}.") from None
     return record
@@ -49,8 +68,7 @@ def record_lines(record: Measurement) -> list[str]:
     charge = record.current_a[1:] * step / SECONDS_PER_HOUR
     out, into = float(np.sum(charge[charge > 0])), float(np.sum(-charge[charge < 0]))
     lines = [
-        f"{len(record):,} rows over {(record.time_s[-1] - record.time_s[0]) / SECONDS_PER_HOUR:.4g} h, every "
-        f"{np.median(step):.4g} s in the median; {_range(record.voltage_v, 'V')}.",
+        f"{extent(record.time_s)}, every {np.median(step):.4g} s in the median; {_range(record.voltage_v, 'V')}.",
         f"Current {_range(record.current_a, 'A')}, positive on discharge: {out:.4g} Ah discharged, {into:.4g} Ah "
         "charged.",
     ]

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from aesi.data.convert import write_csv
 from aesi.data.read import Sign, read_measurement
 from aesi.errors import DataAway, DataError
 
@@ -47,7 +48,7 @@ def fetch(remote: Remote, folder: Path) -> Path:
                 shutil.copyfile(raw, ready)
             else:
                 record = read_measurement(raw, remote.columns, remote.sign, max_rows=None)
-                record.to_frame().to_csv(ready, index=False, float_format="%.10g")
+                write_csv(ready, record.to_frame())
             os.replace(ready, target)
     except DataError:
         raise

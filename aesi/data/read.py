@@ -14,7 +14,7 @@ from aesi.data.channels.load_columns import load_columns
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.table import TableFile
-from aesi.data.reading import Duplicates, Reading
+from aesi.data.reading import Duplicates, Reading, record_name
 from aesi.data.resample import decimate
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
@@ -26,7 +26,6 @@ MAX_ROWS = 2_000_000
 """A tenth of a second for two days; more rows are decimated, and a note says so."""
 WARMEST_START_DEGC = 62.0
 """Tests of cells are at most at 60 degC; a room is at 68 to 77 degF."""
-SUFFIXES = (".gz", ".csv", ".txt", ".tsv", ".bdf", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax")
 
 
 def read_measurement(
@@ -49,7 +48,7 @@ def read_measurement(
     columns : quantity -> the file's name for it, for those not named time_s, current_a, voltage_v,
         temperature_degc (optional), as in BDF or as in a known cycler's export; None leaves the temperature out.
     sign : which direction of the file's current is positive; None: as the known export has it, else discharge.
-        BDF columns have their own, charge positive.
+        BDF's is charge positive.
     max_rows : more rows than this are decimated (interval averages); None keeps all.
     units : quantity -> unit of the file's column, where it is not SI: {"current_a": "mA", "time_s": "h:m:s"}.
     state : the column that says which way a current without a sign flows.
@@ -107,7 +106,7 @@ def measurement_in(
         current_a=data["current_a"],
         voltage_v=data["voltage_v"],
         temperature_degc=data.get("temperature_degc"),
-        name=name or _stem(table.path),
+        name=name or record_name(table.path),
         source=str(table.path),
         notes=tuple(f"{context.file}: {note}" for note in notes),
     )
@@ -130,9 +129,8 @@ def _doubts(temperature_degc: Array) -> list[str]:
 
 
 def _sign_advice(mapped: Mapped, reading: Reading) -> str:
-    if mapped.bdf_current:
-        name = mapped.header["current_a"]
-        return f'; if this BDF file breaks the BDF sign, map its column: --column current_a="{name}"'
+    if mapped.bdf_current and reading.sign is None:
+        return "; if this file breaks the sign of BDF, positive on charge: --sign discharge-positive"
     told = reading.sign or mapped.maker_sign or "discharge-positive"
     other = "charge-positive" if told == "discharge-positive" else "discharge-positive"
     who = (
@@ -143,9 +141,3 @@ def _sign_advice(mapped: Mapped, reading: Reading) -> str:
         else "was assumed"
     )
     return f": {told} {who}; give --sign {other} if the file is meant so"
-
-
-def _stem(path: Path) -> str:
-    while path.suffix.lower() in SUFFIXES:
-        path = path.with_suffix("")
-    return path.name

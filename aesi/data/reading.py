@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 from aesi.data.readers.formats.format import Sign
@@ -11,6 +12,8 @@ from aesi.data.state import Direction
 from aesi.errors import DataError
 
 Duplicates = Literal["refuse", "first", "last"]
+SUFFIXES = (".gz", ".csv", ".txt", ".tsv", ".bdf", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax")
+"""Of files, not of what their records are called."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,23 @@ def bounds(name: str, text: str | None) -> tuple[float, float] | None:
         return float(first), float(last or first)
     except ValueError:
         raise DataError(f"{name} = {text!r} has to be a number, or from:to, as in 3 or 3:5.") from None
+
+
+def record_name(path: str | Path) -> str:
+    """What the record of a file is called: W8_0.5C of W8_0.5C.csv.gz."""
+    path = Path(path)
+    while path.suffix.lower() in SUFFIXES:
+        path = path.with_suffix("")
+    return path.name
+
+
+def record_names(paths: Sequence[Path]) -> list[str]:
+    """What the records of several files are called; those of one name have that of their folder in front of it."""
+    names = [record_name(path) for path in paths]
+    return [
+        name if names.count(name) == 1 else f"{path.resolve().parent.name} {name}"
+        for path, name in zip(paths, names, strict=True)
+    ]
 
 
 def _check_choice(what: str, value: str | None, choices: tuple[str, ...]) -> None:

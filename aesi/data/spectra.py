@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -9,9 +10,10 @@ import numpy as np
 
 from aesi.data.readers import open_table
 from aesi.errors import DataError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import AnyArray, Array
 from aesi.records import Spectrum
 
+LABEL = "spectrum"
 NEEDED = ("frequency_hz", "z_real_ohm", "z_imag_ohm")
 STATES = ("soc", "discharged_ah")
 DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
@@ -20,8 +22,9 @@ DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
 def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     """The spectra of a CSV with frequency_hz, z_real_ohm, z_imag_ohm, and soc or discharged_ah.
 
-    Rows belong to one spectrum as long as these states (and `spectrum`, where there is one of numbers) stay the same;
-    the imaginary part is negative where capacitive. voltage_v and temperature_degc are kept where they are there.
+    Rows belong to one spectrum as long as these states, and the names in a column `spectrum` where there is one, stay
+    the same; the imaginary part is negative where capacitive. voltage_v and temperature_degc are kept where they are
+    there, the temperature as the mean over the rows.
     Raises DataError naming file and column.
     """
     table = open_table(path)
@@ -34,18 +37,24 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
         )
     names = [name for name in (*NEEDED, *DESCRIBED) if name in header]
     columns = dict(zip(names, table.read(tuple(header.index(name) for name in names)), strict=True))
+    if not len(columns["frequency_hz"]):
+        raise DataError(f"{file} has no row below its header; a spectrum needs at least one.")
     for name, values in columns.items():
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
             raise DataError(f"{file}, {table.where(row)}, column {name}: not a number.")
     if not (columns["frequency_hz"] > 0.0).all():
         raise DataError(f"{file}, column frequency_hz: a frequency has to be positive.")
-    return tuple(_spectrum(file, k, columns, rows) for k, rows in enumerate(_pieces(columns)))
+    told_apart: list[AnyArray] = [columns[name] for name in STATES if name in columns]
+    if LABEL in header:
+        told_apart += [np.array(words) for words in table.read_text((header.index(LABEL),))]
+    return tuple(_spectrum(file, k, columns, rows) for k, rows in enumerate(_pieces(told_apart)))
 
 
-def _pieces(columns: dict[str, Array]) -> list[slice]:
-    state = columns["soc"] if "soc" in columns else columns["discharged_ah"]
-    cuts = [0, *(np.flatnonzero(np.diff(state) != 0.0) + 1).tolist(), len(state)]
+def _pieces(told_apart: Sequence[AnyArray]) -> list[slice]:
+    """Runs of rows over which each of the columns (n,) stays the same."""
+    changes = np.any([column[1:] != column[:-1] for column in told_apart], axis=0)
+    cuts = [0, *(np.flatnonzero(changes) + 1).tolist(), len(told_apart[0])]
     return [slice(a, b) for a, b in pairwise(cuts)]
 
 

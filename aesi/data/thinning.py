@@ -94,10 +94,13 @@ class Averaged(Measurement):
 def averaged_over(data: Measurement, step_s: float) -> Measurement:
     """At most one sample in `step_s`: centred averages of current, voltage and temperature.
 
-    Records sampled more slowly than 0.75 of `step_s` on average are returned as they are.
+    Records sampled more slowly than 0.75 of `step_s` on average, and those shorter than a window, are returned as they
+    are.
     """
+    if len(data) < 2:
+        return data
     factor = round(step_s / float(np.median(np.diff(data.time_s))))
-    if factor < 2:
+    if factor < 2 or len(data) <= factor:
         return data
     window = Window(factor)
     time = window.centres(data.time_s)

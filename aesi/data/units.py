@@ -118,7 +118,8 @@ def dates_to_s(cells: Sequence[str], pattern: str) -> Array:
     import pandas as pd
 
     form = "ISO8601" if pattern == DATE else pattern
-    stamps = pd.to_datetime(pd.Series(cells).str.strip(), format=form, errors="coerce")
+    # In UTC: a record that runs over a change to summer time holds two offsets, which pandas refuses otherwise.
+    stamps = pd.to_datetime(pd.Series(cells).str.strip(), format=form, errors="coerce", utc=True)
     first = stamps.dropna()
     if first.empty:
         return np.full(len(cells), np.nan)

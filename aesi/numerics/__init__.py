@@ -1,4 +1,5 @@
 """Arrays in, arrays out: numpy, scipy and numba only; nothing here knows a cell or a flow.
 
-`compiled` and `cache_folder` say where machine code and made data are kept; nothing else knows a file.
+`compiled` and `cache_folder` say where machine code and made data are kept, `files` writes and reads whole files;
+nothing else knows one.
 """

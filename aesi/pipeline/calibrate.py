@@ -16,7 +16,8 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
+from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_belongs
 from aesi.physics.simulation import MODEL_WORDS, ModelName
@@ -88,11 +89,9 @@ def calibrate_files(
     content = calibration_content(
         found, [*(note for m in measurements for note in m.notes), *told], posterior, spectra
     )
-    out.parent.mkdir(parents=True, exist_ok=True)
-    out.write_text(json.dumps(found.cell.to_bpx(), indent=1) + "\n", encoding="utf-8")
-    report = out.with_suffix(".report.json")
-    report.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    out.with_suffix(".report.md").write_text(to_text(content), encoding="utf-8")
+    write_whole(out, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
+    write_whole(out.with_suffix(".report.json"), json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_whole(out.with_suffix(".report.md"), to_text(content))
     if spectra:
         from aesi.pipeline.report.nyquist import write_nyquist
 
@@ -101,9 +100,16 @@ def calibrate_files(
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
-    """Raises DataError for a record that is given twice, is too short or holds no current, InputError for a temperature
-    that no cell has."""
+    """Raises DataError for a record that is given twice, is too short or holds no current, InputError for a name that
+    two records have and a temperature that no cell has."""
     check_distinct(measurements)
+    names = [record.name for record in measurements]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"two records are called {name}, by which a calibration tells them apart; rename one of the files, or "
+                "read it as aesi.read_measurement(FILE, name=...)."
+            )
     for record in measurements:
         span_s = float(record.time_s[-1] - record.time_s[0])
         if span_s < SHORTEST_S:

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
+from aesi.numerics.files.whole import write_whole
 from aesi.physics import Cell
 from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.effect import ActiveEffect
@@ -142,8 +143,7 @@ def _said(effect: ActiveEffect) -> str:
 
 def _write(path: Path, text: str) -> Path:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
+        write_whole(path, text)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None
     return path

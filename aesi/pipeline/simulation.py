@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.constants import MV_PER_V
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
-from aesi.data.reading import Reading
+from aesi.data.reading import Reading, record_name
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
@@ -27,6 +28,8 @@ from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
 if TYPE_CHECKING:
     import pandas as pd
 
+DIGITS = 9
+"""Of what is written, besides the time (or the frequency)."""
 SayNotes = Callable[[Iterable[str]], None]
 
 
@@ -68,7 +71,13 @@ def simulate_file(
     check_belongs(declared.cell, [record])
     used = replace(declared, effects=active, hold=taken, model=model or declared.model)
     start = _start(used, record, soc0)
-    say([start.sentence, hold_sentence(record.name, taken, hold is not None)])
+    say(
+        [
+            start.sentence,
+            hold_sentence(record.name, taken, hold is not None),
+            temperature_sentence(declared.cell, record, active),
+        ]
+    )
     run = simulate(
         declared.cell,
         profile.time_s,
@@ -114,7 +123,13 @@ def predict_file(
     record = _record(profile, current, hold)
     check_belongs(hybrid.cell, [record])
     start = _start(hybrid, record, soc0)
-    say([start.sentence, hold_sentence(record.name, hybrid.hold, hold is not None)])
+    say(
+        [
+            start.sentence,
+            hold_sentence(record.name, hybrid.hold, hold is not None),
+            temperature_sentence(hybrid.cell, record, hybrid.effects),
+        ]
+    )
     prediction = hybrid.predict(
         profile.time_s,
         profile.current_a,
@@ -151,6 +166,19 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
         if np.any(rows):
             said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")
     return said
+
+
+def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[ActiveEffect]) -> str:
+    """At what temperature a record is simulated, and on what that rests."""
+    if record.temperature_degc is None:
+        degc = cell.initial_temperature_k - ZERO_CELSIUS_K
+        taken = f"no temperature in it; taken at {degc:.4g} degC, as the cell's file declares"
+    else:
+        low, high = float(np.min(record.temperature_degc)), float(np.max(record.temperature_degc))
+        taken = f"at its measured temperature, {low:.1f} to {high:.1f} degC"
+    changing = [active.id for active in effects if active.effect.infers == "temperature"]
+    beside = f"; {' and '.join(changing)} may change it" if changing else ""
+    return f"{record.name}: {taken}{beside}."
 
 
 def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> list[str]:
@@ -200,7 +228,7 @@ def _record(profile: CurrentProfile, file: Path, hold: Hold | None) -> Measureme
         profile.current_a,
         voltage,
         profile.temperature_degc,
-        file.name.split(".")[0],
+        record_name(file),
         hold=hold,
     )
 
@@ -222,7 +250,6 @@ def _silent(notes: Iterable[str]) -> None:
 
 def _write(path: Path, frame: pd.DataFrame) -> None:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        frame.to_csv(path, index=False, float_format="%.9g")
+        write_csv(path, frame, DIGITS)
     except OSError as error:
         raise InputError(f"{path} cannot be written: {error.strerror or error}.") from None

@@ -1,1 +1,1 @@
-"""What every other folder stands on: environment, console, files that are whole, content keys, stored stages."""
+"""What every other folder stands on: environment, console, content keys, stored stages."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+from aesi.numerics.files.whole import write_whole
 from flows.base import codec, environment, fingerprint
-from flows.base.files import write_atomically
 
 T = TypeVar("T")
 
@@ -38,7 +38,7 @@ class Cache:
                 return found
         result = compute()
         try:
-            write_atomically(path, codec.dumps(result))
+            write_whole(path, codec.dumps(result))
         except codec.Uncodable:
             pass  # a fitted object of another library: cheap to make again, unsafe to unpickle
         except OSError as error:

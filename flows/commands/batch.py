@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 import typer
 
+from aesi.errors import InputError
 from flows.commands import options, outputs
 
 
@@ -34,13 +35,17 @@ def batch(
         Literal["local", "dask"], typer.Option(help="Processes here, or a Dask cluster.")
     ] = "local",
     address: Annotated[
-        str | None, typer.Option(help="Dask scheduler; without it a cluster on this machine.")
+        str | None,
+        typer.Option(help="Dask scheduler, with --runner dask; without it a cluster on this machine."),
     ] = None,
 ) -> None:
     """One discovery a cell, a summary of all; check-ups of one specimen as a trend. Goes on where it was stopped."""
     outputs.check_folder(out)
+    if address is not None and runner != "dask":
+        raise InputError(
+            f"--address {address} names a Dask scheduler; give --runner dask beside it, or leave it out."
+        )
     options.say_reading([source])
-    from aesi.errors import InputError
     from aesi.pipeline.batch.job import Settings
     from flows.jobs.batch import batch as run
 

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
 from flows.commands import options, outputs
 
@@ -48,9 +47,10 @@ def simulate(
         model=model,
         self_heating=self_heating,
     )
+    from aesi.over_time import extent
+
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
-    hours = float(run.time_s[-1] - run.time_s[0]) / SECONDS_PER_HOUR
-    typer.echo(f"{out}: {len(run.time_s):,} rows over {hours:.4g} h, {low:.3f} to {high:.3f} V", err=True)
+    typer.echo(f"{out}: {extent(run.time_s)}, {low:.3f} to {high:.3f} V", err=True)
 
 
 @options.reads_files
@@ -142,8 +142,8 @@ def calibrate(
 
     request = Request(
         soc0=soc0,
-        temperatures_degc=options.by_file("--temperature", temperature),
-        dates=options.dates(dates),
+        temperatures_degc=options.by_file("--temperature", temperature, data),
+        dates=options.dates(dates, data),
         as_of=options.day("--as-of", as_of),
         impedance=options.spectra(impedance),
         posterior=posterior,
@@ -151,7 +151,7 @@ def calibrate(
         title=title,
         model=model,
     )
-    records = options.measurements(data, reading, hold, options.by_file("--until", until))
+    records = options.measurements(data, reading, hold, options.by_file("--until", until, data))
     flow(cell, records, out, request)
 
 

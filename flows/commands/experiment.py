@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from aesi.errors import InputError
 from flows.commands import options, outputs
 
 Experiment = Annotated[Path, typer.Argument(help="An experiment file, for instance experiments/smoke.yaml.")]
@@ -128,6 +129,16 @@ def ui(
     ] = None,
 ) -> None:
     """The MLflow UI on the tracking store in use, Optuna's dashboard on the searches, or Prefect on the flow runs."""
+    if storage is not None and not optuna:
+        raise InputError(
+            "--storage is a database for Optuna's dashboard; give --optuna beside it, or leave it out."
+        )
+    if uri is not None and (optuna or prefect):
+        raise InputError(
+            "--uri names the store of the MLflow UI; leave it out beside --optuna and --prefect."
+        )
+    if optuna and prefect:
+        raise InputError("--optuna and --prefect are two pages; start one at a time.")
     from flows.results.ui import serve, serve_flows, serve_studies
 
     if prefect:

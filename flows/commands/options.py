@@ -182,6 +182,8 @@ def _pairs(option: str, pairs: list[str] | None) -> dict[str, str]:
         name, equals, value = pair.partition("=")
         if not equals:
             raise InputError(f"{option} {pair}: has to read name=value.")
+        if name.strip() in mapping:
+            raise InputError(f"{option} is there twice for {name.strip()}; give it once.")
         mapping[name.strip()] = value
     return mapping
 
@@ -194,30 +196,23 @@ def measurements(
     until : seconds up to which single records are read, by their names.
     """
     from aesi.data.read import read
+    from aesi.data.reading import record_names
 
-    ends = dict(until or {})
     out = []
-    for path in paths:
-        end = ends.pop(record_name(path), None)
-        out.append(read(path, reading if end is None else reading.but(stop_s=end)).held(hold))
-    if ends:
-        raise InputError(f"--until {next(iter(ends))}=...: no --data file has this name.")
+    for path, name in zip(paths, record_names(paths), strict=True):
+        end = (until or {}).get(name)
+        out.append(read(path, reading if end is None else reading.but(stop_s=end), name=name).held(hold))
     return tuple(out)
 
 
-def record_name(path: str | Path) -> str:
-    """What a record of this file is called."""
-    return Path(path).name.split(".")[0]
+def by_file(option: str, pairs: list[str] | None, paths: list[Path]) -> dict[str, float]:
+    """`FILE=NUMBER` pairs as numbers by record of the files `paths`."""
+    return _by_file(option, pairs, paths, float, "NUMBER")
 
 
-def by_file(option: str, pairs: list[str] | None) -> dict[str, float]:
-    """`FILE=NUMBER` pairs as numbers by record."""
-    return _by_file(option, pairs, float, "NUMBER")
-
-
-def dates(pairs: list[str] | None) -> dict[str, date]:
-    """`--date FILE=YYYY-MM-DD` pairs as days by record."""
-    return _by_file("--date", pairs, date.fromisoformat, "YYYY-MM-DD")
+def dates(pairs: list[str] | None, paths: list[Path]) -> dict[str, date]:
+    """`--date FILE=YYYY-MM-DD` pairs as days by record of the files `paths`."""
+    return _by_file("--date", pairs, paths, date.fromisoformat, "YYYY-MM-DD")
 
 
 def day(option: str, text: str | None) -> date | None:
@@ -229,18 +224,44 @@ def day(option: str, text: str | None) -> date | None:
 
 
 def _by_file(
-    option: str, pairs: list[str] | None, read: Callable[[str], Value], form: str
+    option: str, pairs: list[str] | None, paths: list[Path], read: Callable[[str], Value], form: str
 ) -> dict[str, Value]:
-    out = {}
+    out: dict[str, Value] = {}
     for pair in pairs or []:
         file, equals, text = pair.rpartition("=")
         try:
-            out[record_name(file)] = read(text)
+            value = read(text)
         except ValueError:
             equals = ""
         if not equals or not file:
             raise InputError(f"{option} {pair}: has to read FILE={form}.")
+        name = _record_of(option, file, paths)
+        if name in out:
+            raise InputError(f"{option} is there twice for {name}; give it once.")
+        out[name] = value
     return out
+
+
+def _record_of(option: str, file: str, paths: list[Path]) -> str:
+    """What the record is called that an option means by `file`: a path as in --data, a file's name, or a record's."""
+    from aesi.data.reading import record_name, record_names
+
+    names = record_names(paths)
+    ways: list[list[object]] = [
+        [path.resolve() for path in paths],
+        [*names],
+        [path.name for path in paths],
+        [record_name(path) for path in paths],
+    ]
+    for wanted, there in zip((Path(file).resolve(), file, file, file), ways, strict=True):
+        found = [name for name, one in zip(names, there, strict=True) if one == wanted]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise InputError(
+                f"{option} {file}=...: {len(found)} --data files are called so; give the path of one."
+            )
+    raise InputError(f"{option} {file}=...: there is no such record; there are {', '.join(names)}.")
 
 
 def spectra(paths: list[Path] | None) -> tuple[Spectrum, ...]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from flows.base.files import write_atomically
+from aesi.numerics.files.whole import write_whole
 
 
 class FileOutcomes:
@@ -24,7 +24,7 @@ class FileOutcomes:
             return None
 
     def put(self, key: str, data: bytes) -> None:
-        write_atomically(self._path(key), data)
+        write_whole(self._path(key), data)
 
     def discard(self, key: str) -> None:
         self._path(key).unlink(missing_ok=True)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import AesiError, FitError, InputError
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import weights
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
 from aesi.pipeline.experiment.fit import build_problem, final_models
@@ -109,7 +110,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         "tracked": dict(rebuilt.tracked),
         "coefficients": coefficients(rebuilt.candidate),
     }
-    (out / "candidate.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    write_whole(out / "candidate.json", json.dumps(content, indent=1))
     return out / "model"
 
 

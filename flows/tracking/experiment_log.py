@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.constants import MV_PER_V
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
@@ -17,7 +18,6 @@ from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ROLES, Failed
 from aesi.sparse import Candidate, Genome, Problem, SparseModel
 from flows.base import codec
-from flows.base.files import write_atomically
 from flows.tracking.provenance import versions
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
@@ -44,7 +44,7 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
         tags["aesi.fallback"] = loaded.fallback
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
     tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
-    write_atomically(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
+    write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
     soc0 = next(iter(loaded.soc0.values()), None)
     HybridModel(loaded.cell, loaded.effects, soc0=soc0, model=loaded.model).save(folder / INPUTS / DECLARED)
     tracker.files(folder / INPUTS, INPUTS)

@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+from aesi.numerics.files.whole import write_whole
 from flows.base.console import first_line
-from flows.base.files import write_atomically
 
 Item = dict[str, Any]
 Deliver = Callable[[Item, bool], None]
@@ -64,7 +64,7 @@ class Outbox:
         with self._wake:
             path = self._folder / f"{self._next:08d}.json"
             self._next += 1
-            write_atomically(path, json.dumps(item).encode())
+            write_whole(path, json.dumps(item))
             self._wake.notify_all()
 
     @property

@@ -13,8 +13,8 @@ from types import TracebackType
 
 from filelock import FileLock, Timeout
 
+from aesi.numerics.files.whole import READ_BY_OWNER, write_whole
 from flows.base import environment
-from flows.base.files import write_atomically
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,8 @@ class RunRecord:
 
     def write(self) -> None:
         """Keep it on disk."""
-        write_atomically(_folder() / f"{self.run_id}.json", json.dumps(asdict(self)).encode())
+        # The address of a store may hold a password.
+        write_whole(_folder() / f"{self.run_id}.json", json.dumps(asdict(self)), READ_BY_OWNER)
 
 
 def records(experiment: str | None = None) -> list[RunRecord]:

@@ -74,9 +74,24 @@ def check_time(time_s: Array, context: Context) -> None:
             "keep one row of each, or choose: --duplicates first, or last."
         )
     raise DataError(
-        f"{context.at('time_s', row)}: time runs back from {before:.10g} s to {here:.10g} s; "
-        "one file should hold one continuous test: split it there."
+        f"{context.at('time_s', row)}: time runs back from {before:.10g} s to {here:.10g} s{_disorder(time_s, step)}"
     )
+
+
+def _disorder(time_s: Array, step: Array) -> str:
+    """What kind of times run back, and what to do about it, from '; ' on.
+
+    step : (n - 1,) s between the rows of `time_s`, (n,) s.
+    """
+    first = time_s[1:][step < 0]
+    if len(first) == 1:
+        return "; one file should hold one continuous test: split it there."
+    if np.all(first <= np.min(time_s) + np.median(np.abs(step))):
+        return (
+            f", and begins anew {len(first)} times, as the time of a step does: name the column of the whole test's "
+            "time, --column time_s=NAME, or read one step alone, --step NUMBER."
+        )
+    return f", and {len(first)} times in all: sort the rows by their time, or split the file into its tests."
 
 
 def check_ranges(columns: Columns, context: Context) -> None:

@@ -82,9 +82,12 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
         (words,) = table.read_text((mapped.position["state"],))
         way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
         if asked or np.any(way != 0):
-            data["current_a"] = np.where(way == 0, 0.0, way * np.abs(current))
+            data["current_a"] = way * np.abs(current)  # an empty cell stays one, at rest too
             notes.append(note)
             return
+    if mapped.bdf_current and reading.sign == "discharge-positive":
+        notes.append("The current was declared positive on discharge, which BDF's is not; its sign was left.")
+        return
     if mapped.bdf_current:
         notes.append("BDF current is positive on charge; its sign was turned.")
     elif (reading.sign or mapped.maker_sign) != "charge-positive":
@@ -143,7 +146,7 @@ def _window(data: Columns, context: Context, reading: Reading, notes: list[str])
     if len(keep) < len(time):
         ends = [f"before {low:g} s"] * (reading.start_s is not None)
         ends += [f"after {high:g} s"] * (reading.stop_s is not None)
-        notes.append(f"{len(time) - len(keep)} rows {' and '.join(ends)} were left out as asked.")
+        notes.append(f"{_rows(len(time) - len(keep))} left out as asked, {' and '.join(ends)}.")
     return keep_rows(data, context, keep)
 
 
@@ -154,7 +157,10 @@ def _without_duplicates(
     if duplicates == "refuse" or not np.any(same):
         return data, context
     dropped = np.append(same, False) if duplicates == "last" else np.insert(same, 0, False)
-    notes.append(
-        f"{int(np.sum(same))} rows of a stamp that is there twice were dropped, the {duplicates} kept."
-    )
+    notes.append(f"{_rows(int(np.sum(same)))} dropped whose stamp is there twice, the {duplicates} kept.")
     return keep_rows(data, context, np.flatnonzero(~dropped))
+
+
+def _rows(count: int) -> str:
+    """'1 row was', '1,200 rows were'."""
+    return "1 row was" if count == 1 else f"{count:,} rows were"

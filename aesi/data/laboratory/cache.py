@@ -1,6 +1,6 @@
 """Arrays kept on disk under the hash of everything that made them.
 
-An entry is written to a temporary file and renamed, so a killed process leaves no half of one; one that does not
+A killed process leaves no half of an entry; one that does not
 match its own checksum is computed again, and a warning says so.
 """
 
@@ -9,19 +9,17 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
-import tempfile
 import warnings
-import zlib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
 from aesi.errors import DataError
 from aesi.numerics.cache_folder import cache_folder
+from aesi.numerics.files.arrays import read_arrays
+from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
 
 CHECKSUM = "checksum"
@@ -73,28 +71,21 @@ def _load(path: Path) -> dict[str, Array] | None:
     if not path.exists():
         return None
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as entry:
-            arrays = {name: entry[name] for name in entry.files if name != CHECKSUM}
-            intact = str(entry[CHECKSUM]) == _digest(arrays)
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):
-        intact = False
-    if intact:
-        return arrays
+        arrays = read_arrays(path)
+        if str(arrays.pop(CHECKSUM)) == _digest(arrays):
+            return arrays
+    except (OSError, ValueError, KeyError):
+        pass
     warnings.warn(f"The cache entry {path} is damaged; it is computed again.", stacklevel=3)
     return None
 
 
 def _store(path: Path, arrays: dict[str, Array]) -> None:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        try:
-            with os.fdopen(handle, "wb") as stream:
-                content: dict[str, Any] = {**arrays, CHECKSUM: np.array(_digest(arrays))}
-                np.savez_compressed(stream, **content)
-            os.replace(temporary, path)
-        finally:
-            Path(temporary).unlink(missing_ok=True)
+        stream = io.BytesIO()
+        content: dict[str, Any] = {**arrays, CHECKSUM: np.array(_digest(arrays))}
+        np.savez_compressed(stream, **content)
+        write_whole(path, stream.getvalue())
     except OSError as error:
         raise DataError(
             f"The cache folder {path.parent} cannot be written ({error}); set AESI_CACHE to one that can."

@@ -17,8 +17,8 @@ from aesi.numerics.typing import Array
 class FrameTable:
     """Columns in memory; see `aesi.data.readers.table.TableFile`.
 
-    columns : one sequence a column, in the order of `header`.  first_row : number in the file of the first, where
-    rows have numbers there.
+    columns : one sequence a column, in the order of `header`.  row_numbers : of each row in the file,
+    where rows have numbers there.
     """
 
     def __init__(
@@ -28,7 +28,7 @@ class FrameTable:
         columns: Sequence[Any],
         notes: tuple[str, ...] = (),
         units: tuple[str, ...] = (),
-        first_row: int | None = None,
+        row_numbers: Sequence[int] | None = None,
     ) -> None:
         self.path = path
         self.header = tuple(header)
@@ -36,7 +36,7 @@ class FrameTable:
         self.format: Format | None = recognise(self.header)
         self.units = units
         self._columns = columns
-        self._first_row = first_row
+        self._row_numbers = row_numbers
 
     def read(self, positions: tuple[int, ...]) -> list[Array]:
         """The columns at the given positions; an empty cell is NaN."""
@@ -50,7 +50,7 @@ class FrameTable:
 
     def where(self, row: int) -> str:
         """The row, and its number in a sheet."""
-        there = "" if self._first_row is None else f" (row {self._first_row + row} of the sheet)"
+        there = "" if self._row_numbers is None else f" (row {self._row_numbers[row]} of the sheet)"
         return f"row {row + 1}{there}"
 
     def _numbers(self, position: int) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import io
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
@@ -59,7 +60,9 @@ def decoded(head: bytes, name: str) -> tuple[str, str]:
 
 
 def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Collection[str]) -> Layout:
-    lines = text.splitlines()
+    lines = io.StringIO(text, newline=None).read().split("\n")
+    if lines[-1] == "":
+        del lines[-1]  # what follows the end of the last line is none
     if not whole:
         lines = lines[:-1]  # the last one may be cut by the size of the look
     notes: list[str] = []

@@ -41,17 +41,25 @@ class ParquetTable:
                     f"{self.path.name}: column {name!r} holds {kind}, not numbers, from row 1 on; "
                     "store it as float64."
                 )
+        table = self._columns(names)
         try:
-            table = self._file.read(columns=names)
             return [_floats(table.column(name)) for name in names]
-        except (pa.ArrowException, OSError, ValueError) as error:
-            raise DataError(f"{self.path.name} is damaged: {_brief(error)}") from None
+        except pa.ArrowException as error:
+            raise DataError(f"{self.path.name} holds numbers that are no float64: {_brief(error)}") from None
 
     def read_text(self, positions: tuple[int, ...]) -> list[list[str]]:
         """The columns at the given positions as words; null becomes ''."""
         names = [self.header[position] for position in positions]
-        table = self._file.read(columns=names)
+        table = self._columns(names)
         return [["" if v is None else str(v) for v in table.column(name).to_pylist()] for name in names]
+
+    def _columns(self, names: list[str]) -> Any:
+        import pyarrow as pa
+
+        try:
+            return self._file.read(columns=names)
+        except (pa.ArrowException, OSError, ValueError) as error:
+            raise DataError(f"{self.path.name} is damaged: {_brief(error)}") from None
 
     def where(self, row: int) -> str:
         """Parquet has rows, no lines."""

@@ -61,15 +61,16 @@ def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:
 
 def _table(path: Path, sheet: Any, heading: Heading) -> FrameTable:
     start = heading.line + 1 + int(heading.has_units)
-    rows = [
-        row
-        for row in islice(sheet.iter_rows(values_only=True), start, None)
+    numbered = [
+        (number, row)
+        for number, row in enumerate(islice(sheet.iter_rows(values_only=True), start, None), start + 1)
         if any(c is not None for c in row)
     ]
+    rows = [row for _, row in numbered]
     width = len(heading.header)
     columns = [[_plain(row[place]) if place < len(row) else None for row in rows] for place in range(width)]
     notes = (f"Read from the sheet {sheet.title!r}.",)
-    return FrameTable(path, heading.header, columns, notes, heading.units, start + 1)
+    return FrameTable(path, heading.header, columns, notes, heading.units, [number for number, _ in numbered])
 
 
 def _word(cell: Any) -> str:

@@ -174,8 +174,8 @@ class TextTable:
         width = len(self.header)
         if len(cells) != width:
             raise DataError(
-                f"{place}: {len(cells)} cells where the header has {width}; the row is cut short or damaged: "
-                "correct or remove it."
+                f"{place}: {len(cells)} cell{'s' * (len(cells) != 1)} where the header has {width}; the row is cut "
+                "short or damaged: correct or remove it."
             )
         for position in positions:
             cell = cells[position].strip()

@@ -10,6 +10,7 @@ from typing import Any
 
 from aesi.data.reading import Reading
 from aesi.errors import AesiError
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
@@ -44,13 +45,13 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
         key = job.key(settings.key)
         known = _known(folder, key)
         if known is not None:
-            return known
+            return known | _about(job, "done")  # whose check-up it is, and when, may be told otherwise by now
         row = _row(job, folder, settings)
+        write_whole(folder / ROW, json.dumps({"key": key, "row": row}, indent=1) + "\n")
     except AesiError as error:
         return _about(job, "failed") | {"reason": str(error)}
     except OSError as error:
         return _about(job, "failed") | {"reason": f"{error.filename or 'a file'}: {error.strerror or error}"}
-    (folder / ROW).write_text(json.dumps({"key": key, "row": row}, indent=1) + "\n", encoding="utf-8")
     return row
 
 

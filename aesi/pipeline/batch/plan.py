@@ -38,12 +38,13 @@ class Job:
     soh: float | None = None
 
     def key(self, settings: str) -> str:
-        """What identifies the job: the content of its files and the settings it is run with."""
+        """What identifies the job: the content of its files, what each is for, and the settings it is run with."""
         sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
-        for path in (self.cell, *self.data, *self.tests):
-            files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
-            for file in files:
-                sha.update(file.read_bytes())
+        for role, paths in (("cell", (self.cell,)), ("data", self.data), ("tests", self.tests)):
+            for path in paths:
+                files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
+                for file in files:
+                    sha.update(f"|{role}|".encode() + hashlib.sha256(file.read_bytes()).digest())
         return sha.hexdigest()[:16]
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.calibration.health import HEALTH_WORDS
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.report.page import write_page
 
 if TYPE_CHECKING:
@@ -37,10 +38,9 @@ CellRow = Mapping[str, Any]
 
 def write_summary(out: Path, rows: Sequence[CellRow], title: str) -> Path:
     """Write summary.csv, summary.json and index.html to `out`; returns the page."""
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "summary.csv").write_text(_csv(rows), encoding="utf-8")
+    write_whole(out / "summary.csv", _csv(rows))
     content = {"schema": SCHEMA, "jobs": list(rows), "trends": trends(rows)}
-    (out / "summary.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    write_whole(out / "summary.json", json.dumps(content, indent=1) + "\n")
     specimens = trends(rows)
     figures = {"trends": _figure(specimens)} if specimens else {}
     return write_page(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from aesi.data.read import Reading, read
+from aesi.data.reading import record_names
 from aesi.errors import ConfigError
 from aesi.physics import ModelName
 from aesi.physics.belongs import check_belongs
@@ -46,7 +47,8 @@ def case_of_files(
     """
     paths = (*data, *tests, *good)
     rows = MOST_ROWS // max(1, len(paths))
-    records = [read(path, reading or Reading(), max_rows=rows).held(hold) for path in paths]
+    named = zip(paths, record_names(paths), strict=True)
+    records = [read(path, reading or Reading(), rows, name).held(hold) for path, name in named]
     check_belongs(declared_model(cell).with_soh(soh).cell, records)
     return Case(
         cell,

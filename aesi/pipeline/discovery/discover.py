@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from aesi.constants import MV_PER_V
+from aesi.numerics.files.whole import write_whole
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
@@ -136,9 +137,7 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     from aesi.pipeline.report import write_discovery_report
 
     content = discovery_content(found, case.notes)
-    out.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(content, indent=1, allow_nan=False)
-    (out / "discovery.json").write_text(text + "\n", encoding="utf-8")
+    write_whole(out / "discovery.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
     found_model(found).save(out / "model")
     title = ", ".join(m.name for m in case.measurements)
     write_discovery_report(out / "report.html", view(found, content, title, mlflow_run_id))

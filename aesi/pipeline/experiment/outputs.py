@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from aesi.numerics.files.whole import write_whole
 from aesi.physics import ModelName
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
@@ -86,11 +87,10 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     }
     hybrid(result).save(folder / "model")
     for format in ("md", "tex"):
-        (folder / f"tables.{format}").write_text(tables.render(rows, format), encoding="utf-8")
+        write_whole(folder / f"tables.{format}", tables.render(rows, format))
     write_run_report(folder / "report.html", view)
     write_figures(folder / "figures" / "paper.html", f"{view.experiment}: figures", paper_figures(view))
-    text = json.dumps(summary, indent=1, allow_nan=False)
-    (folder / "summary.json").write_text(text, encoding="utf-8")
+    write_whole(folder / "summary.json", json.dumps(summary, indent=1, allow_nan=False))
     return summary
 
 

@@ -7,7 +7,6 @@ model.json holds the schema, the names of the parts and the caller's own values;
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import InputError
+from aesi.numerics.files.arrays import read_arrays
+from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
 
 SCHEMA = "aesi.model/1"
@@ -35,6 +36,8 @@ def write_model(folder: Path, head: Mapping[str, Any], parts: Mapping[str, Any])
         raise InputError(
             f"{folder} cannot be a folder: a file of that name is there; name another."
         ) from None
+    # The head goes first and comes last: without it nobody takes a folder for a model that is half another one's.
+    (folder / HEAD).unlink(missing_ok=True)
     arrays: dict[str, Array] = {}
     for name, content in parts.items():
         _write_json(part_file(folder, name), _without_arrays(content, name, arrays))
@@ -99,7 +102,7 @@ def _with_arrays(value: Any, arrays: Mapping[str, Array]) -> Any:
 
 
 def _write_json(path: Path, content: Any) -> None:
-    path.write_text(json.dumps(content, indent=1, allow_nan=False), encoding="utf-8")
+    write_whole(path, json.dumps(content, indent=1, allow_nan=False))
 
 
 def _read_json(path: Path, hint: str = "save the model again.") -> Any:
@@ -113,7 +116,6 @@ def _read_json(path: Path, hint: str = "save the model again.") -> Any:
 
 def _read_arrays(path: Path) -> dict[str, Array]:
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
-    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        return read_arrays(path)
+    except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read ({error}); save the model again.") from None

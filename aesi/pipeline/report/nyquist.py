@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aesi.constants import MILLI
+from aesi.numerics.files.whole import write_whole
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -58,9 +59,9 @@ def write_nyquist(path: Path, cell: str, spectra: Sequence[SpectrumError]) -> Pa
         figure = nyquist(group)
         parts.append(figure.to_html(full_html=False, include_plotlyjs=False, config={"responsive": True}))
     page = "\n".join(parts)
-    path.write_text(
+    write_whole(
+        path,
         f"<!doctype html><html><head><meta charset='utf-8'><title>{escape(cell)}</title>"
         f"<script>{get_plotlyjs()}</script></head><body>{page}</body></html>\n",
-        encoding="utf-8",
     )
     return path

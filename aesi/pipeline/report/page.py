@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.digits import resolving
 from aesi.pipeline.report.arrays.embed import ArrayStore, Embedded, embed
 from aesi.pipeline.report.table_formats import ABSENT
@@ -43,7 +44,8 @@ def write_page(path: str | Path, template: str, figures: Mapping[str, Figure], *
             report_js=(HERE / "report.js").read_text(encoding="utf-8"),
         )
     )
-    return _put(Path(path), html)
+    write_whole(Path(path), html)
+    return Path(path)
 
 
 def write_plain_page(
@@ -63,7 +65,8 @@ def write_plain_page(
             style_css=(HERE / "report.css").read_text(encoding="utf-8"),
         )
     )
-    return _put(Path(path), html)
+    write_whole(Path(path), html)
+    return Path(path)
 
 
 def _environment() -> Environment:
@@ -78,19 +81,6 @@ def _environment() -> Environment:
     )
     environment.filters |= FILTERS
     return environment
-
-
-def _put(target: Path, html: str) -> Path:
-    """Write the page in one step."""
-    target.parent.mkdir(parents=True, exist_ok=True)
-    draft = target.with_name(target.name + ".part")
-    try:
-        draft.write_text(html, encoding="utf-8")
-        draft.replace(target)
-    except OSError:
-        draft.unlink(missing_ok=True)
-        raise
-    return target
 
 
 def write_figures(path: str | Path, title: str, figures: Mapping[str, Figure]) -> Path:

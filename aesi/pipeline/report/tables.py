@@ -49,7 +49,7 @@ def free_run_table(models: Sequence[Row]) -> Table:
     caption = (
         f"Table 1. Mean squared error reduction (MSER) of the voltage against the declared {physics}, and on the test "
         f"set against the {physics} recalibrated on the training set. Regime: free run, no measured voltage "
-        "is used after the first sample."
+        "is used after the first sample. Time: of fit and evaluation."
     )
     if any(row.get("validation_mser_pct") is not None for row in models):
         caption += " Drives that chose nothing: each training drive by physics and a model that never saw it."

@@ -42,6 +42,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
             sentence
             for sentence in (
                 runs.corrected_finding(view),
+                runs.constant_finding(view),
                 runs.others_finding(view),
                 runs.persistence_finding(chosen),
                 runs.interval_finding(chosen),

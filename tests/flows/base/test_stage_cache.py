@@ -62,6 +62,6 @@ def test_a_full_disk_is_said_and_costs_nothing_else(workspace, said, monkeypatch
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("flows.base.stage_cache.write_atomically", full)
+    monkeypatch.setattr("flows.base.stage_cache.write_whole", full)
     assert Cache(said.append).get("models", ("a",), lambda: Failed("no")) == Failed("no")
     assert "could not be stored (No space left on device)" in said[0]

@@ -51,6 +51,14 @@ def test_usage_errors_are_exit_code_2(call, arguments):
             "--set changes a key of an experiment file, and none is given",
         ),
         (["predict", "--model", "m", "--current", "d.csv", "--out", "o.xlsx"], "what is written is a CSV"),
+        (["batch", "cells", "--out", "found", "--address", "tcp://here:1"], "give --runner dask beside it"),
+        (["ui", "--storage", "sqlite:///s.db"], "give --optuna beside it"),
+        (["ui", "--optuna", "--uri", "sqlite:///s.db"], "leave it out beside --optuna"),
+        (["ui", "--optuna", "--prefect"], "start one at a time"),
+        (
+            ["data", "convert", "a.csv", "--out", "b.csv", "--unit", "time_s=h", "--unit", "time_s=min"],
+            "--unit is there twice for time_s",
+        ),
         (
             ["impedance", "--cell", LG_M50, "--soc", "0.5", "--frequencies", "1:10", "--out", "z.csv"],
             "--frequencies 1:10: has to read LOW:HIGH:N",
@@ -163,9 +171,10 @@ def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
 
 
 def test_days_of_records_are_read_by_record():
-    assert dates(["folder/pulses.csv.gz=2017-03-11"]) == {"pulses": date(2017, 3, 11)}
+    file = Path("folder/pulses.csv.gz")
+    assert dates([f"{file}=2017-03-11"], [file]) == {"pulses": date(2017, 3, 11)}
     with pytest.raises(InputError, match="has to read FILE=YYYY-MM-DD"):
-        dates(["pulses.csv=yesterday"])
+        dates(["pulses.csv=yesterday"], [file])
     assert day("--as-of", "2017-03-11") == date(2017, 3, 11)
     with pytest.raises(InputError, match="has to read YYYY-MM-DD"):
         day("--as-of", "yesterday")
@@ -186,7 +195,7 @@ def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
         "simulate", "--cell", cell, "--current", current, "--out", tmp_path / "o/run.csv", "--soc0", 0.6
     )
     assert code == 0, err
-    assert "run.csv: 600 rows over 0.1664 h, 3." in err  # a time in another unit is seen at once
+    assert "run.csv: 600 rows over 599 s, 3." in err  # a time in another unit is seen at once
     table = pd.read_csv(tmp_path / "o/run.csv")
     assert {"time_s", "current_a", "voltage_v", "c_sp", "c_sn", "c_e0", "c_eL", "soc"} <= set(table)
     assert len(table) == 600

@@ -1,6 +1,5 @@
 """The shared store of outcomes: atomic, claimed by one process at a time, and by nobody who is dead."""
 
-import os
 import subprocess
 import sys
 import threading
@@ -9,7 +8,6 @@ import time
 import pytest
 
 from aesi.errors import InputError
-from flows.base.files import write_atomically
 from flows.evaluation.outcome_database import DatabaseOutcomes
 from flows.evaluation.outcome_files import FileOutcomes
 from flows.evaluation.outcome_store import open_outcomes
@@ -126,17 +124,3 @@ def test_a_database_that_is_not_there_is_one_sentence():
     with pytest.raises(InputError, match=r"runner\.storage .* cannot be used") as caught:
         DatabaseOutcomes("postgresql://me:secret@127.0.0.1:9/none")
     assert "secret" not in str(caught.value)
-
-
-def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch):
-    path = tmp_path / "x"
-    write_atomically(path, b"old")
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OSError, match="No space"):
-        write_atomically(path, b"new")
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]

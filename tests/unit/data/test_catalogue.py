@@ -155,3 +155,12 @@ def test_a_shared_folder_above_the_working_one_is_looked_into(tmp_path, monkeypa
     project.mkdir(parents=True)
     monkeypatch.chdir(project)
     assert catalogue.locate("lg_m50t_w8", "udds") == folder / "udds.csv"
+
+
+def test_a_set_that_is_in_the_folder_already_stays_there(tmp_path, monkeypatch):
+    folder = tmp_path / "lg_m50t_w8"
+    folder.mkdir()
+    (folder / "udds.csv").write_text("x")
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))
+    assert catalogue.get("lg_m50t_w8", folder) == folder
+    assert (folder / "udds.csv").read_text() == "x"

@@ -40,3 +40,13 @@ def test_what_a_record_holds_is_told_with_its_charge(source):
 def test_a_place_that_cannot_be_written_is_one_sentence(source):
     with pytest.raises(DataError, match="cannot be written"):
         convert_file(source, source / "below.csv")
+
+
+def test_stamps_since_1970_are_still_told_apart(tmp_path):
+    path = tmp_path / "logged.csv"
+    time = 1.7e9 + 0.1 * np.arange(50)
+    current = np.where(np.arange(50) % 20 < 10, 1.0, 0.0)
+    table = np.column_stack([time, current, 4.0 - 0.05 * current])
+    np.savetxt(path, table, delimiter=",", header="time_s,current_a,voltage_v", comments="", fmt="%.15g")
+    convert_file(path, tmp_path / "out.csv")
+    np.testing.assert_allclose(np.diff(read_measurement(tmp_path / "out.csv").time_s), 0.1, atol=1e-4)

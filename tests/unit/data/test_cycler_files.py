@@ -311,7 +311,7 @@ def test_two_rows_at_a_change_of_step_are_one(tmp_path):
     path.write_text("\n".join(doubled))
     record = read_measurement(path)
     assert len(record) == N
-    assert any("1 rows of a stamp" in note for note in record.notes)
+    assert any("1 row was dropped" in note for note in record.notes)
     with pytest.raises(DataError, match="--duplicates"):
         read_measurement(path, duplicates="refuse")
 
@@ -427,3 +427,31 @@ def test_a_damaged_file_is_one_sentence(tmp_path, name, module):
     with pytest.raises(DataError, match=name.replace(".", r"\.")) as caught:
         read_measurement(path)
     assert "\n" not in str(caught.value)
+
+
+def test_an_empty_current_of_a_resting_row_is_refused_not_taken_for_none(tmp_path):
+    path = tmp_path / "rest.csv"
+    path.write_text("time_s,current_a,voltage_v,State\n0,1,4,D\n1,1,3.99,D\n2,,4,R\n3,1,3.98,D\n")
+    with pytest.raises(DataError, match=r"row 3 \(line 4\), column current_a is empty"):
+        read_measurement(path, state="State")
+
+
+def test_dates_over_a_change_to_summer_time_run_on(tmp_path):
+    path = tmp_path / "night.csv"
+    path.write_text(
+        "time_s,current_a,voltage_v\n2024-03-31T01:59:59+01:00,1,4\n2024-03-31T03:00:00+02:00,1,3.99\n"
+        "2024-03-31T03:00:01+02:00,1,3.98\n"
+    )
+    np.testing.assert_allclose(read_measurement(path, units={"time_s": "date"}).time_s, [0.0, 1.0, 2.0])
+
+
+def test_blank_rows_of_a_sheet_count_where_a_row_is_named(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    rows = (["time_s", "current_a", "voltage_v"], [0, 1, 4.0], [None], [None], [1, "one", 3.9])
+    for number, row in enumerate(rows, start=1):
+        for column, value in enumerate(row, start=1):
+            book.active.cell(number, column, value)
+    book.save(tmp_path / "gaps.xlsx")
+    with pytest.raises(DataError, match=r"row 2 \(row 5 of the sheet\): column 'current_a' holds 'one'"):
+        read_measurement(tmp_path / "gaps.xlsx")

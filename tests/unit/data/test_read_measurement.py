@@ -65,6 +65,8 @@ def assert_same(measurement):
         ),
         pytest.param(text(separator="\t", header='"time_s"\t"current_a"\t"voltage_v"').encode(), id="tabs"),
         pytest.param(b"# made by hand\n\n" + text().encode(), id="comment above"),
+        pytest.param(b"logger\x85 1\n" + text().encode("latin-1"), id="dots in Windows' letters above"),
+        pytest.param(b"page 1\x0c of 1\n" + text().encode(), id="form feed above"),
         pytest.param(text(header=" Time_s , CURRENT_A,voltage_v").encode(), id="other case"),
         pytest.param(gzip.compress(text().encode()), id="gzip"),
     ],
@@ -128,6 +130,29 @@ def test_one_bad_row_is_named(tmp_path, line, words):
         assert word in message
 
 
+@pytest.mark.parametrize(
+    ("order", "words"),
+    [
+        pytest.param(np.arange(N)[::-1], "199 times in all: sort the rows", id="reversed"),
+        pytest.param(np.random.default_rng(0).permutation(N), "sort the rows by their time", id="shuffled"),
+        pytest.param(
+            np.arange(N) % 50, "begins anew 3 times, as the time of a step does", id="time of a step"
+        ),
+        pytest.param((np.arange(N) - 150) % N, "split it there", id="two tests"),
+    ],
+)
+def test_times_that_run_back_are_told_by_what_they_are(tmp_path, order, words):
+    assert words in refusal(tmp_path, text(time=TIME[order]))
+
+
+def test_a_sign_that_is_declared_is_believed_of_bdf_too(tmp_path):
+    content = text(header="Test Time / s,Current / A,Voltage / V")
+    assert "--sign discharge-positive" in refusal(tmp_path, content)
+    measurement = read_measurement(tmp_path / "drive.csv", sign="discharge-positive")
+    assert_same(measurement)
+    assert any("declared positive on discharge" in note for note in measurement.notes)
+
+
 def test_the_first_bad_row_is_named_below_blank_lines(tmp_path):
     message = refusal(tmp_path, text().replace("\n", "\n\n") + "x,1,2\n")
     assert "row 201 (line 403)" in message
@@ -137,7 +162,7 @@ def test_duplicates_can_be_dropped_and_that_is_said(tmp_path):
     path = written(tmp_path, with_line(6, "3.0,5.0,3.7"))
     measurement = read_measurement(path, duplicates="last")
     assert len(measurement) == N - 1
-    assert any("1 rows" in note for note in measurement.notes)
+    assert any("1 row was dropped" in note for note in measurement.notes)
 
 
 def test_a_gap_is_refused_with_both_ways_out(tmp_path):

@@ -1,6 +1,7 @@
 """The plan of a batch, what a job leaves, and what the summary makes of it."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -92,7 +93,7 @@ def test_what_is_done_is_taken_again_until_a_file_or_a_setting_changes(tmp_path)
     job, settings = Job("a", CELL, (data,)), Settings()
     folder = tmp_path / "out" / "a"
     folder.mkdir(parents=True)
-    kept = {"name": "a", "status": "done", "verdict": "none"}
+    kept = {"name": "a", "specimen": "", "at": None, "status": "done", "verdict": "none"}
     (folder / "row.json").write_text(json.dumps({"key": job.key(settings.key), "row": kept}))
     assert run_job(job, tmp_path / "out", settings) == kept
     assert run_job(job, tmp_path / "out", Settings(seed=1))["status"] == "failed"
@@ -132,3 +133,23 @@ def test_the_summary_has_every_cell_and_the_trend_in_order(tmp_path):
     assert "Resistance of contacts and films" in page
     assert "1 <small>[5, 5]</small>" in page
     assert len((tmp_path / "summary.csv").read_text().splitlines()) == 4
+
+
+def test_a_record_that_judges_is_another_job_than_one_that_is_fitted(tmp_path):
+    fitted, judged = touched(tmp_path / "a.csv"), touched(tmp_path / "b.csv")
+    judged.write_text("y")
+    both = Job("one", CELL, (fitted, judged))
+    assert both.key("") != Job("one", CELL, (fitted,), (judged,)).key("")
+    joined = tmp_path / "c.csv"
+    joined.write_text("xy")
+    assert both.key("") != Job("one", CELL, (joined,)).key("")
+
+
+def test_a_check_up_that_is_dated_anew_keeps_its_finding_and_not_its_date(tmp_path):
+    job = Job("one", CELL, (touched(tmp_path / "a.csv"),), specimen="cell 1", at=10.0)
+    folder = tmp_path / "out" / "one"
+    folder.mkdir(parents=True)
+    row = {"name": "one", "specimen": "cell 1", "at": 10.0, "status": "done", "verdict": "none"}
+    (folder / "row.json").write_text(json.dumps({"key": job.key(Settings().key), "row": row}))
+    again = run_job(replace(job, specimen="cell 2", at=20.0), tmp_path / "out", Settings())
+    assert again == row | {"specimen": "cell 2", "at": 20.0}

@@ -148,6 +148,23 @@ def test_a_profile_alone_was_said_to_start_as_given(model, data, tmp_path):
     assert f"profile starts at the saved model's state of charge of {SOC0:g}; --soc0 takes another." in said
 
 
+def test_the_temperature_that_a_prediction_is_made_at_is_said(model, data, tmp_path):
+    folder, frame = (
+        model.save(tmp_path / "model"),
+        data.to_frame().drop(columns="temperature_degc", errors="ignore"),
+    )
+    for name, columns in (("without", {}), ("with_it", {"temperature_degc": 11.0})):
+        frame.assign(**columns).to_csv(tmp_path / f"{name}.csv", index=False)
+        said = []
+        predict_file(folder, tmp_path / f"{name}.csv", tmp_path / "out.csv", say_notes=said.extend)
+        words = (
+            "at its measured temperature, 11.0 to 11.0 degC"
+            if columns
+            else "no temperature in it; taken at 25 degC"
+        )
+        assert any(note.startswith(f"{name}: {words}") for note in said)
+
+
 def test_a_folder_of_runs_is_asked_about_its_newest_model(model, tmp_path):
     written = model.save(tmp_path / "runs" / "a" / "model")
     for named in (tmp_path / "runs", tmp_path / "runs" / "a"):

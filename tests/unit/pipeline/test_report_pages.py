@@ -134,7 +134,7 @@ def test_the_same_array_is_stored_once():
 def test_an_interrupted_write_leaves_the_old_report(views, tmp_path, monkeypatch):
     path = tmp_path / "r.html"
     path.write_text("old")
-    monkeypatch.setattr("pathlib.Path.replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         write_figures(path, "t", {})
     assert path.read_text() == "old"

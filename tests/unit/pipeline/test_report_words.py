@@ -29,14 +29,33 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}
     learned = replace(view, models=(*view.models, row), corrected="ESPM recalibrated")
     assert runs.corrected_finding(learned) == (
-        "The ESPM recalibrated alone errs by 3.9 mV there: the correction does not help beyond it."
+        "The correction was learnt on the ESPM recalibrated, which alone errs by 3.9 mV there: it does not help beyond "
+        "that."
     )
     better = replace(learned, models=(*view.models, {**row, "free_run": {"test_rmse_mv": 9.0}}))
-    assert "takes it to 4.1 mV, 79.2 % less mean squared error than that" in runs.corrected_finding(better)
+    assert "takes that to 4.1 mV, 79.2 % less mean squared error" in runs.corrected_finding(better)
     assert runs.corrected_finding(view) == ""
     figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
     refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))
     assert "errs by 2.0 mV there: recalibrate it first" in runs.corrected_finding(refit_does)
+
+
+def test_what_a_mere_refit_and_a_constant_leave_stands_beside_the_gain(views):
+    view = views.run_view(200)
+    assert runs.constant_finding(view) == ""
+    figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": 36.0}
+    constant = {"name": "ESPM + constant", "free_run": {"test_rmse_mv": 4.8}}
+    beside = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}, constant))
+    assert runs.corrected_finding(beside).endswith(
+        "errs by 5.0 mV there: the correction leaves 36.0 % less mean squared error than that."
+    )
+    assert "as a constant, leaves 4.8 mV there" in runs.constant_finding(beside)
+    assert runs.constant_finding(replace(beside, chosen="ESPM + constant")) == ""
+
+
+def test_the_band_that_a_simulation_has_is_told_beside_that_of_an_observer(views):
+    told = runs.interval_finding(views.run_view(200).models[1])
+    assert told.endswith("The band in free run covers 91.0 % of them and is 24.0 mV wide.")
 
 
 def test_errors_that_are_told_apart_late_have_more_digits(views):
@@ -44,8 +63,8 @@ def test_errors_that_are_told_apart_late_have_more_digits(views):
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 4.13}}
     models = (view.models[0], {**view.models[1], "free_run": {"test_rmse_mv": 4.12}}, row)
     assert runs.corrected_finding(replace(view, models=models, corrected="ESPM recalibrated")) == (
-        "The ESPM recalibrated alone errs by 4.13 mV there; the correction takes it to 4.12 mV, 0.5 % less mean "
-        "squared error than that."
+        "The correction was learnt on the ESPM recalibrated, which alone errs by 4.13 mV there; the correction takes "
+        "that to 4.12 mV, 0.5 % less mean squared error."
     )
 
 

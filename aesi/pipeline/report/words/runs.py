@@ -38,30 +38,46 @@ def run_finding(view: RunView) -> str:
 
 
 def corrected_finding(view: RunView) -> str:
-    """What the correction brings beyond the physics that it was learned on, in words; where that is as declared, only
-    that a mere refit of its parameters would have done better."""
+    """What the correction brings beyond the physics that it was learned on, in words; where that is as declared, beyond
+    a mere refit of its parameters."""
     corrected, model = view.model(view.corrected), view.model(view.chosen)
     before, after = (_figure(row, "free_run", "test_rmse_mv") for row in (corrected, model))
     if before is None or after is None:
         return ""
     if view.corrected in (view.physics, view.chosen):
         beyond = _figure(model, "free_run", "test_mser_recalibrated_pct")
-        if view.corrected == view.chosen or beyond is None or beyond >= 0.0:
+        if view.corrected == view.chosen or beyond is None or beyond >= 100.0:
             return ""
         refitted = after / np.sqrt(1.0 - beyond / 100.0)
+        worth = (
+            f"the correction leaves {beyond:.1f} % less mean squared error than that"
+            if beyond >= 0.0
+            else "recalibrate it first (cell.start: recalibrated)"
+        )
         return (
             f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
-            f"{refitted:.1f} mV there: recalibrate it first (cell.start: recalibrated)."
+            f"{_told(refitted, after)[0]} mV there: {worth}."
         )
+    learnt = f"The correction was learnt on the {view.corrected}, which alone errs by"
     if after < before:
         first, last = _told(before, after)
         return (
-            f"The {view.corrected} alone errs by {first} mV there; the correction takes it to {last} mV, "
-            f"{100.0 * (1.0 - (after / before) ** 2):.1f} % less mean squared error than that."
+            f"{learnt} {first} mV there; the correction takes that to {last} mV, "
+            f"{100.0 * (1.0 - (after / before) ** 2):.1f} % less mean squared error."
         )
-    return (
-        f"The {view.corrected} alone errs by {before:.1f} mV there: the correction does not help beyond it."
-    )
+    return f"{learnt} {_told(before, after)[0]} mV there: it does not help beyond that."
+
+
+def constant_finding(view: RunView) -> str:
+    """What the mean error of the training records, the least that a correction has to beat, leaves of the test ones;
+    '' where it was not asked for, or was chosen."""
+    rows = (view.model(f"{physics} + constant") for physics in (view.corrected, view.physics))
+    row = next((row for row in rows if row is not None), None)
+    error = _figure(row, "free_run", "test_rmse_mv")
+    ours = _figure(view.model(view.chosen), "free_run", "test_rmse_mv")
+    if row is None or row["name"] == view.chosen or error is None or ours is None:
+        return ""
+    return f"The mean error of the training records, added as a constant, leaves {_told(error, ours)[0]} mV there."
 
 
 def others_finding(view: RunView) -> str:
@@ -122,7 +138,11 @@ def interval_finding(model: Row) -> str:
         f"{nominal:.0f} % intervals one step ahead cover {coverage:.1f} % of the test samples with "
         f"{1e3 * width:.2f} mV average width"
     )
-    return text + ("." if worst is None else f"; {worst:.1f} % in the worst (current, SOC) bin.")
+    text += "." if worst is None else f"; {worst:.1f} % in the worst (current, SOC) bin."
+    free, wide = (_figure(model, "free_run_intervals", key) for key in ("coverage_pct", "average_width_v"))
+    if free is None or wide is None:
+        return text
+    return f"{text} The band in free run covers {free:.1f} % of them and is {1e3 * wide:.1f} mV wide."
 
 
 def _told(first: float, other: float) -> tuple[str, str]:

@@ -1,0 +1,34 @@
+"""Records by name: what is said and found of each is kept under its name, so that no two may share one."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from aesi.errors import DataError
+from aesi.records import Measurement
+
+
+def named_apart(
+    records: Sequence[Measurement], said: Mapping[str, Mapping[str, object]]
+) -> tuple[Measurement, ...]:
+    """The records; those that share a name are numbered: `us06 (1)`, `us06 (2)`.
+
+    said : option -> what it says, by record name.
+    Raises DataError where it is said of a name that several records share.
+    """
+    counts = Counter(record.name for record in records)
+    for option, by_name in said.items():
+        for name in by_name:
+            if counts[name] > 1:
+                raise DataError(
+                    f"{option} {name}=...: {counts[name]} records have this name; give each one of its own."
+                )
+    seen: Counter[str] = Counter()
+    out = []
+    for record in records:
+        seen[record.name] += 1
+        shared = counts[record.name] > 1
+        out.append(replace(record, name=f"{record.name} ({seen[record.name]})") if shared else record)
+    return tuple(out)

@@ -1,0 +1,34 @@
+"""Records that share a name are told apart before anything is kept by it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.calibration.fit import problem
+from aesi.calibration.records.named import named_apart
+from aesi.calibration.rewind import capacities
+from aesi.errors import DataError
+from aesi.records import Measurement
+
+
+def record(name: str) -> Measurement:
+    return Measurement(np.arange(3.0), np.ones(3), np.full(3, 4.0), name=name)
+
+
+def test_only_those_that_share_a_name_are_numbered():
+    given = tuple(record(name) for name in ("us06", "c20", "us06"))
+    assert [one.name for one in named_apart(given, {})] == ["us06 (1)", "c20", "us06 (2)"]
+    assert named_apart(given[:2], {})[1] is given[1]
+
+
+def test_what_is_said_of_a_name_that_two_share_is_refused():
+    given = tuple(record(name) for name in ("us06", "c20", "us06"))
+    with pytest.raises(DataError, match=r"--temperature us06=\.\.\.: 2 records have this name"):
+        named_apart(given, {"--temperature": {"us06": 10.0}})
+    assert len(named_apart(given, {"--temperature": {"c20": 10.0}})) == 3
+
+
+def test_two_records_of_one_name_each_have_their_own_share_of_the_capacity(start, records):
+    model, _ = problem(start, [replace(one, name="drive") for one in records], None, {})
+    assert len(capacities(model, np.zeros(model.layout.size))) == len(records)

@@ -1,0 +1,51 @@
+"""Impedance spectra on disk: which rows are one spectrum, and what is refused."""
+
+import pytest
+
+from aesi.data import read_spectra
+from aesi.errors import DataError
+
+COLUMNS = "frequency_hz,z_real_ohm,z_imag_ohm"
+POINTS = ("100,0.010,-0.001", "10,0.011,-0.002")
+
+
+def written(folder, header, *rows):
+    path = folder / "cell.csv"
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+def test_rows_of_one_state_are_one_spectrum(tmp_path):
+    rows = [f"{point},{soc}" for soc in (0.5, 0.4) for point in POINTS]
+    high, low = read_spectra(written(tmp_path, f"{COLUMNS},soc", *rows))
+    assert (high.soc, low.soc) == (0.5, 0.4)
+    assert high.frequency_hz.tolist() == low.frequency_hz.tolist() == [100.0, 10.0]
+    assert high.z_ohm.tolist() == [0.01 - 0.001j, 0.011 - 0.002j]
+
+
+@pytest.mark.parametrize("names", [("1", "2"), ("cold", "warm")])
+def test_spectra_of_one_state_are_told_apart_by_their_names(tmp_path, names):
+    rows = [
+        f"{name},{point},0.5,{degc}" for name, degc in zip(names, (0, 25), strict=True) for point in POINTS
+    ]
+    cold, warm = read_spectra(written(tmp_path, f"spectrum,{COLUMNS},soc,temperature_degc", *rows))
+    assert (cold.temperature_degc, warm.temperature_degc) == (0.0, 25.0)
+    assert len(cold.frequency_hz) == len(warm.frequency_hz) == 2
+
+
+def test_a_file_without_a_row_is_one_sentence(tmp_path):
+    with pytest.raises(DataError, match="no row below its header"):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc"))
+
+
+@pytest.mark.parametrize(
+    ("header", "row", "told"),
+    [
+        (COLUMNS, POINTS[0], "no column soc or discharged_ah"),
+        (f"{COLUMNS},soc", "0,0.01,-0.001,0.5", "a frequency has to be positive"),
+        (f"{COLUMNS},soc", "10,,-0.001,0.5", r"row 1 \(line 2\), column z_real_ohm: not a number"),
+    ],
+)
+def test_what_is_no_spectrum_is_refused(tmp_path, header, row, told):
+    with pytest.raises(DataError, match=told):
+        read_spectra(written(tmp_path, header, row))
