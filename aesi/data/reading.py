@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -76,10 +77,11 @@ def record_name(path: str | Path) -> str:
 
 def record_names(paths: Sequence[Path]) -> list[str]:
     """What the records of several files are called; those of one name have that of their folder in front of it."""
-    names = [record_name(path) for path in paths]
+    files = [path.resolve() for path in paths]
+    shared = Counter(record_name(file) for file in set(files))
     return [
-        name if names.count(name) == 1 else f"{path.resolve().parent.name} {name}"
-        for path, name in zip(paths, names, strict=True)
+        f"{file.parent.name} {name}" if shared[name] > 1 else name
+        for file, name in ((file, record_name(file)) for file in files)
     ]
 
 

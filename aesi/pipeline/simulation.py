@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
@@ -20,6 +20,7 @@ from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_st
 from aesi.physics.belongs import check_belongs
 from aesi.physics.effects import activated
 from aesi.physics.effects.self_heating import of_file
+from aesi.pipeline.notes import temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -166,19 +167,6 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
         if np.any(rows):
             said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")
     return said
-
-
-def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[ActiveEffect]) -> str:
-    """At what temperature a record is simulated, and on what that rests."""
-    if record.temperature_degc is None:
-        degc = cell.initial_temperature_k - ZERO_CELSIUS_K
-        taken = f"no temperature in it; taken at {degc:.4g} degC, as the cell's file declares"
-    else:
-        low, high = float(np.min(record.temperature_degc)), float(np.max(record.temperature_degc))
-        taken = f"at its measured temperature, {low:.1f} to {high:.1f} degC"
-    changing = [active.id for active in effects if active.effect.infers == "temperature"]
-    beside = f"; {' and '.join(changing)} may change it" if changing else ""
-    return f"{record.name}: {taken}{beside}."
 
 
 def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> list[str]:

@@ -61,7 +61,7 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
         content: dict[str, Any] = run("report", lambda: write_discovery(out, case, found, _run_id(tracker)))
         _track_result(tracker, found, content, out)
     run.publish("discovery", _page(content, out, tracker), "What the model lacks")
-    _say(console, content, (*case.restrictions, *found.notes), out, started)
+    _say(console, content, (*case.restrictions, *case.assumed, *found.notes), out, started)
     return content
 
 

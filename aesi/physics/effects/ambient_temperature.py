@@ -3,7 +3,7 @@
     T = T_declared + dT;   D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
 Leaves out gradients within the cell. Holds where the cell file declares activation energies, and is refused where it
-declares none. A measured temperature is shifted too.
+declares none. A measured temperature is taken as it is.
 
 Source: Arrhenius' law as BPX defines it, bpxstandard.com.
 """
@@ -11,7 +11,7 @@ Source: Arrhenius' law as BPX defines it, bpxstandard.com.
 from aesi.errors import CellError
 from aesi.parameters import Parameter
 from aesi.physics.cell import Cell
-from aesi.physics.effect import Effect, Record
+from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
 PARAMETERS = {
@@ -39,13 +39,6 @@ def shift_cell(model: EspmModel, *, shift_k: float) -> EspmModel:
     )
 
 
-def shift_record(record: Record, *, shift_k: float) -> Record:
-    """The record at the shifted temperature, where it has one."""
-    if record.temperature_k is None:
-        return record
-    return Record(record.time_s, record.current_a, record.temperature_k + shift_k)
-
-
 def depends_on_temperature(cell: Cell) -> bool:
     """True where at least one activation energy is declared."""
     n, p, e = cell.negative, cell.positive, cell.electrolyte
@@ -59,7 +52,6 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=shift_cell,
-    on_record=shift_record,
     infers="temperature",
     experiment="the same profile in a climate chamber at two temperatures",
 )

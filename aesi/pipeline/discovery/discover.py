@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from aesi.constants import MV_PER_V
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.notes import together
+from aesi.pipeline.notes import temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
@@ -97,9 +97,16 @@ class Case:
         return tuple(sentence for sentence, holds in said.items() if holds)
 
     @property
+    def assumed(self) -> tuple[str, ...]:
+        """Sentences on the temperature of the records that hold none."""
+        given = self.declared()
+        untold = (m for m in self.records if m.temperature_degc is None)
+        return tuple(temperature_sentence(given.cell, m, given.effects) for m in untold)
+
+    @property
     def notes(self) -> tuple[str, ...]:
-        """What was not tried or not used, and what a reader dropped, mapped or averaged in the files."""
-        return (*self.restrictions, *(note for m in self.records for note in m.notes))
+        """What was not tried, not used or assumed, and what a reader dropped, mapped or averaged in the files."""
+        return (*self.restrictions, *self.assumed, *(note for m in self.records for note in m.notes))
 
     def declared(self) -> HybridModel:
         """What the cell is declared to be.  Raises CellError or InputError for what cannot be read."""
@@ -168,6 +175,7 @@ def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, 
         "indistinguishable": [list(group) for group in verdict.groups],
         "confidence": round(verdict.confidence, 4),
         "reason": verdict.reason,
+        "declared_degc": found.cell.initial_temperature_k - ZERO_CELSIUS_K,
         "model": _model(found),
         **{state: {part: _errors(found, state, part) for part in ("fit", "test")} for state in STATES},
         "noise_floor_mv": MV_PER_V * found.noise_floor_v,

@@ -50,7 +50,10 @@ def test_everything_is_written_and_tracked(tracked, case):
     assert content["schema"] == "aesi.discovery/1"
     assert content["effects"] == ["series_resistance"]
     assert content["after"]["test"]["rmse_mv"] < content["before"]["test"]["rmse_mv"]
-    assert content["notes"][0] == "drive: thinned."
+    assert content["notes"][:2] == [
+        "drive: no temperature in it; taken at 25 degC, as the cell's file declares.",
+        "drive: thinned.",
+    ]
     report = (out / "report.html").read_text()
     assert "series_resistance" in report
     assert "<li>drive: thinned.</li>" in report

@@ -84,19 +84,20 @@ def test_what_was_not_tried_is_said_so_that_no_verdict_is_read_as_one_about_it(t
         "tried alone: film_growth, clock_skew; nothing is said about other effects.",
         "not tried: series_resistance.",
     )
-    (none,) = case_of_files(BPX, [record], max_effects=0).notes
+    (none, at) = case_of_files(BPX, [record], max_effects=0).notes
     assert none.startswith("no effect is tried")
+    assert at.endswith("no temperature in it; taken at 25 degC, as the cell's file declares.")
 
 
 def test_a_holdout_beside_test_records_was_passed_over_in_silence(tmp_path):
     record, test = write_record(tmp_path), tmp_path / "test.csv"
     test.write_text(record.read_text().replace("3.7", "3.71"))
     case = case_of_files(BPX, [record], [test], holdout=0.4)
-    (note,) = case.notes
+    (note,) = case.restrictions
     assert note.startswith("test records are given, so that the holdout of 0.4 is not used")
     assert case.kept_back == 0.0
-    assert case_of_files(BPX, [record], [test]).notes == ()
-    assert case_of_files(BPX, [record], [test], holdout=0.0).notes == ()
+    assert case_of_files(BPX, [record], [test]).restrictions == ()
+    assert case_of_files(BPX, [record], [test], holdout=0.0).restrictions == ()
     assert case_of_files(BPX, [record]).kept_back == 0.3
 
 

@@ -39,6 +39,10 @@ def test_physics_is_had_and_what_is_off_has_a_size():
     assert with_size("ambient_temperature", discovery("ambient_temperature", "parameter", kelvin)) == (
         "ambient temperature (-14.1 K [-15.2, -12.9])"
     )
+    told = discovery("ambient_temperature", "parameter", kelvin) | {"declared_degc": 25.0}
+    assert with_size("ambient_temperature", told) == (
+        "ambient temperature (10.9 degC [9.8, 12.1] instead of 25 degC)"
+    )
 
 
 def test_only_what_differs_from_nothing_is_told():

@@ -19,6 +19,8 @@ ADDED = "added to what"
 """How a parameter's description says that it comes on top of the declared value."""
 SHARE = "share of the declared"
 """How a parameter's description says that it is a part of something declared, which is told in per cent."""
+INSTEAD = {"true minus declared temperature": ("declared_degc", "degC")}
+"""Description of a parameter that is how far something is from what was declared -> where that stands, and its unit."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
 """Unit -> that of its thousandths or millionths, and how many make one."""
 SMALL = 0.5
@@ -36,6 +38,8 @@ def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = Non
         return name
     ((key, value), *others) = told.items()
     if not others and value["unit"] != "dimensionless":
+        if row and (said := _instead(value, known.get(key), discovery)):
+            return f"{name} ({said})"
         if row and row["kind"] != "physics":  # what is off, or lies, is not had more or less of
             return f"{name} ({quantity(value)})"
         parameter = known.get(key)
@@ -44,6 +48,17 @@ def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = Non
     parts = [_part(key, value, known.get(key)) for key, value in list(told.items())[:MOST_PARAMETERS]]
     rest = ", ..." if len(told) > MOST_PARAMETERS else ""
     return f"{name} ({', '.join(parts)}{rest})"
+
+
+def _instead(value: Mapping[str, Any], parameter: Parameter | None, discovery: Mapping[str, Any]) -> str:
+    """'14.0 degC [12.1, 15.9] instead of 25 degC', of a parameter that is how far something is from what was declared;
+    '' of any other."""
+    key, unit = INSTEAD.get(parameter.description if parameter else "", ("", ""))
+    if key not in discovery:
+        return ""
+    declared = discovery[key]
+    there = {end: declared + value[end] for end in ("value", "low", "high")}
+    return f"{quantity({**there, 'unit': unit})} instead of {declared:.4g} {unit}"
 
 
 def quantity(value: Mapping[str, Any]) -> str:

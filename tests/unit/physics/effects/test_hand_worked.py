@@ -122,6 +122,16 @@ def test_ten_kelvin_colder_slows_everything_by_arrhenius():
     )  # between the ohmic share (17 kJ/mol) and the kinetic (55 kJ/mol)
 
 
+def test_a_measured_temperature_is_taken_as_it_is_by_a_model_that_was_found_to_be_colder():
+    cold = CATALOGUE["ambient_temperature"].activate(shift_k=-10.0)
+    measured = np.linspace(12.0, 14.0, len(TIME))
+    voltage = [
+        simulate(CELL, TIME, CURRENT, soc0=SOC0, effects=effects, temperature_degc=measured).voltage_v
+        for effects in ([], [cold])
+    ]
+    np.testing.assert_array_equal(*voltage)
+
+
 def test_the_step_from_rest_is_the_closed_form_of_the_voltage_law():
     current = 60.0
     theta = dict(zip("np", CELL.stoichiometries(SOC0), strict=True))
