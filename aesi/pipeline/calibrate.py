@@ -225,7 +225,8 @@ def to_text(content: dict[str, Any]) -> str:
     ]  # fmt: skip
     lines += [
         f"| {f['name']} | {_at(f['temperature_degc'], content['declared_degc'])} "
-        f"| {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} | {f['as_simulated_rmse_mv']:.2f} | {f['capacity_share']:.3f} |"
+        f"| {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} | {f['as_simulated_rmse_mv']:.2f} "
+        f"| {f['capacity_share']:.3f} |"
         for f in content["files"]
     ]
     lines += [

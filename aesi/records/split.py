@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from aesi.numerics.typing import Array
 from aesi.records.error_series import ErrorSeries
 
 Role = Literal["train", "valid", "test"]
@@ -15,17 +17,19 @@ ROLES: tuple[Role, ...] = ("train", "valid", "test")
 class HeldOutDrive:
     """The training records under physics that was fitted without some samples of one of them.
 
-    place : of that one.  rows : these samples.
+    series : that one.  place : its place among them.  rows : these samples.
+    errors_v : the error of every training record under that physics, (n_i,) V each.
     """
 
-    train: tuple[ErrorSeries, ...]
+    series: ErrorSeries
     place: int
     rows: slice
+    errors_v: tuple[Array, ...]
 
-    @property
-    def series(self) -> ErrorSeries:
-        """The record that the samples are of."""
-        return self.train[self.place]
+    @classmethod
+    def of(cls, train: Sequence[ErrorSeries], place: int, rows: slice) -> HeldOutDrive:
+        """train : all training records under that physics."""
+        return cls(train[place], place, rows, tuple(record.error_v for record in train))
 
 
 @dataclass(frozen=True, eq=False)

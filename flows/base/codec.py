@@ -1,6 +1,6 @@
 """Records to bytes and back without pickle: a checksum, and a .npz of a JSON tree and the arrays it refers to.
 
-Only plain values, numpy arrays and the dataclasses of the `aesi` package pass, so that reading a file can
+Only plain values, slices, numpy arrays and the dataclasses of the `aesi` package pass, so that reading a file can
 build data and nothing else. The checksum makes a damaged file an error instead of a wrong result.
 """
 
@@ -75,6 +75,8 @@ def _encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:
         return {"dict": [[_encode(k, arrays), _encode(v, arrays)] for k, v in value.items()]}
     if isinstance(value, Path):
         return {"path": str(value)}
+    if isinstance(value, slice):
+        return {"slice": [value.start, value.stop, value.step]}
     if dataclasses.is_dataclass(value) and not isinstance(value, type) and _is_ours(type(value)):
         fields = {
             field.name: _encode(getattr(value, field.name), arrays)
@@ -108,6 +110,8 @@ def _decode(tree: Any, arrays: Mapping[str, np.ndarray]) -> Any:
         return {_decode(k, arrays): _decode(v, arrays) for k, v in tree["dict"]}
     if "path" in tree:
         return Path(tree["path"])
+    if "slice" in tree:
+        return slice(*tree["slice"])
     return _class(*tree["class"])(**{name: _decode(v, arrays) for name, v in tree["fields"].items()})
 
 

@@ -28,7 +28,14 @@ from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
 from flows.base import codec
-from flows.tracking.experiment_log import DECLARED, INPUTS, RECORDS, candidate_metrics, coefficients
+from flows.tracking.experiment_log import (
+    DECLARED,
+    INPUTS,
+    LEFT_OUT,
+    RECORDS,
+    candidate_metrics,
+    coefficients,
+)
 from flows.tracking.store import KIND, PARENT, Store
 
 GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
@@ -36,7 +43,11 @@ GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
 
 @dataclass(frozen=True, eq=False)
 class Rebuilt:
-    """A candidate made again. tracked, metrics : its figures then and now, by MLflow's names."""
+    """A candidate made again.
+
+    left_out : the training drives under physics that has not seen them.  tracked, metrics : its figures then and now,
+    by MLflow's names.
+    """
 
     run_id: str
     number: int
@@ -44,6 +55,7 @@ class Rebuilt:
     declared: HybridModel
     problem: Problem
     candidate: Candidate
+    left_out: LeftOutDrives
     tracked: Mapping[str, float]
     metrics: Mapping[str, float]
 
@@ -66,11 +78,11 @@ def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
     run = _candidate(store, run_id)
     parent = run.data.tags[PARENT]
     config = parse_experiment(json.loads(store.read(parent, "experiment.json").read_text(encoding="utf-8")))
-    split = codec.loads(store.read(parent, f"{INPUTS}/{RECORDS}").read_bytes())
-    declared = HybridModel.load(store.read(parent, f"{INPUTS}/{DECLARED}"))
-    loaded = Loaded(
-        declared.cell, declared.cell.name, declared.effects, split, LeftOutDrives(), {}, {}, (), config
+    split, left_out = (
+        codec.loads(store.read(parent, f"{INPUTS}/{name}").read_bytes()) for name in (RECORDS, LEFT_OUT)
     )
+    declared = HybridModel.load(store.read(parent, f"{INPUTS}/{DECLARED}"))
+    loaded = Loaded(declared.cell, declared.cell.name, declared.effects, split, left_out, {}, {}, (), config)
     problem = build_problem(loaded, config)
     candidate = evaluate(problem, _genome(run), weights(config))
     if isinstance(candidate, Failed):
@@ -79,7 +91,9 @@ def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
         )
     number = int(run.data.params["number"])
     metrics = {name: float(value) for name, value in candidate_metrics(candidate).items()}
-    return Rebuilt(run.info.run_id, number, config, declared, problem, candidate, run.data.metrics, metrics)
+    return Rebuilt(
+        run.info.run_id, number, config, declared, problem, candidate, left_out, run.data.metrics, metrics
+    )
 
 
 def save(rebuilt: Rebuilt, out: Path) -> Path:
@@ -87,12 +101,16 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
     one = rebuilt.candidate.better
     only = rebuilt.config.model_copy(update={"models": (one.name,)})
     (fitted,) = conformalise(
-        final_models(rebuilt.problem, rebuilt.candidate, only), rebuilt.problem, rebuilt.candidate, only
+        final_models(rebuilt.problem, rebuilt.candidate, only),
+        rebuilt.problem,
+        rebuilt.candidate,
+        only,
+        rebuilt.left_out,
     )
     model = HybridModel(
         cell=rebuilt.declared.cell,
         effects=rebuilt.declared.effects,
-        correction=one,
+        correction=fitted.model,  # with the leverage that its bands ask for
         intervals=fitted.intervals,
         bands=fitted.bands,
         dt_s=rebuilt.config.data.dt_s,

@@ -23,8 +23,9 @@ from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
 CHOSEN = "aesi.chosen"
-INPUTS, RECORDS, DECLARED = "inputs", "records.bin", "declared"
-"""What a candidate is made from: the error series by role, and the declared cell with its effects."""
+INPUTS, RECORDS, LEFT_OUT, DECLARED = "inputs", "records.bin", "left_out.bin", "declared"
+"""What a candidate is made from: the error series by role, those of training drives under physics that has not seen
+them, and the declared cell with its effects."""
 HEADLINES = ("free_run", "one_step", "intervals")
 """What MLflow's charts show first: it draws a section a prefix, in the order of the alphabet."""
 WITH_UNIT = {
@@ -45,6 +46,7 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
     tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
+    write_whole(folder / INPUTS / LEFT_OUT, codec.dumps(loaded.left_out))
     soc0 = next(iter(loaded.soc0.values()), None)
     HybridModel(loaded.cell, loaded.effects, soc0=soc0, model=loaded.model).save(folder / INPUTS / DECLARED)
     tracker.files(folder / INPUTS, INPUTS)

@@ -89,7 +89,7 @@ class TrainingDrives:
         return fitted.carried(carried_over(slopes)), LeftOutDrives(tuple(parted), tuple(whole))
 
     def _left_out(self, physics: PhysicsModels, piece: Piece) -> HeldOutDrive:
-        return HeldOutDrive(self.under(physics), *piece)
+        return HeldOutDrive.of(self.under(physics), *piece)
 
     def pieces(self) -> Pieces:
         """What is left out in turn."""
@@ -104,7 +104,7 @@ class TrainingDrives:
         """Under physics that is the same for all: as declared, or of a single drive."""
         pieces = self.pieces()
         made = [
-            tuple(HeldOutDrive(train, place, rows) for place, rows in each)
+            tuple(HeldOutDrive.of(train, place, rows) for place, rows in each)
             for each in (pieces.parts, pieces.drives)
         ]
         return LeftOutDrives(made[0], made[1] if len(train) > 1 else ())

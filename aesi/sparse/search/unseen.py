@@ -38,7 +38,7 @@ def unseen_errors(
     before, after = (
         np.stack(
             [
-                scaling.error_to_scaled(np.concatenate([record.error_v[which] for record in each.train]))
+                scaling.error_to_scaled(np.concatenate([error_v[which] for error_v in each.errors_v]))
                 for each in left_out
             ]
         )

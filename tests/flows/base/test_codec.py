@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aesi.records import ErrorSeries, Failed, Split
+from aesi.records import ErrorSeries, Failed, HeldOutDrive, LeftOutDrives, Split
 from flows.base import codec
 
 plain = st.recursive(
@@ -72,3 +72,11 @@ def _with_tree(tree):
     np.savez(buffer, **{codec.TREE: np.frombuffer(tree.encode(), dtype=np.uint8)})
     body = buffer.getvalue()
     return codec.MAGIC + hashlib.sha256(body).digest() + body
+
+
+def test_left_out_rows_come_back():
+    left_out = LeftOutDrives((HeldOutDrive.of((series(3), series(5)), 1, slice(2, 4)),))
+    (again,) = codec.loads(codec.dumps(left_out)).parts
+    assert (again.place, again.rows) == (1, slice(2, 4))
+    np.testing.assert_array_equal(again.series.inputs, series(5).inputs)
+    assert [len(error_v) for error_v in again.errors_v] == [3, 5]

@@ -3,13 +3,46 @@
 import json
 import re
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import aesi
 from aesi.errors import InputError
+from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.product.hybrid import HybridModel
 from flows.tracking.store import KIND, Store
+
+PERIOD_S = 300
+NMC = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
+
+
+def repeated_drive(folder):
+    """An experiment on five repeats of a drive with worse contacts than the cell file has, physics recalibrated."""
+    cell = aesi.Cell.from_bpx(NMC)
+    rng = np.random.default_rng(0)
+    current = np.tile(np.repeat(rng.normal(12.0, 30.0, PERIOD_S // 20), 20).clip(-60.0, 90.0), 5)
+    current[:60] = 0.0
+    time = np.arange(len(current), dtype=float)
+    run = aesi.simulate(
+        cell, time, current, 0.8, [CATALOGUE["series_resistance"].activate(resistance_ohm=1.5e-3)]
+    )
+    voltage = run.voltage_v + 1e-3 * rng.standard_normal(len(time))
+    aesi.Measurement(time, current, voltage).to_frame().to_csv(folder / "drive.csv", index=False)
+    repeats = {"period_s": PERIOD_S, "train": [1, 3, 5], "test": [2, 4]}
+    content = {
+        "name": "repeats",
+        "data": {"kind": "files", "record": "drive.csv", "repeats": repeats},
+        "cell": {"bpx": str(NMC), "soc0": 0.8, "start": "recalibrated"},
+        "search": {"candidates": 3, "population": 3, "resamples": 10, "block": 60},
+        "conformal": {"window": 20, "compare": []},
+        "models": ["ESPM", "AESI I", "AESI II"],
+        "tracking": {"log_model": False, "system_metrics": False},
+    }
+    path = folder / "repeats.yaml"
+    path.write_text(json.dumps(content))  # which is YAML
+    return path
 
 
 @pytest.fixture
@@ -71,3 +104,21 @@ def test_coverage_is_tracked_for_both_ensembles(store_alone):
         assert 50 < one["intervals/valid_coverage_pct"] <= 100
         assert 50 < one["intervals/valid_coverage_pct_aesi_ii"] <= 100
         assert one["loss/valid"] == pytest.approx((one["loss/valid_aesi_i"] + one["loss/valid_aesi_ii"]) / 2)
+
+
+def test_a_candidate_on_recalibrated_physics_came_back_with_other_figures(tracked, tmp_path):
+    from flows.jobs.start import start
+    from flows.results.candidate import rebuild, save
+
+    folder = start(repeated_drive(tmp_path), use_prefect=False)
+    rebuilt = rebuild(folder.name)
+    assert rebuilt.tracked["loss/valid"] == rebuilt.metrics["loss/valid"]
+    assert rebuilt.differing == {}
+    save(rebuilt, tmp_path / "back")
+    time, current = np.arange(120.0), np.full(120, 5.0)
+    ran, again = (
+        HybridModel.load(each / "model").predict(time, current, soc0=0.7)
+        for each in (folder, tmp_path / "back")
+    )
+    np.testing.assert_array_equal(again.voltage_v, ran.voltage_v)
+    np.testing.assert_array_equal(again.upper_v, ran.upper_v)

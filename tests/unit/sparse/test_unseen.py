@@ -25,7 +25,7 @@ def shifted(by_v: float):
 
 def left_out() -> list[HeldOutDrive]:
     """Physics that errs by 1 mV more for each place of the drive that it has not seen."""
-    return [HeldOutDrive(shifted(1e-3 * (k + 1)), k, slice(0, 600)) for k in range(3)]
+    return [HeldOutDrive.of(shifted(1e-3 * (k + 1)), k, slice(0, 600)) for k in range(3)]
 
 
 def problem(left) -> Problem:
@@ -73,7 +73,7 @@ def test_an_error_that_physics_made_worse_by_seeing_nothing_of_it_lowers_the_amp
     # What physics without a drive leaves on it has the opposite sign: the correction does not carry over.
     against = tuple(replace(record, error_v=-record.error_v) for record in DRIVES)
     left = [
-        HeldOutDrive(tuple(against[i] if i == k else DRIVES[i] for i in range(3)), k, slice(0, 600))
+        HeldOutDrive.of(tuple(against[i] if i == k else DRIVES[i] for i in range(3)), k, slice(0, 600))
         for k in range(3)
     ]
     assert candidate(problem([])).bagging.fade.amplitude > 0.85
