@@ -99,10 +99,8 @@ class InverseProblem:
         return tuple(out)
 
     def _soc0_sd(self, record: PreparedRecord) -> float:
-        """Standard deviation of the initial state of charge; for a measured cell at least the difference between the
-        one that was given and the one that its voltage reads as."""
-        if self.trust not in MEASURED_CELL:
-            return record.soc0_sd
+        """Standard deviation of the initial state of charge, at least the difference between the one that was given and
+        the one that its voltage reads as: of two that disagree neither is known better than that."""
         least = BESIDE_SOC0_SD if self.trust == "beside" else 0.0
         return max(record.soc0_sd, record.start.doubt, least)
 

@@ -5,25 +5,28 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.stats import norm
 
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
+from aesi.tracer.search.forward import needed
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.plausible import ALIKE_NATS
 
 NINETY = 1.645
 """Standard deviations either side of a 90 % interval."""
-WRONG_SDS = 2.0
-"""Of its spread: a declared parameter that the data put further off, with 95 % probability, is wrong and is named. A
-convention: of values that scatter as the spread says, one in twenty lies further off."""
+WRONG_IN = 0.05
+"""Of cells whose declared parameters scatter as their spreads say, so many have one that is called wrong, whichever. A
+convention."""
 
 
 def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
     """The path with those declared parameters as effects that the data put beyond what cell files are off by.
 
-    One at a time, that which says most: another one may only have made up for it. `most` names in all.
+    One at a time, that which says most: another one may only have made up for it. `most` names in all. An effect that
+    is not needed beside them is none: a contact and a wrong electrolyte say no more than the electrolyte.
     """
     chosen = path.chosen
     while len(chosen.hypothesis) < most and (beyond := beyond_spread(path.problem, chosen)):
@@ -38,17 +41,43 @@ def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
         chosen = max(better, key=lambda f: f.score.total)
     if chosen is path.chosen:
         return path
+    chosen = _without_needless(path, chosen, archive)
     step = Step((path.chosen,), (), (chosen,), chosen)
     return replace(path, steps=(*path.steps, step), chosen=chosen)
+
+
+def _without_needless(path: Path, chosen: FittedHypothesis, archive: Archive) -> FittedHypothesis:
+    """The hypothesis without effects that it does not need, while no declared parameter goes beyond its spread."""
+    while len(chosen.hypothesis) > 1:
+        rests = (tuple(o for o in chosen.hypothesis if o != name) for name in chosen.hypothesis)
+        fits = [fitted_hypothesis(path.problem, path.blocks, rest, chosen, archive) for rest in rests]
+        enough = [
+            fit
+            for fit in fits
+            if fit is not None
+            and not needed(path.blocks, fit, chosen, path.admission_nats)
+            and not beyond_spread(path.problem, fit)
+        ]
+        if not enough:
+            break
+        chosen = max(enough, key=lambda f: f.score.total)
+    return chosen
 
 
 def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
     """Ids of the effects whose own parameters are off by more than files are, with 95 % probability."""
     sds = np.sqrt(np.diagonal(fit.score.covariance))
-    owners = [
-        f.owner
+    declared = [
+        (f.owner, abs(float(x)) - NINETY * float(sd))
         for f, x, sd in zip(fit.free, fit.point.x, sds, strict=True)
         if f.own and f.owner in problem.effects and problem.effects[f.owner].refines is None
-        if abs(float(x)) - NINETY * float(sd) > WRONG_SDS
     ]
-    return list(dict.fromkeys(owners))
+    most = wrong_sds(len(declared))
+    return list(dict.fromkeys(owner for owner, off in declared if off > most))
+
+
+def wrong_sds(parameters: int) -> float:
+    """Deviations that one of so many normal deviates exceeds in WRONG_IN of all draws (Sidak, J. Am. Stat. Assoc. 62
+    (1967) 626)."""
+    each = 1.0 - (1.0 - WRONG_IN) ** (1.0 / max(parameters, 1))
+    return float(norm.isf(0.5 * each))

@@ -28,9 +28,9 @@ from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
-from aesi.tracer.search.fitted import base_of, values_without
+from aesi.tracer.search.fitted import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.forward import searched
-from aesi.tracer.search.wrong_parameters import with_wrong_parameters
+from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 
 NEVER = Archive(None, "")
 
@@ -83,11 +83,38 @@ def test_what_needs_declared_parameters_that_no_cell_has_is_unknown(path):
     assert consistent(far, verdict) == verdict
 
 
-def test_no_more_names_than_were_asked_for_are_given_to_wrong_parameters(path):
-    x = np.where([f.owner == "solid_diffusivity" for f in path.chosen.free], 3.9, path.chosen.point.x)
-    far = replace(path, chosen=replace(path.chosen, point=replace(path.chosen.point, x=x)))
-    assert with_wrong_parameters(far, 1, NEVER) is far
-    assert with_wrong_parameters(far, 2, NEVER).chosen.hypothesis == ("ocv_hysteresis", "solid_diffusivity")
+def test_a_wrong_parameter_is_named_with_what_is_needed_beside_it(cell, few, make):
+    archive = Archive(None, "")
+    hysteresis = CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006)
+    slow = CATALOGUE["solid_diffusivity"].activate(negative_factor=0.12, positive_factor=1.0)
+    problem = InverseProblem(cell, prepare_all(cell, [make((hysteresis, slow))], 0.9, 0.3), few)
+    path = searched(problem, 0, lambda blocks, fit: True, archive)
+    one, two = (
+        fitted_hypothesis(problem, path.blocks, names, path.base, archive)
+        for names in (("ocv_hysteresis",), ("series_resistance", "ocv_hysteresis"))
+    )
+    assert beyond_spread(problem, one) == ["solid_diffusivity"]
+    far = replace(path, chosen=one)
+    assert with_wrong_parameters(far, 1, archive) is far
+    named = with_wrong_parameters(far, 2, archive).chosen.hypothesis
+    assert named == ("ocv_hysteresis", "solid_diffusivity")
+    assert with_wrong_parameters(replace(path, chosen=two), 3, archive).chosen.hypothesis == named
+
+
+@pytest.mark.parametrize("parameters", [1, 6, 12])
+def test_one_cell_in_twenty_has_a_declared_parameter_called_wrong(parameters):
+    most = np.abs(np.random.default_rng(parameters).normal(size=(20_000, parameters))).max(axis=1)
+    share = np.mean(most > wrong_sds(parameters))
+    assert share == pytest.approx(0.05, abs=4 * np.sqrt(0.05 * 0.95 / 20_000))
+
+
+def test_a_given_state_of_charge_is_believed_no_closer_than_the_voltage_contradicts_it(path):
+    problem = path.problem
+    record = problem.records[0]
+    doubted = replace(record, start=replace(record.start, doubt=0.02))
+    for trust in ("tight", "loose", "exact", "measured"):
+        sds = [replace(problem, records=(one,), trust=trust).free(())[0].sd for one in (record, doubted)]
+        assert sds == [max(record.soc0_sd, record.start.doubt), 0.02]
 
 
 def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
