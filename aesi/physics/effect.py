@@ -142,7 +142,11 @@ class Effect:
 
 @dataclass(frozen=True)
 class ActiveEffect:
-    """An effect with values for all of its parameters: what `simulate` takes."""
+    """An effect with values for all of its parameters: what `simulate` takes.
+
+    Equal to another of the very same effect with the same values. Effects are not told apart by their ids: one that was
+    written anew under its id acts differently, and what was computed with the other has to be computed again.
+    """
 
     effect: Effect
     values: tuple[tuple[str, float], ...]
@@ -159,17 +163,6 @@ class ActiveEffect:
     def parameters(self) -> dict[str, float]:
         """Values by name."""
         return dict(self.values)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ActiveEffect) and (self.key == other.key)
-
-    def __hash__(self) -> int:
-        return hash(self.key)
-
-    @property
-    def key(self) -> tuple[str, str | None, tuple[tuple[str, float], ...]]:
-        """What identifies it: id, file of a user's own effect, values."""
-        return self.effect.id, self.effect.file, self.values
 
     def act(self, function: Callable[..., Acted], given: object) -> Acted:
         """What one of the effect's functions makes of what it is given; what a user's own raises names its file."""

@@ -15,8 +15,8 @@ from aesi.calibration import Calibration, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
-from aesi.constants import MV_PER_V
-from aesi.errors import DataError, InputError
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_belongs
@@ -100,16 +100,9 @@ def calibrate_files(
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
-    """Raises DataError for a record that is given twice, is too short or holds no current, InputError for a name that
-    two records have and a temperature that no cell has."""
+    """Raises DataError for a record that is given twice, is too short or holds no current, InputError for a
+    temperature that no cell has."""
     check_distinct(measurements)
-    names = [record.name for record in measurements]
-    for name in names:
-        if names.count(name) > 1:
-            raise InputError(
-                f"two records are called {name}, by which a calibration tells them apart; rename one of the files, or "
-                "read it as aesi.read_measurement(FILE, name=...)."
-            )
     for record in measurements:
         span_s = float(record.time_s[-1] - record.time_s[0])
         if span_s < SHORTEST_S:
@@ -143,6 +136,8 @@ def calibration_content(
     read : what a reader dropped, mapped or averaged in the files.
     """
     sampled_notes = () if posterior is None else (posterior.sentence,)
+    deviations = np.sqrt(np.diag(found.covariance))  # the working vector is in deviations of the priors
+    left = dict(zip((free.name for free in found.model.free), deviations.tolist(), strict=False))
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
@@ -161,12 +156,14 @@ def calibration_content(
         "parameters": {
             name: {
                 "value": p.value, "low": p.low, "high": p.high, "unit": p.unit, "prior_from": p.source,
+                "of_prior": left.get(name),
                 **_of_posterior(posterior, name),
             }
             for name, p in found.parameters.items()
         },
         "capacity_ah": found.cell.capacity_ah,
         "declared_capacity_ah": found.declared.capacity_ah,
+        "declared_degc": found.declared.initial_temperature_k - ZERO_CELSIUS_K,
         "health": _health_rows(found),
         "undetermined": [
             {"weights": dict(o.weights), "narrowed": o.narrowed, "sentence": o.sentence}
@@ -227,8 +224,9 @@ def to_text(content: dict[str, Any]) -> str:
         "|---|---|---|---|---|---|",
     ]  # fmt: skip
     lines += [
-        f"| {f['name']} | {_number(f['temperature_degc'])} | {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} "
-        f"| {f['as_simulated_rmse_mv']:.2f} | {f['capacity_share']:.3f} |"
+        f"| {f['name']} | {_at(f['temperature_degc'], content['declared_degc'])} "
+        f"| {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} | {f['as_simulated_rmse_mv']:.2f} "
+        f"| {f['capacity_share']:.3f} |"
         for f in content["files"]
     ]
     lines += [
@@ -239,9 +237,15 @@ def to_text(content: dict[str, Any]) -> str:
     ]
     lines += ["| state of health | value | 95 % interval |", "|---|---|---|"]
     lines += [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
-    lines += ["", "| parameter | value | 95 % interval | unit | prior from |", "|---|---|---|---|---|"]
     lines += [
-        f"| {name} | {_with_interval(p)} | {p['unit']} | {p['prior_from']} |"
+        "",
+        "Of prior: the share of the prior's width that the records leave; of 100 % they say nothing.",
+        "",
+        "| parameter | value | 95 % interval | unit | of prior, % | prior from |",
+        "|---|---|---|---|---|---|",
+    ]
+    lines += [
+        f"| {name} | {_with_interval(p)} | {p['unit']} | {_percent(p['of_prior'])} | {p['prior_from']} |"
         for name, p in content["parameters"].items()
     ]
     if content["impedance"]:
@@ -264,6 +268,15 @@ def to_text(content: dict[str, Any]) -> str:
         if texts:
             lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
     return "\n".join(lines) + "\n"
+
+
+def _at(measured_degc: float | None, declared_degc: float) -> str:
+    """The temperature of a record, or that of the cell file, at which it was taken."""
+    return f"{declared_degc:.1f}, as declared" if measured_degc is None else _number(measured_degc)
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{100.0 * min(share, 1.0):.0f}"
 
 
 def _with_interval(row: Mapping[str, Any]) -> str:

@@ -227,3 +227,31 @@ def test_what_an_effect_of_ones_own_raises_names_its_file(tmp_path, cell, curren
     with pytest.raises(ZeroDivisionError) as caught:
         aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
     assert caught.value.__notes__ == [f"raised by drop of {path}"]
+
+
+def test_an_effect_that_was_written_anew_acted_as_the_one_before(tmp_path, cell):
+    path = tmp_path / "contacts.py"
+    voltage = []
+    for ohm in ("0.00", "0.02"):  # of one length, within a second
+        path.write_text(
+            '"""More ohm."""\nfrom aesi.physics import Effect\nEFFECT = Effect("contacts", "physics", __doc__, '
+            f"on_model=lambda m: m.with_cell(contact_resistance_ohm={ohm}))\n"
+        )
+        active = load_effect(path).activate()
+        voltage.append(aesi.simulate(cell, TIME, np.full(len(TIME), 5.0), 0.5, [active]).voltage_v[-1])
+    assert voltage[0] - voltage[1] == pytest.approx(0.1, rel=1e-6)
+    assert load_effect(path) is load_effect(str(path))
+
+
+def test_two_effects_of_one_id_are_two_effects(cell):
+    def contacts(ohm):
+        def changed(model):
+            return model.with_cell(contact_resistance_ohm=ohm)
+
+        return Effect("contacts", "physics", "More ohm.", on_model=changed).activate()
+
+    fresh, worn = (
+        aesi.simulate(cell, TIME, np.full(len(TIME), 5.0), 0.5, [contacts(ohm)]).voltage_v[-1]
+        for ohm in (0.0, 0.02)
+    )
+    assert fresh - worn == pytest.approx(0.1, rel=1e-6)

@@ -41,13 +41,15 @@ def comparison(result: Result) -> dict[str, Any]:
 
 def _left(trace: RecordTrace, name: str) -> Array:
     """(n,) V that the model leaves in free run; the error of the physics where the model is not among the traces."""
-    if name == DECLARED or name not in trace.predictions:
+    if name in trace.all_physics_v:
+        return trace.measured_v - trace.all_physics_v[name]
+    if name not in trace.predictions:
         return trace.measured_v - trace.physics_v
     return trace.measured_v - trace.predictions[name].free_run_v
 
 
 def _intervals(tests: list[RecordTrace], name: str, seed: int) -> dict[str, list[float]]:
-    """Percentiles over resampled blocks of the test records; the same blocks for the model and the physics."""
+    """Percentiles over resampled blocks of the test records; the same blocks for the model and the declared physics."""
     squares = np.concatenate([_block_sums(trace, _left(trace, name)) for trace in tests])
     bare = np.concatenate([_block_sums(trace, _left(trace, DECLARED)) for trace in tests])
     rows = np.concatenate([_block_sums(trace, np.ones(len(trace.time_s))) for trace in tests])

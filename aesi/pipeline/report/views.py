@@ -41,6 +41,7 @@ class RecordTrace:
     """One record: what was measured, what the physics says, and what each model says.
 
     time_s, current_a, soc, measured_v, physics_v : (n,).  predictions : by the model's name.
+    all_physics_v : (n,) V by the name of the physics; `physics_v` is of the one that the correction was learned on.
     """
 
     name: str
@@ -51,6 +52,7 @@ class RecordTrace:
     measured_v: Array
     physics_v: Array
     predictions: Mapping[str, ModelVoltage] = field(default_factory=dict)
+    all_physics_v: Mapping[str, Array] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

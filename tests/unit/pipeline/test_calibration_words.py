@@ -1,6 +1,6 @@
 """What a calibration says of parameters that its records do not tell."""
 
-from aesi.pipeline.calibrate import _with_interval, open_line
+from aesi.pipeline.calibrate import _with_interval, open_line, to_text
 
 
 def content(weights: list[dict[str, float]], total: int) -> dict[str, object]:
@@ -30,3 +30,32 @@ def test_a_capacity_that_was_not_fitted_has_no_interval_without_a_width():
 def test_an_interval_is_told_with_the_digits_that_show_its_width():
     assert _with_interval({"value": 14.2999, "low": 14.297, "high": 14.3028}) == "14.2999 | 14.297 to 14.3028"
     assert _with_interval({"value": 1.061, "low": 1.044, "high": 1.077}) == "1.061 | 1.044 to 1.077"
+
+
+def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_each_parameter():
+    file = {"before_rmse_mv": 2.0, "after_rmse_mv": 1.0, "as_simulated_rmse_mv": 1.5, "capacity_share": 1.0}
+    told = {"low": 0.9, "high": 1.1, "unit": "factor", "prior_from": "convention", "value": 1.0}
+    text = to_text(
+        {
+            "cell": "mine",
+            "model": "espm",
+            "declared_degc": 25.0,
+            "files": [
+                file | {"name": "a", "temperature_degc": None},
+                file | {"name": "b", "temperature_degc": 9.5},
+            ],
+            "health": {},
+            "parameters": {
+                "negative.rate": told | {"of_prior": 0.034},
+                "contact": told | {"of_prior": 1.001},
+            },
+            "impedance": [],
+            "undetermined": [],
+            "at_bounds": [],
+            "notes": [],
+        }
+    )
+    assert "| a | 25.0, as declared | 2.00 |" in text
+    assert "| b | 9.5 | 2.00 |" in text
+    assert "| negative.rate | 1 | 0.9 to 1.1 | factor | 3 | convention |" in text
+    assert "| contact | 1 | 0.9 to 1.1 | factor | 100 | convention |" in text

@@ -249,6 +249,7 @@ def _trace(role: Role, series: ErrorSeries, predictions: dict[str, ModelVoltage]
         measured_v=series.model_v + series.error_v,
         physics_v=series.model_v,
         predictions=predictions,
+        all_physics_v=series.physics,
     )
 
 
