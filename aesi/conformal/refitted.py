@@ -19,7 +19,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from aesi.conformal.intervals import Intervals
-from aesi.conformal.online.method import marginal_interval
+from aesi.conformal.online.method import check_settings, marginal_interval
 from aesi.conformal.online.records import checked_record, checked_records
 from aesi.errors import FitError
 from aesi.numerics.typing import Array
@@ -55,11 +55,12 @@ class RefittedForest:
     ) -> RefittedIntervals:
         """Take up the end of the calibration residuals, one (n_i,) array a record, V; the current is not used.
 
-        Raises FitError where the longest record holds fewer than two windows.
+        Raises InputError as `Method.fit`, FitError where the longest record holds fewer than two windows.
         """
+        check_settings(alpha, window)
         records = checked_records(residuals)
         finite = [record[np.isfinite(record)] for record in records]
-        longest = max(finite, key=len)
+        longest = max(finite, key=len, default=np.empty(0))
         if len(longest) < 2 * window:
             raise FitError(
                 f"{self.name} has {len(longest)} calibration residuals in a row and needs {2 * window}; give a "

@@ -99,16 +99,20 @@ def to_even(measurement: Measurement, dt_s: float) -> Measurement:
 
 
 def decimate(measurement: Measurement, max_rows: int) -> Measurement:
-    """At most max_rows rows: averages over runs of consecutive rows, stamped at their ends, with a note."""
+    """At most max_rows rows: averages over runs of consecutive rows, stamped at their ends, with a note.
+
+    Rows behind the last whole run are left out, which the note says too.
+    """
     n = len(measurement)
     if n <= max_rows:
         return measurement
     if max_rows < 2:
         raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")
     run = -(-(n - 1) // (max_rows - 1))
+    left = (n - 1) % run
     note = (
         f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, interval averages of the current, "
-        "{voltage}."
+        "{voltage}" + (f"; the last {left} rows, no whole run, were left out." if left else ".")
     )
     return _onto(measurement, measurement.time_s[::run], note)
 

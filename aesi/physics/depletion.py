@@ -29,56 +29,65 @@ def sentence(
     cell = model.cell
     head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
     where = f"at {time_s[at]:.6g} s"  # of a row the file may know nothing: models run on rows of their own
-    degc = kelvin - ZERO_CELSIUS_K
-    tail = 'or, in Python, let it run on with on_depletion="clip".'
+    amperes = abs(float(current_a[at]))
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
-    if what == NO_SOLUTION and driest < DRY_SHARE:
-        what = SALT
-    if what == SALT:
-        here, there = (carried_a(model, t) for t in (kelvin, cell.reference_temperature_k))
-        cause = (
-            f"{head}the electrolyte ran out of salt {where}: at {degc:.3g} degC it carries {here:.3g} A for long, and "
-            f"the record asks for {abs(current_a[at]):.3g} A"
+    if what == SALT or (what == NO_SOLUTION and driest < DRY_SHARE):
+        told = _no_salt(model, kelvin, amperes, where)
+    elif what == NO_SOLUTION:
+        told = (
+            f"no reaction was found that carries {amperes:.3g} A at {kelvin - ZERO_CELSIUS_K:.3g} degC, {where}; check "
+            "the unit of the current"
         )
-        if here < 0.9 * there:
-            cause += (
-                f" (at {cell.reference_temperature_k - ZERO_CELSIUS_K:.3g} degC it would carry {there:.3g} A); it is "
-                "too cold for this current. Check the electrolyte's diffusivity and its activation energy"
-            )
-        else:
-            cause += ". Check the unit of the current and the electrolyte's diffusivity"
-        return f"{cause}, {tail}"
-    if what == NO_SOLUTION:
+    else:
+        told = _surface_left(model, kelvin, amperes, rows[:, at], what, where)
+    return f'{head}{told}, or, in Python, let it run on with on_depletion="clip".'
+
+
+def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
+    """Of an electrolyte that ran dry: by the cold, where it would carry notably more when warm."""
+    reference_k = model.cell.reference_temperature_k
+    here, there = (carried_a(model, t) for t in (kelvin, reference_k))
+    cause = (
+        f"the electrolyte ran out of salt {where}: at {kelvin - ZERO_CELSIUS_K:.3g} degC it carries {here:.3g} A for "
+        f"long, and the record asks for {amperes:.3g} A"
+    )
+    if here < 0.9 * there:
         return (
-            f"{head}no reaction was found that carries {abs(current_a[at]):.3g} A at {degc:.3g} degC, {where}; check "
-            f"the unit of the current, {tail}"
+            f"{cause} (at {reference_k - ZERO_CELSIUS_K:.3g} degC it would carry {there:.3g} A); it is too cold for "
+            "this current. Check the electrolyte's diffusivity and its activation energy"
         )
-    electrode = (cell.negative, cell.positive)[what - 1]
-    mean = float(rows[4 + what, at])
-    n = cell.negative
-    soc = (float(rows[5, at]) - n.theta_min) / (n.theta_max - n.theta_min)
-    surface = f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}"
+    return f"{cause}. Check the unit of the current and the electrolyte's diffusivity"
+
+
+def _surface_left(model: EspmModel, kelvin: float, amperes: float, row: Array, what: int, where: str) -> str:
+    """Of a surface that is empty or full: by the charge, or by a current that solid diffusion cannot follow.
+
+    row : of `run_plain`, the faulty one.  what : 1 or 2, the electrode.
+    """
+    cell, electrode = model.cell, (model.cell.negative, model.cell.positive)[what - 1]
+    soc = (float(row[5]) - cell.negative.theta_min) / (cell.negative.theta_max - cell.negative.theta_min)
+    surface = (
+        f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}, at a state of charge of "
+        f"{100 * soc:.1f} %"
+    )
     if not 0.0 <= soc <= 1.0:
         asks = (
             "asks for more charge than the cell has"
             if soc < 0.0
             else "brings more charge than the cell can hold"
         )
-        return (
-            f"{head}{surface}, at a state of charge of {100 * soc:.1f} %: the record {asks}. "
-            f"Check soc0, the capacity and the sign of the current, {tail}"
-        )
-    slower = rate_factor(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
+        return f"{surface}: the record {asks}. Check soc0, the capacity and the sign of the current"
     cause = (
-        f"{head}{surface}, at a state of charge of {100 * soc:.1f} %, while its particles hold {100 * mean:.1f} % "
-        f"in the mean: solid diffusion cannot follow {abs(current_a[at]):.3g} A"
+        f"{surface}, while its particles hold {100 * float(row[4 + what]):.1f} % in the mean: solid diffusion cannot "
+        f"follow {amperes:.3g} A"
     )
+    slower = rate_factor(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
     if slower < 0.9:
-        cause += f" at {degc:.3g} degC, where it is {1.0 / slower:.2g} times slower than at the reference temperature"
-    return (
-        f"{cause}. Check soc0, the capacity, the diffusivity with its activation energy and the unit of the current, "
-        f"{tail}"
-    )
+        cause += (
+            f" at {kelvin - ZERO_CELSIUS_K:.3g} degC, where it is {1.0 / slower:.2g} times slower than at the "
+            "reference temperature"
+        )
+    return f"{cause}. Check soc0, the capacity, the diffusivity with its activation energy and the unit of the current"
 
 
 def ran_out(name: str, at_s: Mapping[str, float]) -> str:

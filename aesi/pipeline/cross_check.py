@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
-from aesi.errors import SimulationError
+from aesi.errors import DataError, SimulationError
 from aesi.numerics.typing import Array, IntArray, Numbers
 from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
@@ -91,11 +91,14 @@ def cross_check(
 
     time_s : (n,) s, rising.  current_a : (n,) A, discharge positive, a straight line between rows.
     soc0 : state of charge at the first row.
-    Raises SimulationError where PyBaMM ends early or loses charge, InputError as `simulate` and for another model.
+    Raises SimulationError where PyBaMM ends early or loses charge, DataError and InputError as `simulate`, for a single
+    row and for another model.
     """
     check_choice("model", model, PybammModel)
     time, current = numbers(time_s, "time_s"), numbers(current_a, "current_a")
     ours = simulate(cell, time, current, soc0=soc0, model=OURS[model]).voltage_v
+    if len(time) < 2:
+        raise DataError("two models are compared over time; give at least two rows.")
     bends = _bends(time, current)
     run = pybamm_run(cell.to_bpx(), cell, time[bends], current[bends], time, soc0, FINE_MESH, model)
     return CrossCheck(time, ours, run.voltage_v, run.solution)

@@ -11,7 +11,7 @@ import aesi
 
 # Presentation does not change a number, so editing a report keeps the cache.
 PRESENTATION = ("pipeline/report", "bench")
-LIBRARIES = ("numba", "numpy", "pybamm", "quantile-forest", "scikit-learn", "scipy")
+LIBRARIES = ("numba", "numpy", "pybamm", "pysindy", "quantile-forest", "scikit-learn", "scipy")
 
 
 @cache

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.conformal import METHODS, Calibrated, calibrated_from_dict
+from aesi.conformal import COMPARED, METHODS, Calibrated, calibrated_from_dict
 from aesi.errors import FitError, InputError
 
 WINDOW = 50
@@ -202,3 +202,23 @@ def test_too_few_residuals_are_refused(name: str) -> None:
 def test_an_impossible_level_is_refused(name: str) -> None:
     with pytest.raises(InputError, match="share of misses"):
         METHODS[name].fit([series(1000, 9)], alpha=1.5)
+
+
+@pytest.mark.parametrize("name", sorted(COMPARED))
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"alpha": 0.0}, "not a share of misses"),
+        ({"window": 1}, "too short a history"),
+        ({"window": 50.5}, "not a number of samples"),
+    ],
+)
+def test_settings_that_no_method_can_have_are_refused(name: str, asked: dict, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        COMPARED[name].fit([series(1000, 1)], **asked)
+
+
+@pytest.mark.parametrize("name", sorted(COMPARED))
+def test_no_record_to_calibrate_on_is_refused(name: str) -> None:
+    with pytest.raises(FitError):
+        COMPARED[name].fit([])

@@ -62,10 +62,7 @@ class Method(ABC):
 
         Raises InputError for an impossible alpha, window or current, FitError for too few or constant residuals.
         """
-        if not 0 < alpha < 1:
-            raise InputError(f"alpha = {alpha:g} is not a share of misses; give a value between 0 and 1.")
-        if window < MIN_WINDOW:
-            raise InputError(f"window = {window} samples is too short a history; give {MIN_WINDOW} or more.")
+        check_settings(alpha, window)
         records = checked_records(residuals)
         marginal = marginal_interval(records, alpha)
         floor = width_floor(records, marginal)
@@ -77,6 +74,16 @@ class Method(ABC):
     @abstractmethod
     def band(self, data: CalibrationData) -> tuple[Band, Scale]:
         """The raw band, and the factor on its half-width that calibrates it."""
+
+
+def check_settings(alpha: float, window: int) -> None:
+    """Raises InputError for an alpha that is no share, or a window that is no number of samples, or too few."""
+    if not 0 < alpha < 1:
+        raise InputError(f"alpha = {alpha:g} is not a share of misses; give a value between 0 and 1.")
+    if not isinstance(window, int | np.integer):
+        raise InputError(f"window = {window!r} is not a number of samples; give a whole one.")
+    if window < MIN_WINDOW:
+        raise InputError(f"window = {window} samples is too short a history; give {MIN_WINDOW} or more.")
 
 
 def marginal_interval(records: Sequence[Array], alpha: float) -> tuple[float, float]:

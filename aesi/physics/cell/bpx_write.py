@@ -17,6 +17,7 @@ from aesi.physics.cell.parts import (
     UNITY,
     CellParameters,
     Electrode,
+    Electrolyte,
 )
 from aesi.physics.cell.relations import to_bpx
 
@@ -32,6 +33,24 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
         header["Description"] = cell.description
     if cell.references:
         header["References"] = cell.references
+    parts: dict[str, Any] = {
+        "Cell": _write_cell(cell),
+        "Electrolyte": _write_electrolyte(cell.electrolyte),
+        "Negative electrode": _write_electrode(cell.negative),
+        "Positive electrode": _write_electrode(cell.positive),
+        "Separator": {
+            "Thickness [m]": cell.separator.thickness_m,
+            "Porosity": cell.separator.porosity,
+            "Transport efficiency": cell.separator.transport_efficiency,
+        },
+    }
+    own = _own_fields(cell)
+    if own:
+        parts["User-defined"] = own
+    return {"Header": header, "Parameterisation": parts, "State": _write_state(cell)}
+
+
+def _write_cell(cell: CellParameters) -> dict[str, Any]:
     fields: dict[str, Any] = {
         "Reference temperature [K]": cell.reference_temperature_k,
         "Lower voltage cut-off [V]": cell.lower_voltage_v,
@@ -46,25 +65,21 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
         "Volume [m3]": cell.volume_m3,
         "External surface area [m2]": cell.surface_area_m2,
     }
-    fields.update({name: value for name, value in optional.items() if value is not None})
-    electrolyte = cell.electrolyte
-    parts: dict[str, Any] = {
-        "Cell": fields,
-        "Electrolyte": {
-            "Cation transference number": electrolyte.transference,
-            "Conductivity [S.m-1]": to_bpx(electrolyte.conductivity, *ELECTROLYTE_TABLE_MOL_M3),
-            "Diffusivity [m2.s-1]": to_bpx(electrolyte.diffusivity, *ELECTROLYTE_TABLE_MOL_M3),
-            "Conductivity activation energy [J.mol-1]": electrolyte.conductivity_ea_j_mol,
-            "Diffusivity activation energy [J.mol-1]": electrolyte.diffusivity_ea_j_mol,
-        },
-        "Negative electrode": _write_electrode(cell.negative),
-        "Positive electrode": _write_electrode(cell.positive),
-        "Separator": {
-            "Thickness [m]": cell.separator.thickness_m,
-            "Porosity": cell.separator.porosity,
-            "Transport efficiency": cell.separator.transport_efficiency,
-        },
+    return fields | {name: value for name, value in optional.items() if value is not None}
+
+
+def _write_electrolyte(electrolyte: Electrolyte) -> dict[str, Any]:
+    return {
+        "Cation transference number": electrolyte.transference,
+        "Conductivity [S.m-1]": to_bpx(electrolyte.conductivity, *ELECTROLYTE_TABLE_MOL_M3),
+        "Diffusivity [m2.s-1]": to_bpx(electrolyte.diffusivity, *ELECTROLYTE_TABLE_MOL_M3),
+        "Conductivity activation energy [J.mol-1]": electrolyte.conductivity_ea_j_mol,
+        "Diffusivity activation energy [J.mol-1]": electrolyte.diffusivity_ea_j_mol,
     }
+
+
+def _own_fields(cell: CellParameters) -> dict[str, Any]:
+    """What BPX has no field for, as far as the cell has it."""
     own: dict[str, Any] = {
         CONTACT_RESISTANCE: cell.contact_resistance_ohm,
         **{field: float(model == cell.fitted_with) for model, field in FITTED_WITH.items()},
@@ -77,20 +92,21 @@ def write_bpx(cell: CellParameters) -> dict[str, Any]:
         if electrode.film_ohm_m2 != NO_FILM:
             own[FILM_RESISTANCES[side]] = to_bpx(electrode.film_ohm_m2)
             own[FILM_ENERGIES[side]] = electrode.film_ea_j_mol
-    if any(own.values()):
-        parts["User-defined"] = {name: value for name, value in own.items() if value}
+    return {name: value for name, value in own.items() if value}
+
+
+def _write_state(cell: CellParameters) -> dict[str, Any]:
     surroundings = {"Ambient temperature [K]": cell.ambient_temperature_k}
     if cell.heat_transfer_w_m2_k is not None:
         surroundings[HEAT_TRANSFER] = cell.heat_transfer_w_m2_k
-    state = {
+    return {
         "Initial conditions": {
             "Initial state-of-charge": 1.0,
             "Initial temperature [K]": cell.initial_temperature_k,
-            "Initial electrolyte concentration [mol.m-3]": electrolyte.c0_mol_m3,
+            "Initial electrolyte concentration [mol.m-3]": cell.electrolyte.c0_mol_m3,
         },
         "Thermal environment": surroundings,
     }
-    return {"Header": header, "Parameterisation": parts, "State": state}
 
 
 def _write_electrode(electrode: Electrode) -> dict[str, Any]:

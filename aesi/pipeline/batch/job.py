@@ -73,11 +73,11 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
         job.cell,
         job.data,
         job.tests,
-        settings.reading,
-        job.soc0,
-        None if job.tests else settings.holdout,
-        settings.max_effects,
-        settings.seed,
+        reading=settings.reading,
+        soc0=job.soc0,
+        holdout=None if job.tests else settings.holdout,
+        max_effects=settings.max_effects,
+        seed=settings.seed,
         soh=job.soh,
     )
     content = write_discovery(folder, case, run_case(case, folder))

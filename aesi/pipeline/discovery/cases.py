@@ -25,24 +25,25 @@ def case_of_files(
     cell: Path,
     data: Sequence[Path],
     tests: Sequence[Path] = (),
+    *,
+    good: Sequence[Path] = (),
     reading: Reading | None = None,
+    hold: Hold | None = None,
     soc0: float | None = None,
     holdout: float | None = None,
     max_effects: int = 3,
     seed: int = 0,
     effect_files: Sequence[Path] = (),
-    hold: Hold | None = None,
     only: Sequence[str] = (),
     without: Sequence[str] = (),
     model: ModelName | None = None,
     soh: float | None = None,
-    good: Sequence[Path] = (),
 ) -> Case:
     """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
 
-    holdout : as `Case` has it.  soh : share of the file's capacity that the cell had then; None takes all of it.
-    good : files of records that are
-    known to be good.
+    data, tests, good : files of the records that are looked at, that choose nothing, and that are known to be good.
+    reading, hold : how the files are read, and how the current runs between their rows; None tells by the rows.
+    All else as `Case` has it.
     Raises DataError where a file cannot be of the cell.
     """
     paths = (*data, *tests, *good)
@@ -52,18 +53,18 @@ def case_of_files(
     check_belongs(declared_model(cell).with_soh(soh).cell, records)
     return Case(
         cell,
-        tuple(records[: len(data)]),
-        tuple(records[len(data) : len(data) + len(tests)]),
-        soc0,
-        holdout,
-        max_effects,
-        seed,
-        tuple(effect_files),
-        tuple(only),
-        tuple(without),
-        model,
-        soh,
-        tuple(records[len(data) + len(tests) :]),
+        measurements=tuple(records[: len(data)]),
+        tests=tuple(records[len(data) : len(data) + len(tests)]),
+        good=tuple(records[len(data) + len(tests) :]),
+        soc0=soc0,
+        holdout=holdout,
+        max_effects=max_effects,
+        seed=seed,
+        effect_files=tuple(effect_files),
+        only=tuple(only),
+        without=tuple(without),
+        model=model,
+        soh=soh,
     )
 
 

@@ -28,7 +28,7 @@ COLUMNS = {
     "confidence": "confidence",
     "seconds": "seconds",
 }
-"""MLflow's name of a metric -> heading; a column is shown where a run has it. What is tracked in V stands there in mV."""
+"""MLflow's name of a metric -> heading; a column is shown where a run has it, in mV where it is tracked in V."""
 MOST_COLUMNS = 40
 """Of runs side by side; more are summed up in one column."""
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from aesi.numerics.metrics import pearson
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.records import Failed
 from aesi.sparse.ensemble import Ensemble, best_members, combine
 from aesi.sparse.fade import Fade
@@ -141,12 +141,7 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         return Failed(
             f"no term reaches an inclusion probability of tau = {genome.tau:g}, or survives the refit"
         )
-    fold_fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.fold_factors])
-    stable = np.append(ensemble.stability != 0, True)
-    refits = np.zeros_like(fold_fits)
-    refits[:, stable[:-1]] = [
-        solver.fit_factor(factor[:, columns[stable]]) for factor in problem.fold_factors
-    ]
+    fold_fits, refits = _fold_fits(problem, columns, ensemble.stability != 0, solver)
     runs, memory = fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
     bagging, stability = (
         faded(
@@ -187,6 +182,20 @@ def fitness(losses: tuple[float, float, float], library_size: int, weights: Fitn
     """The paper's scalar fitness, equation (24), from the three losses of a candidate."""
     oob, valid, sparse = losses
     return 1.0 - (weights.oob * oob + weights.valid * valid + weights.sparse * sparse / library_size)
+
+
+def _fold_fits(
+    problem: Problem, columns: IntArray, stable: BoolArray, solver: STRidge
+) -> tuple[Array, Array]:
+    """(n_folds, m) each: coefficients of the active terms fitted without each fold, and of those that are stable alone.
+
+    columns : (m + 1,) of a factor, those of the active terms and of the target.  stable : (m,).
+    """
+    fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.fold_factors])
+    refits = np.zeros_like(fits)
+    kept = columns[np.append(stable, True)]
+    refits[:, stable] = [solver.fit_factor(factor[:, kept]) for factor in problem.fold_factors]
+    return fits, refits
 
 
 def _with_left_out(problem: Problem, runs: FoldRuns, judged: Sequence[Judged]) -> tuple[float, float]:

@@ -170,13 +170,7 @@ class Problem:
         error_functions = np.stack(
             [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
         )
-        longest = max(stop - start for start, stop in spans)
-        if options.block is not None and options.block >= longest:
-            raise DataError(
-                f"a bootstrap block of {options.block} rows is no shorter than the longest training record "
-                f"({longest} rows), so that resamples are alike; lower search.block, or leave it out."
-            )
-        block = options.block or default_block(n)
+        block = _checked_block(options.block, spans)
         cut = left_out_pieces(spans, options.fold, options.cuts)
         soc = np.concatenate([record.soc[:-1] for record in train])
         temperature = temperatures(train)
@@ -187,18 +181,12 @@ class Problem:
         if not drives_left_out or options.feedback:  # pieces of a single record, or terms that hold the error
             left_out = ()
         unseen = unseen_errors(left_out, scaling, error, target, cut)
-        m = len(library)
-        augmented = np.empty((n, m + 1 + len(unseen.targets)), order="F")
-        for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
-            augmented[:, j] = products[product] * error_functions[q]
-        augmented[:, m] = target
-        augmented[:, m + 1 :] = unseen.targets.T
-        if not np.isfinite(augmented).all():
-            raise DataError(not_finite(library, augmented))
+        columns = _columns(library, which, products, error_functions, (target, *unseen.targets))
         zero = float(scaling.error_to_scaled(np.array(0.0)))
         row_weights = balanced_weights(spans, target - zero) if options.balance else np.ones(n)
-        augmented *= np.sqrt(row_weights)[:, None]
-        q_rows, r = orthonormal(augmented)
+        columns *= np.sqrt(row_weights)[:, None]
+        q_rows, r = orthonormal(columns)
+        m = len(library)
         every = triangular_factors(weighted_grams(q_rows, np.vstack([weights, leave_out_weights(cut, n)])), r)
         return cls(
             options=options,
@@ -281,6 +269,35 @@ class Problem:
         return np.asarray(
             self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
         )
+
+
+def _checked_block(asked: int | None, spans: Sequence[Span]) -> int:
+    """Rows of a bootstrap block.  Raises DataError for one that no training record is longer than."""
+    longest = max(stop - start for start, stop in spans)
+    if asked is not None and asked >= longest:
+        raise DataError(
+            f"a bootstrap block of {asked} rows is no shorter than the longest training record ({longest} rows), so "
+            "that resamples are alike; lower search.block, or leave it out."
+        )
+    return asked or default_block(spans[-1][1])
+
+
+def _columns(
+    library: Library, which: IntArray, products: Array, error_functions: Array, targets: Sequence[Array]
+) -> Array:
+    """(n, m + n_targets), stored by columns: the terms along the training rows, and what they are fitted to.
+
+    Raises DataError for the first that is not a number.
+    """
+    m = len(library)
+    columns = np.empty((products.shape[1], m + len(targets)), order="F")
+    for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
+        columns[:, j] = products[product] * error_functions[q]
+    for j, target in enumerate(targets, start=m):
+        columns[:, j] = target
+    if not np.isfinite(columns).all():
+        raise DataError(not_finite(library, columns))
+    return columns
 
 
 def _of_own_target(factors: Array, m: int, targets: int) -> Array:

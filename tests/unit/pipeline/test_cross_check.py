@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import aesi
-from aesi.errors import InputError, SimulationError
+from aesi.errors import DataError, InputError, SimulationError
 from aesi.pipeline.cross_check import _bends, cross_check
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -47,3 +47,8 @@ def test_the_current_is_told_where_it_bends():
 def test_another_model_is_refused(cell):
     with pytest.raises(InputError, match="model = 'dfn' is not known; give 'SPMe' or 'DFN'"):
         cross_check(cell, [0.0, 1.0], [0.0, 1.0], 0.5, model="dfn")
+
+
+def test_a_single_row_is_refused(cell):
+    with pytest.raises(DataError, match="at least two rows"):
+        cross_check(cell, np.zeros(1), np.ones(1), soc0=0.5)
