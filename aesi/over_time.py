@@ -30,7 +30,8 @@ def extent(time_s: Array) -> str:
     if not len(time_s):
         return "no rows"
     unit, divisor = time_unit(float(time_s[-1] - time_s[0]))
-    return f"{len(time_s):,} rows over {(time_s[-1] - time_s[0]) / divisor:,.4g} {unit}"
+    length = float(time_s[-1] - time_s[0]) / divisor
+    return f"{len(time_s):,} rows over {f'{length:,.0f}' if length >= 1000.0 else f'{length:.4g}'} {unit}"
 
 
 def over_time(

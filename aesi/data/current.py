@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from aesi.data.channels.checks import check_finite, check_time
+from aesi.data.channels.checks import Columns, check_finite, check_time
 from aesi.data.channels.columns import map_columns
+from aesi.data.channels.gaps import find_gaps
 from aesi.data.channels.load_columns import load_columns
 from aesi.data.read import measurement_in
 from aesi.data.readers import open_table
@@ -45,6 +46,7 @@ def read_current(path: str | Path, reading: Reading | None = None) -> CurrentPro
     data, context, _, notes = load_columns(table, told, needed)
     check_finite(data, context)
     check_time(data["time_s"], context)
+    notes += _over_gaps(data)
     return CurrentProfile(
         data["time_s"],
         data["current_a"],
@@ -52,3 +54,15 @@ def read_current(path: str | Path, reading: Reading | None = None) -> CurrentPro
         data.get("temperature_degc"),
         tuple(f"{context.file}: {note}" for note in notes),
     )
+
+
+def _over_gaps(data: Columns) -> list[str]:
+    """A note on each long way between two rows under a current: of corners of a profile it is meant, of a record rows
+    are missing."""
+    time, current = data["time_s"], data["current_a"]
+    return [
+        f"No rows for {time[k + 1] - time[k]:.6g} s from {time[k]:.10g} s on, where the current runs from "
+        f"{current[k]:.4g} to {current[k + 1]:.4g} A; if rows are missing there, read one side of it: --to-s {time[k]:.10g}."
+        for k in find_gaps(data)
+        if current[k] or current[k + 1]
+    ]

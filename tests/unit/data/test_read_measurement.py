@@ -315,3 +315,12 @@ def test_a_room_in_fahrenheit_is_doubted(tmp_path):
     converted = read_measurement(path, units={"temperature_degc": "F"})
     np.testing.assert_allclose(converted.temperature_degc, 25.0)
     assert not any("starts at" in note for note in converted.notes)
+
+
+def test_a_gap_in_a_current_alone_was_crossed_in_silence(tmp_path):
+    time = np.where(TIME < 100, TIME, TIME + 14_400.0)
+    rows = "\n".join(f"{t},{i}" for t, i in zip(time, CURRENT, strict=True))
+    profile = read_current(written(tmp_path, f"time_s,current_a\n{rows}\n"))
+    assert [note for note in profile.notes if "No rows for 14401 s from 99 s on" in note]
+    corners = written(tmp_path, "time_s,current_a\n0,0\n60,0\n3660,0\n3661,5\n", "corners.csv")
+    assert read_current(corners).notes == ()
