@@ -45,6 +45,10 @@ class RefittedForest:
     name: str = NAME
     refit: int = REFIT
 
+    def check(self, alpha: float, window: int) -> None:
+        """See `Method.check`."""
+        check_settings(alpha, window)
+
     def fit(
         self,
         residuals: Sequence[Array],
@@ -57,7 +61,7 @@ class RefittedForest:
 
         Raises InputError as `Method.fit`, FitError where the longest record holds fewer than two windows.
         """
-        check_settings(alpha, window)
+        self.check(alpha, window)
         records = checked_records(residuals)
         finite = [record[np.isfinite(record)] for record in records]
         longest = max(finite, key=len, default=np.empty(0))

@@ -174,8 +174,8 @@ def _cause(ratio: float, record: Measurement) -> str:
     one_way = np.min(record.current_a) >= 0.0 or np.max(record.current_a) <= 0.0
     if ratio > 1.0 and one_way:
         return (
-            "the cell file is another cell's, or the current is written without its sign (--state COLUMN names the "
-            "column that says which way it flows)"
+            "the cell file is another cell's, the sign of the current is the other one (discharge is positive here), "
+            "or the current is written without its sign (--state COLUMN names the column that says which way it flows)"
         )
     return (
         "the cell file is another cell's, the current is that of several cells in parallel, or its sign is the other "

@@ -25,7 +25,7 @@ import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
 from aesi.errors import DataError, SimulationError
-from aesi.numerics.typing import Array, ComplexArray
+from aesi.numerics.typing import Array, ComplexArray, Numbers
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
@@ -46,7 +46,7 @@ SMALL_A = 1e-6
 
 def impedance(
     cell: Cell,
-    frequency_hz: Array,
+    frequency_hz: Numbers,
     soc: float,
     temperature_degc: float = 25.0,
     effects: Iterable[ActiveEffect] = (),

@@ -17,7 +17,7 @@ import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, Numbers
 from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
@@ -36,11 +36,11 @@ OnDepletion = Literal["raise", "clip"]
 
 def simulate(
     cell: Cell,
-    time_s: Array,
-    current_a: Array,
+    time_s: Numbers,
+    current_a: Numbers,
     soc0: float | None = None,
     effects: Iterable[ActiveEffect] = (),
-    temperature_degc: Array | float | None = None,
+    temperature_degc: Numbers | None = None,
     hold: Hold = "linear",
     *,
     rest_voltage_v: float | None = None,
@@ -221,7 +221,7 @@ def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
     return np.ascontiguousarray(time), np.ascontiguousarray(current)
 
 
-def _kelvin(temperature_degc: Array | float | None, time: Array) -> Array | None:
+def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:
     if temperature_degc is None:
         return None
     kelvin = numbers(temperature_degc, "temperature_degc") + ZERO_CELSIUS_K

@@ -18,7 +18,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.errors import DataError, SimulationError
-from aesi.numerics.typing import Array, IntArray
+from aesi.numerics.typing import Array, IntArray, Numbers
 from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
 from aesi.physics.arguments import check_choice
@@ -85,7 +85,7 @@ class CrossCheck:
 
 
 def cross_check(
-    cell: Cell, time_s: Array, current_a: Array, soc0: float, model: PybammModel = "SPMe"
+    cell: Cell, time_s: Numbers, current_a: Numbers, soc0: float, model: PybammModel = "SPMe"
 ) -> CrossCheck:
     """Simulate the cell with this package and with PyBaMM: "SPMe" holds "espm" against it, "DFN" holds "dfn".
 

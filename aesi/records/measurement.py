@@ -10,7 +10,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
-from aesi.numerics.typing import Array, ComplexArray
+from aesi.numerics.typing import Array, ComplexArray, Numbers
 from aesi.over_time import extent, over_time
 from aesi.records.checked import check_increasing, check_row, numbers
 
@@ -70,6 +70,20 @@ class Measurement:
     source: str = ""
     notes: tuple[str, ...] = ()
     hold: Hold | None = None
+
+    if TYPE_CHECKING:  # what is given need not be arrays yet
+
+        def __init__(
+            self,
+            time_s: Numbers,
+            current_a: Numbers,
+            voltage_v: Numbers,
+            temperature_degc: Numbers | None = None,
+            name: str = "measurement",
+            source: str = "",
+            notes: tuple[str, ...] = (),
+            hold: Hold | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         """Raises DataError, naming column and row, for columns that are no rows of numbers, or of different lengths."""

@@ -162,7 +162,7 @@ def _candidate(store: Store, run_id: str) -> Any:
             raise InputError(
                 f"run {run_id} has chosen no candidate yet; give the id of one of its candidates."
             )
-        run = store.children(run.info.experiment_id, run_id)[f"candidate:{number}"]
+        run = store.children(run.info.experiment_id, run.info.run_id)[f"candidate:{number}"]
     if run.data.tags.get(KIND) != "candidate":
         raise InputError(f"run {run_id} is no candidate of a search, nor the run of an experiment.")
     if "aesi.failed" in run.data.tags:

@@ -10,10 +10,8 @@ from typing import Any
 
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
-from flows.tracking.store import Store
+from flows.tracking.store import SHORTEST_ID, Store
 
-SHORTEST_ID = 4
-"""Letters of a run's id that may stand for it."""
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 """Parameters that are what came of a run, not what was asked for."""
 

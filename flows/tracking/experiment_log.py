@@ -148,14 +148,19 @@ def track_result(
 def result_line(row: Mapping[str, Any]) -> str:
     """What came of a run, in one sentence, from the chosen model's row of the summary."""
     free, step = row["free_run"], row.get("intervals") or {}
-    line = f"{row['name']}: {free['test_mser_pct']:.1f} % less squared error on test in free run"
+    line = f"{row['name']}: {_reduced(free['test_mser_pct'])} squared error on test in free run"
     line += f" ({free['test_rmse_mv']:.2f} mV)"
     beyond = free.get("test_mser_recalibrated_pct")
     if beyond is not None and isfinite(beyond):
-        line += f", {beyond:.1f} % less than recalibrated"
+        line += f", {_reduced(beyond)} than recalibrated"
     if step:
         line += f"; {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:.0f} %"
     return f"{line}."
+
+
+def _reduced(percent: float) -> str:
+    """'1.7 % less', or more."""
+    return f"{abs(percent):.1f} % {'more' if percent < 0.0 else 'less'}"
 
 
 def coefficients(candidate: Candidate) -> dict[str, dict[str, float]]:

@@ -118,8 +118,14 @@ class Outbox:
                     self._wake.wait()
                     continue
             self._sending = True
-            attempt = 0 if self._send(waiting[0]) else attempt + 1
-            self._sending = False
+            try:
+                attempt = 0 if self._send(waiting[0]) else attempt + 1
+            except OSError as error:  # of the disk: the item could not be crossed off or put aside
+                attempt += 1
+                self._old.add(waiting[0].name)
+                self._complain(f"{waiting[0]} is delivered and cannot be removed ({first_line(error)})")
+            finally:
+                self._sending = False
             if attempt:
                 with self._wake:
                     self._wake.wait_for(lambda: self._closing, RETRY_S[min(attempt, len(RETRY_S)) - 1])
@@ -131,7 +137,10 @@ class Outbox:
         except Exception as error:
             self._old.add(path.name)  # part of it may have arrived
             if self._away(error):
-                self._complain(error)
+                self._complain(
+                    f"the store does not answer ({first_line(error)}); results are kept in {self._folder} and "
+                    "delivered when it is back"
+                )
                 return False
             self._tries += 1
             if self._tries < TRIES:
@@ -149,10 +158,8 @@ class Outbox:
             self._say("tracking: the store answers again; what waited is being delivered.")
         return True
 
-    def _complain(self, error: Exception) -> None:
+    def _complain(self, reason: str) -> None:
+        """Say, once until something is delivered again, why nothing is."""
         if self._failing_since is None:
             self._failing_since = time.monotonic()
-            self._say(
-                f"tracking: the store does not answer ({first_line(error)}); results are kept in {self._folder} "
-                "and delivered when it is back."
-            )
+            self._say(f"tracking: {reason}.")

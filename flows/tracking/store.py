@@ -31,6 +31,8 @@ KIND = "aesi.kind"
 REACH_S = 5.0
 """Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
+SHORTEST_ID = 4
+"""Letters of a run's id that may stand for it."""
 PAGE = 1000
 """Runs asked for at a time."""
 
@@ -97,15 +99,30 @@ class Store:
         return Path(self.uri.removeprefix("sqlite:///")).expanduser().resolve()
 
     def run(self, run_id: str) -> Any:
-        """A run by its whole id. Raises InputError where there is none."""
+        """A run by its id; one that is a whole job also by its beginning. Raises InputError where there is none."""
         from mlflow.exceptions import MlflowException
 
         try:
             return self.client.get_run(run_id)
         except MlflowException:
+            begun = self._beginning(run_id)
+            if len(begun) == 1:
+                return begun[0]
+            asked = (
+                "more of its id"
+                if begun
+                else "the whole id of a candidate, or the beginning of that of a run"
+            )
             raise InputError(
-                f"no run {run_id!r} is tracked in {_without_password(self.uri)}; give a whole run id."
+                f"no run {run_id!r} is tracked in {_without_password(self.uri)}; give {asked}."
             ) from None
+
+    def _beginning(self, begin: str) -> list[Any]:
+        """The whole jobs whose id begins so."""
+        if len(begin) < SHORTEST_ID:
+            return []
+        experiments = [each.experiment_id for each in self.client.search_experiments()]
+        return [run for e in experiments for run in self.jobs(e) if run.info.run_id.startswith(begin)]
 
     def artifact(self, run: Any, name: str) -> Path | None:
         """A file among the artifacts of a run, or None where there is none; of a local store without asking it."""

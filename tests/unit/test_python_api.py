@@ -1,6 +1,7 @@
 """`import aesi` at a prompt: what it offers, what it shows, and what it says of what cannot be meant."""
 
 from pathlib import Path
+from typing import get_type_hints
 
 import numpy as np
 import pandas as pd
@@ -288,3 +289,15 @@ def test_a_table_in_place_of_a_file_is_told_what_takes_one():
 def test_a_parameter_that_is_no_number_is_told():
     with pytest.raises(InputError, match="resistance_ohm = '1m' is not a number"):
         CATALOGUE["series_resistance"].activate(resistance_ohm="1m")
+
+
+def test_a_type_checker_lets_through_what_the_functions_take():
+    from aesi.numerics.typing import Numbers
+
+    for function, names in (
+        (aesi.simulate, ("time_s", "current_a")),
+        (aesi.HybridModel.predict, ("time_s", "current_a")),
+        (aesi.impedance, ("frequency_hz",)),
+        (aesi.cross_check, ("time_s", "current_a")),
+    ):
+        assert {get_type_hints(function)[name] for name in names} == {Numbers}, function

@@ -62,7 +62,7 @@ class Method(ABC):
 
         Raises InputError for an impossible alpha, window or current, FitError for too few or constant residuals.
         """
-        check_settings(alpha, window)
+        self.check(alpha, window)
         records = checked_records(residuals)
         marginal = marginal_interval(records, alpha)
         floor = width_floor(records, marginal)
@@ -70,6 +70,10 @@ class Method(ABC):
         rng = rng or np.random.default_rng(0)
         band, scale = self.band(CalibrationData(records, currents, alpha, window, marginal, floor, rng))
         return Calibrated(self.name, alpha, window, band, scale, self.rate, marginal, floor)
+
+    def check(self, alpha: float, window: int) -> None:
+        """Raises InputError for settings that it cannot calibrate with, whatever the data."""
+        check_settings(alpha, window)
 
     @abstractmethod
     def band(self, data: CalibrationData) -> tuple[Band, Scale]:
@@ -127,11 +131,19 @@ class EnbPI(Method):
     name: str = "enbpi"
     n_betas: int = 5
 
-    def band(self, data: CalibrationData) -> tuple[Band, Scale]:
-        alpha, window = data.alpha, data.window
-        needed = int(np.ceil(2 / alpha)) - 1
-        if needed > window:
+    def check(self, alpha: float, window: int) -> None:
+        super().check(alpha, window)
+        if self._needed(alpha) > window:
             raise InputError(
-                f"a window of {window} cannot hold the {needed} residuals that alpha = {alpha:g} needs."
+                f"window = {window} cannot hold the {self._needed(alpha)} residuals that {self.name} needs at alpha = "
+                f"{alpha:g}; give a longer one, or another method."
             )
-        return RollingBand(window, needed, level_pairs(alpha, self.n_betas)), Scale.none()
+
+    def band(self, data: CalibrationData) -> tuple[Band, Scale]:
+        levels = level_pairs(data.alpha, self.n_betas)
+        return RollingBand(data.window, self._needed(data.alpha), levels), Scale.none()
+
+    @staticmethod
+    def _needed(alpha: float) -> int:
+        """Residuals before the extreme ranks exist."""
+        return int(np.ceil(2 / alpha)) - 1

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import csv
 import hashlib
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TextIO
 
 from aesi.errors import InputError
 
@@ -93,16 +95,31 @@ def _cell_in(folder: Path, given: Path | None) -> Path:
 
 
 def _of_table(table: Path, cell: Path | None) -> tuple[Job, ...]:
-    with table.open(encoding="utf-8-sig", newline="") as stream:
-        reader = csv.DictReader(stream)
-        header = tuple(reader.fieldnames or ())
-        unknown = [name for name in header if name not in COLUMNS]
-        if unknown or not {"name", "data"} <= set(header):
+    try:
+        with table.open(encoding="utf-8-sig", newline="") as stream:
+            return tuple(_jobs(table, stream, cell))
+    except UnicodeDecodeError:
+        raise InputError(f"{table} is no text in UTF-8; save the table as CSV in that encoding.") from None
+    except csv.Error as error:
+        raise InputError(f"{table} is no CSV: {error}.") from None
+
+
+def _jobs(table: Path, stream: TextIO, cell: Path | None) -> Iterator[Job]:
+    reader = csv.DictReader(stream)
+    header = tuple(reader.fieldnames or ())
+    unknown = [name for name in header if name not in COLUMNS]
+    if unknown or not {"name", "data"} <= set(header):
+        raise InputError(
+            f"{table} needs the columns name and data and may have {', '.join(COLUMNS[2:])}; it has: "
+            f"{', '.join(header) or 'none'}."
+        )
+    for row in reader:
+        if None in row:
             raise InputError(
-                f"{table} needs the columns name and data and may have {', '.join(COLUMNS[2:])}; it has: "
-                f"{', '.join(header) or 'none'}."
+                f"{table}, line {reader.line_num}: more cells than the header has; several files of a cell are "
+                "separated by ;"
             )
-        return tuple(_job(table, row, number, cell) for number, row in enumerate(reader, start=2))
+        yield _job(table, row, reader.line_num, cell)
 
 
 def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | None) -> Job:
@@ -113,9 +130,12 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
     def number(column: str) -> float | None:
         text = (row.get(column) or "").strip()
         try:
-            return float(text) if text else None
+            value = float(text) if text else None
         except ValueError:
-            raise InputError(f"{table}, line {line}: {column} = {text!r} is no number.") from None
+            value = math.nan
+        if value is not None and not math.isfinite(value):
+            raise InputError(f"{table}, line {line}: {column} = {text!r} is no number.")
+        return value
 
     own = files("cell")
     if not own and cell is None:

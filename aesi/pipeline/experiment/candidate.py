@@ -11,7 +11,7 @@ import numpy as np
 from aesi.conformal import METHODS, Method
 from aesi.conformal.scores import Scores
 from aesi.conformal.validation import validation_scores
-from aesi.errors import AesiError, ConfigError
+from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import ErrorSeries, Failed
@@ -142,10 +142,5 @@ def genome_space(problem: Problem, config: ExperimentConfig) -> GenomeSpace:
 
 
 def method(config: ExperimentConfig) -> Method:
-    """The conformal method the experiment names. Raises ConfigError for an unknown name."""
-    found = METHODS.get(config.conformal.method)
-    if found is None:
-        raise ConfigError(
-            f"conformal.method = {config.conformal.method!r} is unknown; there are: {', '.join(METHODS)}."
-        )
-    return found
+    """The conformal method that the experiment names."""
+    return METHODS[config.conformal.method]

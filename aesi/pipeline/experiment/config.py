@@ -58,7 +58,7 @@ class ExperimentConfig(Section):
     library: LibraryConfig = LibraryConfig()
     search: SearchConfig = SearchConfig()
     conformal: ConformalConfig = ConformalConfig()
-    models: tuple[str, ...] = Field(default_factory=model_names)
+    models: tuple[str, ...] = Field(default_factory=model_names, min_length=1)
     tracking: TrackingConfig = TrackingConfig()
     runner: RunnerConfig = RunnerConfig()
     discover: DiscoverConfig | None = None
@@ -71,6 +71,9 @@ class ExperimentConfig(Section):
         if unknown:
             known = ", ".join(map(repr, model_names()))
             raise ValueError(f"there is no model {unknown[0]!r}; known are {known}")
+        twice = next((name for name in value if value.count(name) > 1), None)
+        if twice is not None:
+            raise ValueError(f"{twice} is named twice; give it once")
         return value
 
     @model_validator(mode="after")

@@ -35,6 +35,12 @@ class RepeatsConfig(Section):
 
     @model_validator(mode="after")
     def _apart(self) -> RepeatsConfig:
+        for role, numbers in (("train", self.train), ("test", self.test)):
+            if not numbers:
+                raise ValueError(f"{role} names no repeat; give at least one")
+            twice = next((number for number in numbers if numbers.count(number) > 1), None)
+            if twice is not None:
+                raise ValueError(f"repeat {twice} is in {role} twice; give it once")
         both = sorted(set(self.train) & set(self.test))
         if both:
             raise ValueError(f"repeat {both[0]} is in train and in test; a repeat has one role")
@@ -56,7 +62,7 @@ class VirtualConfig(Section):
     values: dict[str, dict[str, float]] = {}
     pulse_c: Annotated[float, Field(ge=0)] = 5.0
     other_load: Positive = 2.0
-    seed: int = 0
+    seed: Annotated[int, Field(ge=0)] = 0
 
 
 class DataConfig(Section):
@@ -230,15 +236,32 @@ class ConformalConfig(Section):
     horizons_s: tuple[Positive, ...] = (1.0, 10.0, 60.0)
     compare: tuple[str, ...] = ("split", "enbpi", "spci_refitted", "spci_linear")
 
+    @field_validator("method")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        from aesi.conformal import METHODS
+
+        if value not in METHODS:
+            raise ValueError(f"there is no method {value!r}; there are: {', '.join(METHODS)}")
+        return value
+
     @field_validator("compare")
     @classmethod
-    def _known(cls, value: tuple[str, ...]) -> tuple[str, ...]:
+    def _all_known(cls, value: tuple[str, ...]) -> tuple[str, ...]:
         from aesi.conformal import COMPARED
 
         unknown = [name for name in value if name not in COMPARED]
         if unknown:
             raise ValueError(f"there is no method {unknown[0]!r}; there are: {', '.join(COMPARED)}")
         return value
+
+    @model_validator(mode="after")
+    def _possible(self) -> ConformalConfig:
+        from aesi.conformal import COMPARED
+
+        for name in (self.method, *self.compare):
+            COMPARED[name].check(self.alpha, self.window)
+        return self
 
 
 class TrackingConfig(Section):

@@ -8,9 +8,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aesi.data.read import read
+from aesi.data.read import Reading, read
 from aesi.data.virtual import DEFAULT_MIX
-from aesi.errors import ConfigError, did_you_mean
+from aesi.errors import ConfigError, DataError, did_you_mean
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
@@ -18,6 +18,18 @@ from aesi.records import ROLES, Measurement, Role
 
 if TYPE_CHECKING:
     from aesi.data.virtual import VirtualExperiment
+
+
+KEYS = {
+    "--sign": "data.sign",
+    "--column": "data.columns",
+    "--unit": "data.units",
+    "--state": "data.columns: {state: COLUMN}",
+    "--duplicates": "data.duplicates",
+    "--step": "a file of its own, by `aesi data convert --step`",
+    "--to-s": "a file of its own, by `aesi data convert --to-s`",
+}
+"""Option of a command that reads files -> what says the same in an experiment file."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +52,7 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
-        name: (read(where(name), data.reading), None) for name in dict.fromkeys(names)
+        name: (_record(where(name), data.reading), None) for name in dict.fromkeys(names)
     }
     test = [records[name][0] for name in roles["test"]]
     for role in ("train", "valid"):
@@ -90,7 +102,7 @@ def discovery_records(
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
         reading = config.data.reading
         return tuple(
-            read(where(name), reading.but(stop_s=stop_s.get(name))).held(wanted.hold) for name in names
+            _record(where(name), reading.but(stop_s=stop_s.get(name))).held(wanted.hold) for name in names
         )
 
     return (
@@ -128,6 +140,18 @@ def cell_path(config: ExperimentConfig) -> Path:
     if config.data.set is None:
         raise ConfigError("cell.bpx: catalogue needs data.set; give the path of a BPX file.")
     return locate(config.data.set, "cell.bpx.json")
+
+
+def _record(path: Path, reading: Reading) -> Measurement:
+    """A record of a file.  Raises DataError that names, beside the options of a command, the keys of an experiment."""
+    try:
+        return read(path, reading)
+    except DataError as error:
+        text = str(error)
+        keys = [key for option, key in KEYS.items() if option in text]
+        if not keys:
+            raise
+        raise DataError(f"{text.removesuffix('.')} (in an experiment file: {', '.join(keys)}).") from None
 
 
 def _locator(config: ExperimentConfig) -> Callable[[str], Path]:

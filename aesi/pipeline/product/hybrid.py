@@ -15,7 +15,7 @@ import numpy as np
 from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, Numbers
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_voltage
 from aesi.physics.effects import active_effect
@@ -57,11 +57,11 @@ class HybridModel:
 
     def predict(
         self,
-        time_s: Array,
-        current_a: Array,
+        time_s: Numbers,
+        current_a: Numbers,
         soc0: float | None = None,
-        voltage_v: Array | None = None,
-        temperature_degc: Array | float | None = None,
+        voltage_v: Numbers | None = None,
+        temperature_degc: Numbers | None = None,
         error0_v: float = 0.0,
     ) -> Prediction:
         """Voltage under a current, with its band.
@@ -219,7 +219,7 @@ class HybridModel:
         )
 
 
-def _each_row(temperature_degc: Array | float | None, rows: tuple[int, ...]) -> Array | None:
+def _each_row(temperature_degc: Numbers | None, rows: tuple[int, ...]) -> Array | None:
     if temperature_degc is None:
         return None
     given = numbers(temperature_degc, "temperature_degc")

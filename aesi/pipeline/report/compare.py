@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from aesi.constants import MV_PER_V
 from aesi.pipeline.report.page import write_plain_page
 from aesi.pipeline.report.table_formats import ABSENT
 from aesi.sparse.search.genome import GENE_WORDS
@@ -18,7 +19,7 @@ COLUMNS = {
     "one_step/persistence_rmse_mv": "persistence, one step, mV",
     "intervals/coverage_pct": "coverage, one step, %",
     "intervals/worst_bin_coverage_pct": "worst bin, %",
-    "intervals/average_width_v": "width, one step, V",
+    "intervals/average_width_v": "width, one step, mV",
     "tables/free_run_intervals/coverage_pct": "coverage, free run, %",
     "terms": "terms",
     "before/test_rmse_mv": "as declared, test, mV",
@@ -27,7 +28,7 @@ COLUMNS = {
     "confidence": "confidence",
     "seconds": "seconds",
 }
-"""MLflow's name of a metric -> heading; a column is shown where a run has it."""
+"""MLflow's name of a metric -> heading; a column is shown where a run has it, in mV where it is tracked in V."""
 MOST_COLUMNS = 40
 """Of runs side by side; more are summed up in one column."""
 
@@ -156,6 +157,8 @@ def _figure(run: ComparedRun, name: str) -> ComparedCell:
     regime, _, figure = name.partition("/")
     known = run.comparison.get("intervals", {}).get(run.chosen, {}) if regime == "free_run" else {}
     ends = known.get(figure)
+    if name.endswith("_v"):
+        value *= MV_PER_V
     return ComparedCell(_text(value), value, f"{_text(ends[0])} to {_text(ends[1])}" if ends else "")
 
 

@@ -3,6 +3,7 @@
 import json
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
@@ -117,3 +118,29 @@ def test_an_item_that_takes_long_is_waited_for(tmp_path, said):
     assert box.flush(0.2) == 0
     assert delivered == [1, 2]
     assert not said
+
+
+def test_an_item_that_cannot_be_crossed_off_kept_an_ending_run_waiting_for_ever(
+    tmp_path, store, said, monkeypatch
+):
+    refused, remove = threading.Event(), Path.unlink
+    refused.set()
+
+    def unlink(path, missing_ok=False):
+        if refused.is_set() and path.suffix == ".json":
+            raise PermissionError(13, "Permission denied", str(path))
+        remove(path, missing_ok=missing_ok)
+
+    monkeypatch.setattr(Path, "unlink", unlink)
+    box = opened(tmp_path, store, said)
+    box.put({"n": 0})
+    ended = threading.Thread(target=box.flush, args=(0.3,), daemon=True)
+    ended.start()
+    ended.join(5)
+    assert not ended.is_alive()
+    assert len(said) == 1
+    assert "cannot be removed" in said[0]
+    refused.clear()
+    assert box.flush(5) == 0
+    assert store.again[-1]  # a store is told that it may have been sent before
+    box.close()

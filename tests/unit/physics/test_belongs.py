@@ -91,3 +91,11 @@ def test_a_short_record_in_ma_was_said_to_be_of_many_cells_in_parallel(m50, reco
 
 def test_a_profile_without_a_voltage_says_nothing(m50, record):
     check_belongs(m50, [replace(record, voltage_v=np.full_like(record.voltage_v, np.nan))])
+
+
+def test_a_discharge_of_the_other_sign_is_asked_about_its_sign(m50):
+    time = np.arange(600.0)
+    current = np.where(time < 60.0, 0.0, 5.0)
+    turned = Measurement(time, -current, aesi.simulate(m50, time, current, soc0=0.8).voltage_v)
+    with pytest.raises(DataError, match="the sign of the current is the other one"):
+        check_belongs(m50, [turned])

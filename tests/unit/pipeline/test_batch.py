@@ -153,3 +153,19 @@ def test_a_check_up_that_is_dated_anew_keeps_its_finding_and_not_its_date(tmp_pa
     (folder / "row.json").write_text(json.dumps({"key": job.key(Settings().key), "row": row}))
     again = run_job(replace(job, specimen="cell 2", at=20.0), tmp_path / "out", Settings())
     assert again == row | {"specimen": "cell 2", "at": 20.0}
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("name,data\nZelle ä,a.csv\n".encode("latin-1"), "is no text in UTF-8"),
+        (b"name,data\nc0,a.csv,b.csv\n", "line 2: more cells than the header has"),
+        (b"name,data,at\nc0,a.csv,nan\n", "line 2: at = 'nan' is no number"),
+        (b"name,data,soc0\nc0,a.csv,full\n", "line 2: soc0 = 'full' is no number"),
+    ],
+)
+def test_a_table_that_cannot_be_meant_is_one_sentence(tmp_path, content, words):
+    touched(tmp_path / "a.csv")
+    (tmp_path / "plan.csv").write_bytes(content)
+    with pytest.raises(InputError, match=words):
+        read_plan(tmp_path / "plan.csv", CELL)

@@ -71,6 +71,28 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
             },
             "repeat 1 is in train and in test",
         ),
+        (
+            {
+                "data": {
+                    "kind": "files",
+                    "record": "a.csv",
+                    "repeats": {"period_s": 10, "train": [1, 3, 1], "test": [2]},
+                }
+            },
+            "repeat 1 is in train twice",
+        ),
+        ({"models": []}, "models = [] is not admissible"),
+        ({"models": ["ESPM", "ESPM"]}, "models: ESPM is named twice"),
+        (
+            {"conformal": {"method": "spci"}},
+            "conformal.method: there is no method 'spci'; there are: split, aci",
+        ),
+        ({"conformal": {"window": 9}}, "conformal: window = 9 samples is too short a history"),
+        (
+            {"conformal": {"window": 18}},
+            "window = 18 cannot hold the 19 residuals that enbpi needs at alpha = 0.1",
+        ),
+        ({"data": {"kind": "virtual", "virtual": {"seed": -1}}}, "data.virtual.seed = -1"),
     ],
 )
 def test_an_inadmissible_value_is_named(changes, words):

@@ -131,6 +131,12 @@ def test_the_same_array_is_stored_once():
     assert len(store.arrays) == 1
 
 
+def test_numbers_of_another_kind_with_the_same_bytes_are_another_array():
+    store = ArrayStore()
+    assert store.add(np.zeros(4, dtype="f4")) != store.add(np.zeros(2))
+    assert sorted(each["dtype"] for each in store.arrays.values()) == ["f4", "f8"]
+
+
 def test_an_interrupted_write_leaves_the_old_report(views, tmp_path, monkeypatch):
     path = tmp_path / "r.html"
     path.write_text("old")

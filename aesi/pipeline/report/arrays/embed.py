@@ -35,11 +35,9 @@ class ArrayStore:
 
     def add(self, array: AnyArray) -> str:
         """Keep the array and return its id, the same for the same content."""
-        data = np.ascontiguousarray(array).tobytes()
-        key = hashlib.sha256(data).hexdigest()[:12]
-        self.arrays.setdefault(
-            key, {"dtype": array.dtype.str[1:], "data": base64.b64encode(data).decode("ascii")}
-        )
+        data, dtype = np.ascontiguousarray(array).tobytes(), array.dtype.str[1:]
+        key = hashlib.sha256(dtype.encode() + data).hexdigest()[:12]
+        self.arrays.setdefault(key, {"dtype": dtype, "data": base64.b64encode(data).decode("ascii")})
         return key
 
 
