@@ -51,7 +51,7 @@ def _column(series: ErrorSeries, name: str) -> Array:
         return series.soc
     if name == "I_next":
         return np.append(series.current_a[1:], series.current_a[-1:])
-    if match := _FILTERED.match(name):
+    if (match := _FILTERED.match(name)) and float(match.group(1)) > 0.0:
         return low_pass(series.current_a, series.dt_s, float(match.group(1)))
     raise DataError(
         f"{series.name}: no input {name!r}; it has {', '.join(series.input_names)}, and soc, I_next and "
