@@ -62,7 +62,8 @@ def _over_gaps(data: Columns) -> list[str]:
     time, current = data["time_s"], data["current_a"]
     return [
         f"No rows for {time[k + 1] - time[k]:.6g} s from {time[k]:.10g} s on, where the current runs from "
-        f"{current[k]:.4g} to {current[k + 1]:.4g} A; if rows are missing there, read one side of it: --to-s {time[k]:.10g}."
+        f"{current[k]:.4g} to {current[k + 1]:.4g} A; if rows are missing there, read one side of it: "
+        f"--to-s {time[k]:.10g}."
         for k in find_gaps(data)
         if current[k] or current[k + 1]
     ]
