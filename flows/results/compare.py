@@ -10,7 +10,7 @@ from typing import Any
 
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
-from flows.tracking.store import SHORTEST_ID, Store
+from flows.tracking.store import Store, beginning
 
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
 """Parameters that are what came of a run, not what was asked for."""
@@ -43,8 +43,10 @@ def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
             jobs = store.jobs(by_name[name])
             matching = [run for run in reversed(jobs) if run.info.status == "FINISHED"]
         else:
-            known = known if known is not None else _all(store, list(experiments))
-            matching = _beginning(known, name)
+            known = known if known is not None else store.all_jobs()
+            matching = beginning(known, name)
+            if len(matching) > 1:
+                raise InputError(f"{name!r} is the beginning of {len(matching)} run ids; give more of it.")
         if not matching:
             there = ", ".join(sorted(set(by_name) - {"Default"})) or "none"
             raise InputError(
@@ -52,18 +54,6 @@ def _chosen(store: Store, wanted: Sequence[str]) -> list[tuple[str, Any]]:
             )
         found |= {run.info.run_id: (experiments[run.info.experiment_id], run) for run in matching}
     return list(found.values())
-
-
-def _all(store: Store, experiments: Sequence[str]) -> list[Any]:
-    return [run for number in experiments for run in store.jobs(number)]
-
-
-def _beginning(known: Sequence[Any], name: str) -> list[Any]:
-    """The one run whose id begins so."""
-    matching = [run for run in known if run.info.run_id.startswith(name)] if len(name) >= SHORTEST_ID else []
-    if len(matching) > 1:
-        raise InputError(f"{name!r} is the beginning of {len(matching)} run ids; give more of it.")
-    return matching
 
 
 def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:

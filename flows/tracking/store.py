@@ -13,7 +13,7 @@ import sqlite3
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -35,6 +35,11 @@ SHORTEST_ID = 4
 """Letters of a run's id that may stand for it."""
 PAGE = 1000
 """Runs asked for at a time."""
+
+
+def beginning(runs: Sequence[Any], begin: str) -> list[Any]:
+    """Those of the runs whose id begins so; none where that is too short to stand for an id."""
+    return [run for run in runs if run.info.run_id.startswith(begin)] if len(begin) >= SHORTEST_ID else []
 
 
 class StoreAway(AesiError):
@@ -105,7 +110,7 @@ class Store:
         try:
             return self.client.get_run(run_id)
         except MlflowException:
-            begun = self._beginning(run_id)
+            begun = beginning(self.all_jobs(), run_id)
             if len(begun) == 1:
                 return begun[0]
             asked = (
@@ -116,13 +121,6 @@ class Store:
             raise InputError(
                 f"no run {run_id!r} is tracked in {_without_password(self.uri)}; give {asked}."
             ) from None
-
-    def _beginning(self, begin: str) -> list[Any]:
-        """The whole jobs whose id begins so."""
-        if len(begin) < SHORTEST_ID:
-            return []
-        experiments = [each.experiment_id for each in self.client.search_experiments()]
-        return [run for e in experiments for run in self.jobs(e) if run.info.run_id.startswith(begin)]
 
     def artifact(self, run: Any, name: str) -> Path | None:
         """A file among the artifacts of a run, or None where there is none; of a local store without asking it."""
@@ -173,6 +171,11 @@ class Store:
         if self.local:
             return read_runs(self.database, experiment_id, (KIND, "run"))
         return list(self.runs(experiment_id, f"tags.`{KIND}` = 'run'"))
+
+    def all_jobs(self) -> list[Any]:
+        """Those of every experiment."""
+        experiments = [each.experiment_id for each in self.client.search_experiments()]
+        return [run for number in experiments for run in self.jobs(number)]
 
     def children(self, experiment_id: str, parent: str) -> dict[str, Any]:
         """Nested runs of a parent by the label they were given (`candidate:7`, `model:AESI I`)."""

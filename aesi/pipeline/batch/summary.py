@@ -39,9 +39,9 @@ CellRow = Mapping[str, Any]
 def write_summary(out: Path, rows: Sequence[CellRow], title: str) -> Path:
     """Write summary.csv, summary.json and index.html to `out`; returns the page."""
     write_whole(out / "summary.csv", _csv(rows))
-    content = {"schema": SCHEMA, "jobs": list(rows), "trends": trends(rows)}
-    write_whole(out / "summary.json", json.dumps(content, indent=1) + "\n")
     specimens = trends(rows)
+    content = {"schema": SCHEMA, "jobs": list(rows), "trends": specimens}
+    write_whole(out / "summary.json", json.dumps(content, indent=1) + "\n")
     figures = {"trends": _figure(specimens)} if specimens else {}
     return write_page(
         out / "index.html",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -96,7 +97,7 @@ class Case:
         }
         return tuple(sentence for sentence, holds in said.items() if holds)
 
-    @property
+    @cached_property
     def assumed(self) -> tuple[str, ...]:
         """Sentences on the temperature of the records that hold none."""
         given = self.declared()

@@ -82,23 +82,28 @@ def searched(
             break
         others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
         parents = [chosen, *others][:BEAM]
-    chosen = _pruned(problem, blocks, base, chosen, steps, archive, report)
+    least_nats = max((step.admission_nats for step in steps), default=0.0)
+    chosen = without_needless(problem, blocks, chosen, least_nats, archive, base, report)
     if not _hopeless(problem, blocks, base, chosen):
         chosen = _exchanged(problem, blocks, chosen, steps, slopes, archive, report)
     return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
 
 
-def _pruned(
+def without_needless(
     problem: InverseProblem,
     blocks: Blocks,
-    base: FittedHypothesis,
     chosen: FittedHypothesis,
-    steps: Sequence[Step],
+    least_nats: float,
     archive: Archive,
-    report: Report,
+    base: FittedHypothesis | None = None,
+    report: Report = lambda problem, one, gain: None,
+    may_be: Callable[[FittedHypothesis], bool] = lambda fit: True,
 ) -> FittedHypothesis:
-    """The hypothesis without effects that it does not need once the others are in."""
-    least_nats = max((step.admission_nats for step in steps), default=0.0)
+    """The hypothesis without effects that it does not need once the others are in, one at a time.
+
+    least_nats : that an effect has to say.  base : the one without effects; None where one has to stay.
+    may_be : whether a smaller hypothesis is admissible by itself.
+    """
     while chosen.hypothesis:
         best: FittedHypothesis | None = None
         for name in chosen.hypothesis:
@@ -107,8 +112,10 @@ def _pruned(
             if fit is None:
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
-            if not needed(blocks, fit, chosen, least_nats) and (
-                best is None or fit.score.total > best.score.total
+            if (
+                not needed(blocks, fit, chosen, least_nats)
+                and may_be(fit)
+                and (best is None or fit.score.total > best.score.total)
             ):
                 best = fit
         if best is None:

@@ -11,7 +11,7 @@ from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
-from aesi.tracer.search.forward import needed
+from aesi.tracer.search.forward import without_needless
 from aesi.tracer.search.path import Path, Step
 from aesi.tracer.search.plausible import ALIKE_NATS
 
@@ -41,27 +41,16 @@ def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
         chosen = max(better, key=lambda f: f.score.total)
     if chosen is path.chosen:
         return path
-    chosen = _without_needless(path, chosen, archive)
+    chosen = without_needless(
+        path.problem,
+        path.blocks,
+        chosen,
+        path.admission_nats,
+        archive,
+        may_be=lambda fit: not beyond_spread(path.problem, fit),
+    )
     step = Step((path.chosen,), (), (chosen,), chosen)
     return replace(path, steps=(*path.steps, step), chosen=chosen)
-
-
-def _without_needless(path: Path, chosen: FittedHypothesis, archive: Archive) -> FittedHypothesis:
-    """The hypothesis without effects that it does not need, while no declared parameter goes beyond its spread."""
-    while len(chosen.hypothesis) > 1:
-        rests = (tuple(o for o in chosen.hypothesis if o != name) for name in chosen.hypothesis)
-        fits = [fitted_hypothesis(path.problem, path.blocks, rest, chosen, archive) for rest in rests]
-        enough = [
-            fit
-            for fit in fits
-            if fit is not None
-            and not needed(path.blocks, fit, chosen, path.admission_nats)
-            and not beyond_spread(path.problem, fit)
-        ]
-        if not enough:
-            break
-        chosen = max(enough, key=lambda f: f.score.total)
-    return chosen
 
 
 def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
