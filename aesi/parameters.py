@@ -76,8 +76,8 @@ class Parameter:
         if low <= value <= high:  # this way round, NaN fails too
             return value
         raise ParameterError(
-            f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit}, "
-            f"the range from {self.source}. If the cell warrants it, widen it where {name} is declared."
+            f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit} ({self.source}). "
+            f"If the cell warrants it, widen it where {name} is declared."
         )
 
 
