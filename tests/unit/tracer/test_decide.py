@@ -316,6 +316,12 @@ def test_running_empty_at_the_end_of_a_discharge_is_no_fault(path, monkeypatch, 
     assert range_fault(moved) == ("runs empty" if at_fault else None)
 
 
+def test_fits_of_another_version_were_taken_for_this_one_s(path, monkeypatch):
+    here = context_of(path.problem)
+    monkeypatch.setattr("aesi.tracer.search.archive.source_digest", lambda: "another")
+    assert context_of(path.problem) != here
+
+
 def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):
     effect = CATALOGUE["series_resistance"]
     wider = {k: replace(p, bounds=(0.0, 0.2)) for k, p in effect.parameters.items()}
