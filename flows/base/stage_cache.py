@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
-from aesi.numerics.source_digest import source_digest
 from flows.base import codec, environment, fingerprint
 
 T = TypeVar("T")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aesi.errors import FitError
-from aesi.numerics.source_digest import source_digest
+from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.experiment.candidate import ScoredCandidate, genome_space, top_share, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import Failed

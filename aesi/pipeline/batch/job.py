@@ -11,8 +11,8 @@ from typing import Any
 
 from aesi.data.reading import Reading
 from aesi.errors import AesiError
+from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
-from aesi.numerics.source_digest import source_digest
 from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.numerics.source_digest import source_digest
+from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.typing import Array
 from aesi.physics.effect import Effect
 from aesi.tracer.case.problem import InverseProblem

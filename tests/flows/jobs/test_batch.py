@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from aesi.calibration.health import HEALTH_WORDS
-from aesi.numerics.source_digest import source_digest
+from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.batch.job import Settings
 from aesi.pipeline.batch.plan import read_plan
 

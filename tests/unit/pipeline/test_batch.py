@@ -9,7 +9,7 @@ import pytest
 import aesi
 from aesi.calibration.health import HEALTH_WORDS, health_of
 from aesi.errors import InputError
-from aesi.numerics.source_digest import source_digest
+from aesi.numerics.files.source_digest import source_digest
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.folded import folded
 from aesi.pipeline.batch.job import Settings, of_other_code, run_job

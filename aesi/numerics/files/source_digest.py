@@ -7,7 +7,7 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 PRESENTATION = ("pipeline/report", "bench")
 """It changes no number, so that a report may be edited and what was computed is kept."""
 LIBRARIES = ("numba", "numpy", "pybamm", "pysindy", "quantile-forest", "scikit-learn", "scipy")
