@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from aesi.errors import ParameterError, did_you_mean
 
@@ -37,7 +38,9 @@ class Parameter:
     than large ones, None where all within bounds are alike. `linear` says that the voltage is all but linear in it,
     so that a fit need not take its slope anew at every step. `low_is_limit` says that the lower bound stands for
     nought, which a logarithmic scale does not reach: to end there is a value like others. `spread` says by how much
-    cell files are off in it, so that a hypothesis about something else may move it by that much.
+    cell files are off in it, so that a hypothesis about something else may move it by that much. `counted` says how a
+    value stands to what the cell file declares of the same: by itself, `added` to it, or a `share` of it. `shift_of`
+    names what it is a shift of, as a discovery writes that with its unit (`declared_degc`); empty where it is none.
     """
 
     default: float
@@ -51,6 +54,8 @@ class Parameter:
     linear: bool = False
     low_is_limit: bool = False
     spread: Spread | None = None
+    counted: Literal["itself", "added", "share"] = "itself"
+    shift_of: str = ""
 
     def __post_init__(self) -> None:
         low, high = self.bounds
@@ -71,8 +76,8 @@ class Parameter:
         if low <= value <= high:  # this way round, NaN fails too
             return value
         raise ParameterError(
-            f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit}, "
-            f"the range from {self.source}. If the cell warrants it, widen it where {name} is declared."
+            f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit} ({self.source}). "
+            f"If the cell warrants it, widen it where {name} is declared."
         )
 
 

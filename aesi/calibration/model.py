@@ -18,7 +18,8 @@ from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, solver
 
 SOLID_ORDER = 8
-"""Modes of solid diffusion: eight resolve a particle to 0.4 mV under a drive to 3C."""
+"""Modes of solid diffusion: eight err by 0.03 mV RMS at most under a drive (LG M50 to 2C), by 0.1 mV under pulses (LFP
+to 3C)."""
 ELECTRODE_POINTS = 4
 """Points across a porous electrode: four err by 0.14 mV at most on discharges of the shipped cells to 1C."""
 MOST_STEPS = 16

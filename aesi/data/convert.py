@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -44,13 +45,20 @@ def write_csv(path: Path, table: pd.DataFrame, digits: int = DIGITS) -> None:
 
 
 def convert_file(
-    path: Path, out: Path, reading: Reading | None = None, layout: WrittenLayout = "aesi"
+    path: Path,
+    out: Path,
+    reading: Reading | None = None,
+    layout: WrittenLayout = "aesi",
+    admit: Callable[[Measurement], None] | None = None,
 ) -> Measurement:
     """Read `path`, check it as every command does, and write it whole to `out`; returns what was written.
 
+    admit : a further check, which raises before anything is written.
     Raises DataError where it cannot be used as a measurement, or `out` cannot be written.
     """
     record = read(path, reading or Reading(), max_rows=None)
+    if admit is not None:
+        admit(record)
     table = record.to_frame()
     if layout == "bdf":
         table["current_a"] = 0.0 - record.current_a

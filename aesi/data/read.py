@@ -9,7 +9,7 @@ from pathlib import Path
 from aesi.data.channels.checks import check_alive, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import REQUIRED, Mapped
 from aesi.data.channels.gaps import without_gaps
-from aesi.data.channels.implausible import check_scale, check_sign, check_signed
+from aesi.data.channels.implausible import check_scale, check_sign, check_signed, check_stuck
 from aesi.data.channels.load_columns import load_columns
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
@@ -101,6 +101,7 @@ def measurement_in(
     check_scale(data, context)
     check_signed(data, context, table.header)
     check_sign(data, context, _sign_advice(mapped, reading))
+    check_stuck(data, context)
     measurement = Measurement(
         time_s=data["time_s"],
         current_a=data["current_a"],

@@ -16,8 +16,8 @@ from aesi.physics.cell.parts import NO_FILM, UNITY
 from aesi.physics.cell.relations import Constant
 
 DEFAULT_SOLID_ORDER = 12
-"""Against 24, it moves the voltage by 0.02 mV RMS at most: LG M50 to 2C, the load of `aesi bench espm`; 8 by 0.2
-mV."""
+"""Against 24, it moves the voltage by 0.001 mV RMS at most: LG M50 to 2C, the load of `aesi bench espm`; 8 by 0.03
+mV. Where diffusion is ten times as slow, under a third of the load, by 0.02 mV; 8 by 0.3."""
 DEFAULT_ELECTROLYTE_ORDER = 3
 """Against 8, it moves that voltage by 0.007 mV RMS at most; 2 by 0.09 mV."""
 DEFAULT_ELECTRODE_POINTS = 7
@@ -71,7 +71,7 @@ class EspmModel:
 
     regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
     heat : None for a temperature that is given or constant.
-    solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
+    solid_order : even Legendre polynomials a particle (`SphereModes`).  electrolyte_order : polynomial degree a layer.
     electrode_points : of a porous electrode, where reaction and salt are resolved.
     substep_s : longest step of whatever is not stepped exactly.  most_substeps : of them between two samples.
     """

@@ -15,7 +15,7 @@ from aesi.calibration import Calibration, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
-from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
@@ -26,6 +26,7 @@ from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.report.views import DiscoveryTrace
 from aesi.records import Measurement, Spectrum
 from aesi.tracer.case.checks import SHORTEST_S
 
@@ -92,11 +93,48 @@ def calibrate_files(
     write_whole(out, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
     write_whole(out.with_suffix(".report.json"), json.dumps(content, indent=1, allow_nan=False) + "\n")
     write_whole(out.with_suffix(".report.md"), to_text(content))
-    if spectra:
-        from aesi.pipeline.report.nyquist import write_nyquist
-
-        write_nyquist(out.with_suffix(".nyquist.html"), found.cell.name, spectra)
+    _write_page(out.with_suffix(".report.html"), found, content, spectra)
     return content
+
+
+def _write_page(
+    path: Path, found: Calibration, content: Mapping[str, Any], spectra: Sequence[SpectrumError]
+) -> None:
+    from aesi.pipeline.report.calibration import CalibrationView, write_calibration_report
+
+    words = MODEL_WORDS[found.model.physics]
+    view = CalibrationView(
+        content, words, fit_traces(found), HEALTH_WORDS, open_line(content), tuple(spectra)
+    )
+    write_calibration_report(path, view)
+
+
+def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
+    """Each record's rows with the voltage of the start file, of the file as it is simulated, and as fitted.
+
+    The state of charge is counted from the fitted start, of the capacity that the cell of the record had.
+    """
+    model, x = found.model, found.x
+    states = (
+        (found.declared, np.zeros(model.layout.size)),
+        (model.cell_at(model.as_simulated(x)), model.as_simulated(x)),
+        (model.cell_at(x), x),
+    )
+    out = []
+    for i, record in enumerate(model.records):
+        rows = record.rows
+        start, simulated, fitted = (model.run(i, cell, at)[0] for cell, at in states)
+        capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
+        current = rows.current_a
+        mean = current[1:] if record.hold == "backward" else 0.5 * (current[1:] + current[:-1])
+        moved_ah = np.concatenate([[0.0], np.cumsum(mean * np.diff(rows.time_s))]) / SECONDS_PER_HOUR
+        soc = record.start.soc + record.soc_sd * float(x[model.layout.soc(i)]) - moved_ah / capacity_ah
+        out.append(
+            DiscoveryTrace(
+                record.name, "fit", rows.time_s, rows.current_a, soc, rows.voltage_v, start, simulated, fitted
+            )
+        )
+    return tuple(out)
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:
@@ -203,7 +241,7 @@ def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, fl
     return {"posterior_low": interval.low, "posterior_high": interval.high}
 
 
-def open_line(content: dict[str, Any]) -> str:
+def open_line(content: Mapping[str, Any]) -> str:
     """What the records leave open, in one sentence; empty where they tell every parameter."""
     left = content["undetermined"]
     if not left:

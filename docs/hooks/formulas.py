@@ -1,6 +1,7 @@
 """Formulas between dollar signs become MathML, which browsers set by themselves: no script, no network.
 
-`$...$` within a line, `$$...$$` as a block. Fenced and inline code is left alone.
+`$...$` within a line, `$$...$$` as a block, which belongs to a list item where it is indented as that is. Fenced and
+inline code is left alone.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from typing import Any
 from latex2mathml.converter import convert
 
 CODE = re.compile(r"(^```.*?^```|^~~~.*?^~~~|`[^`\n]*`)", re.MULTILINE | re.DOTALL)
-BLOCK = re.compile(r"\$\$(.+?)\$\$", re.DOTALL)
+BLOCK = re.compile(r"^([ ]*)\$\$(.+?)\$\$", re.DOTALL | re.MULTILINE)
 INLINE = re.compile(r"(?<![\\\w$])\$(?=\S)([^$\n]+?)(?<=\S)\$(?![\w$])")
 
 
@@ -23,12 +24,13 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 
 def _formulas(text: str) -> str:
-    text = BLOCK.sub(lambda m: f'\n<div class="formula">{_mathml(m[1], "block")}</div>\n', text)
+    # A span, since Markdown takes a div within a list item for the end of the list.
+    text = BLOCK.sub(lambda m: f'\n{m[1]}<span class="formula">{_mathml(m[2], "block")}</span>\n', text)
     # The span keeps Markdown from taking a formula at the start of a line for a block.
     return INLINE.sub(lambda m: f"<span>{_mathml(m[1], 'inline')}</span>", text)
 
 
 def _mathml(latex: str, display: str) -> str:
-    # Newlines would end the raw HTML block, and the source helps those who copy it.
+    # Newlines would end the paragraph, and the source helps those who copy it.
     math = convert(" ".join(latex.split()), display=display).replace("\n", " ")
     return math.replace("<math ", f'<math aria-label="{html.escape(latex.strip(), quote=True)}" ', 1)

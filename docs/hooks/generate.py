@@ -89,6 +89,21 @@ def over_time() -> str:
     return str(_hook("recorded")["over_time"](_history()))
 
 
+def speed() -> str:
+    """How fast both models are beside PyBaMM's, and how close to a fine mesh, from the newest recorded lines."""
+    from flows.benchmarks.history import latest
+
+    lines = [line for _, line in latest(_history()).values()]
+    parts = []
+    for bench, words in (("espm", "The single particle"), ("dfn", "the porous electrode")):
+        line = next((line for line in lines if line["bench"] == bench and line.get("ratio")), None)
+        if line is not None:
+            parts.append(
+                f"{words} {line['ratio']:.0f} times as fast as PyBaMM's, {line['rmse_mv']:.2g} mV RMSE off a fine mesh"
+            )
+    return "; ".join(parts) or "No run has been recorded"
+
+
 def dfn_curve() -> str:
     """Error against time of the porous electrode, from the newest recorded lines."""
     from flows.benchmarks.history import latest
@@ -150,6 +165,7 @@ def _from_root(name: str) -> str:
 GENERATORS: dict[str, Callable[[], str]] = {
     "catalogue": catalogue,
     "over time": over_time,
+    "speed": speed,
     "dfn curve": dfn_curve,
     "command line": command_line,
     "contributing": contributing,

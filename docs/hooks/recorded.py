@@ -91,17 +91,25 @@ def _tables(lines: Iterable[Line]) -> list[str]:
 
 
 def _table(lines: Sequence[Line]) -> str:
-    """Few values stand below each other; several lines become rows, many of them folded away."""
+    """A line a row, many of them folded away; a line a column where it has more figures than there are lines."""
     keys = [
         key for key in dict.fromkeys(key for line in lines for key in line) if key not in ("bench", "summary")
     ]
+    cells = [[_cell(line.get(key)) for line in lines] for key in keys]
     if len(lines) == 1:
-        (line,) = lines
-        body = [f"| {key} | {_cell(line[key])} |" for key in keys]
-        return "\n".join(["| figure | value |", "|---|---:|", *body, ""])
-    body = ["| " + " | ".join(_cell(line.get(key)) for key in keys) + " |" for line in lines]
-    table = ["| " + " | ".join(keys) + " |", "|" + "---|" * len(keys), *body]
-    return _folded(f"{len(lines)} lines", table) if len(lines) > LONG else "\n".join([*table, ""])
+        return _grid(
+            [["figure", "value"], *([key, *row] for key, row in zip(keys, cells, strict=True))], "---:"
+        )
+    if len(lines) < len(keys) and len(lines) <= LONG:
+        return _grid([[key, *row] for key, row in zip(keys, cells, strict=True)], "---:")
+    table = _grid([keys, *zip(*cells, strict=True)], "---")
+    return _folded(f"{len(lines)} lines", table.splitlines()) if len(lines) > LONG else table
+
+
+def _grid(rows: Sequence[Sequence[str]], align: str) -> str:
+    """A table whose first row is its head; `align` of all columns but the first."""
+    head, *body = ("| " + " | ".join(row) + " |" for row in rows)
+    return "\n".join([head, f"|---|{'|'.join([align] * (len(rows[0]) - 1))}|", *body, ""])
 
 
 def _folded(title: str, table: Sequence[str]) -> str:

@@ -31,6 +31,10 @@ class Damaged(ValueError):
     """The bytes are not what `dumps` wrote."""
 
 
+class OtherVersion(Damaged):
+    """The bytes are what `dumps` wrote, of records that another version of the package has."""
+
+
 def dumps(value: Any) -> bytes:
     """The value as bytes. Raises Uncodable naming the type that cannot be stored."""
     arrays: dict[str, np.ndarray] = {}
@@ -56,7 +60,7 @@ def loads(data: bytes) -> Any:
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise Damaged(f"not a stored record: {error}") from None
     except (AttributeError, ImportError, TypeError) as error:
-        raise Damaged(f"stored by another version: {error}") from None
+        raise OtherVersion(f"stored by another version: {error}") from None
 
 
 def _encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:

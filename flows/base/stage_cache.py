@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TypeVar
 
+from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from flows.base import codec, environment, fingerprint
 
@@ -25,7 +26,7 @@ class Cache:
         A damaged entry is computed again, and said. A result that is no plain data, or that does not fit on
         the disk, is not kept.
         """
-        path = self._folder / f"{stage}-{fingerprint.key(fingerprint.code(), *parts)}.bin"
+        path = self._folder / f"{stage}-{fingerprint.key(source_digest(), *parts)}.bin"
         if self._reuse and path.is_file():
             try:
                 found: T = codec.loads(path.read_bytes())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -46,6 +47,14 @@ def convert(
     *,
     reading: Any,
     out: Annotated[Path, typer.Option(help="CSV to write.")],
+    cell: Annotated[
+        Path | None,
+        typer.Option(
+            "--cell",
+            help="BPX file, or a saved model, of the cell: a record that cannot be of it, as in another unit of time "
+            "or current, is refused.",
+        ),
+    ] = None,
     to: Annotated[
         Literal["aesi", "bdf"],
         typer.Option(
@@ -54,10 +63,15 @@ def convert(
     ] = "aesi",
 ) -> None:
     """Write a measurement as CSV in SI units, and say what was done to it."""
-    outputs.check_table(out, [file])
+    outputs.check_table(out, [file, *([cell] if cell else [])])
     from aesi.data.convert import convert_file, record_lines
 
-    record = convert_file(file, out, reading, to)
+    admit = None
+    if cell is not None:
+        from aesi.pipeline.product.declared import check_of_cell
+
+        admit = partial(check_of_cell, cell)
+    record = convert_file(file, out, reading, to, admit)
     options.say_notes(record.notes)
     for line in record_lines(record):
         typer.echo(line, err=True)

@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from aesi.pipeline.batch.job import Settings, run_job
+from aesi.pipeline.batch.job import Settings, of_other_code, run_job
 from aesi.pipeline.batch.plan import Job, read_plan
 from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -44,14 +44,21 @@ def batch(
     environment.prepare_process()
     console = Console()
     started = time.monotonic()
+    settings = settings or Settings()
     jobs = read_plan(source, cell, soh)
     out.mkdir(parents=True, exist_ok=True)
     cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
     console.say(f"{cells} from {source}; results in {out}")
+    if other := of_other_code(jobs, out):
+        were = "was" if len(other) == 1 else "were"
+        console.say(
+            f"{', '.join(other)} {were} done by another version of this program, whose figures are not compared with "
+            "this one's: done again."
+        )
     rows: dict[str, dict[str, Any]] = {}
     kept = f"What is done is kept in {out}; the same command goes on from there."
-    with kept_on_interrupt(kept), _tracked(jobs, settings or Settings(), source, console) as tracker:
-        for row in _rows(jobs, out, settings or Settings(), workers, runner, address):
+    with kept_on_interrupt(kept), _tracked(jobs, settings, source, console) as tracker:
+        for row in _rows(jobs, out, settings, workers, runner, address):
             rows[row["name"]] = row
             told = row["finding"] if row["status"] == "done" else f"failed: {row['reason']}"
             console.say(f"{len(rows)}/{len(jobs)} {row['name']}: {told}")

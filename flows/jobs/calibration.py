@@ -41,5 +41,5 @@ def calibrate(
         console.say(f"  {left} (each with its weights in the report)")
     if content["at_bounds"]:
         console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")
-    console.say(f"Written: {out} and {out.with_suffix('.report.md')}")
+    console.say(f"Written: {out}. Report: {out.with_suffix('.report.html')}")
     return content

@@ -49,8 +49,8 @@ def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str)
     started = time.monotonic()
     if (out / ARCHIVE).exists():
         console.say(
-            f"{out} holds an earlier search: fits of the same cell and records are taken up again, and its finding is "
-            "replaced."
+            f"{out} holds an earlier search: fits of the same cell and records by this version are taken up again, and "
+            "its finding is replaced."
         )
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
     title = ", ".join(m.name for m in case.measurements)

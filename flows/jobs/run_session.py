@@ -81,9 +81,10 @@ def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> 
         left = tracker.end("FINISHED")
         replace(record, status="finished").write()
     if left:
-        console.say(
-            f"tracking: {left} items could not be delivered to {record.uri}; the next run delivers them."
-        )
+        from flows.tracking.store import without_login
+
+        place = without_login(record.uri)
+        console.say(f"tracking: {left} items could not be delivered to {place}; the next run delivers them.")
 
 
 def _begin(

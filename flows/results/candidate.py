@@ -12,8 +12,10 @@ to the last digit where the libraries are those of the run.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +40,8 @@ from flows.tracking.experiment_log import (
 )
 from flows.tracking.store import KIND, PARENT, Store
 
+EXPERIMENT = "experiment.json"
+COMMIT, COMMIT_SHOWN = "mlflow.source.git.commit", 10
 GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
 
 
@@ -72,24 +76,25 @@ class Rebuilt:
 def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
     """The candidate of a tracked run; for the run of an experiment, the fittest of those that were chosen.
 
-    Raises InputError where the run is no candidate, had failed, or lacks what it was made from.
+    Raises InputError where the run is no candidate, had failed, or lacks what it was made from, or where another
+    version wrote that.
     """
     store = Store(uri)
     run = _candidate(store, run_id)
-    parent = run.data.tags[PARENT]
-    config = parse_experiment(json.loads(store.read(parent, "experiment.json").read_text(encoding="utf-8")))
-    split, left_out = (
-        codec.loads(store.read(parent, f"{INPUTS}/{name}").read_bytes()) for name in (RECORDS, LEFT_OUT)
-    )
-    declared = HybridModel.load(store.read(parent, f"{INPUTS}/{DECLARED}"))
+    parent = store.run(run.data.tags[PARENT])
+    with _as_written(parent):
+        read = partial(store.read, parent)
+        config = parse_experiment(json.loads(read(EXPERIMENT).read_text(encoding="utf-8")))
+        split, left_out = (codec.loads(read(f"{INPUTS}/{name}").read_bytes()) for name in (RECORDS, LEFT_OUT))
+        declared = HybridModel.load(read(f"{INPUTS}/{DECLARED}"))
+        genome, number = _genome(run), int(run.data.params["number"])
     loaded = Loaded(declared.cell, declared.cell.name, declared.effects, split, left_out, {}, {}, (), config)
     problem = build_problem(loaded, config)
-    candidate = evaluate(problem, _genome(run), weights(config))
+    candidate = evaluate(problem, genome, weights(config))
     if isinstance(candidate, Failed):
         raise FitError(
-            f"candidate {run_id} comes to nothing here ({candidate.reason}); it was made with other code."
+            f"candidate {run_id} comes to nothing here ({candidate.reason}); it was made by an earlier version."
         )
-    number = int(run.data.params["number"])
     metrics = {name: float(value) for name, value in candidate_metrics(candidate).items()}
     return Rebuilt(
         run.info.run_id, number, config, declared, problem, candidate, left_out, run.data.metrics, metrics
@@ -170,6 +175,22 @@ def _candidate(store: Store, run_id: str) -> Any:
     if "terms" not in run.data.params:
         raise InputError(f"candidate {run_id} was tracked without its terms, by an earlier version.")
     return run
+
+
+@contextmanager
+def _as_written(run: Any) -> Iterator[None]:
+    """What a run carries was written by the program: where it cannot be read, another version wrote it, or it was
+    changed since. Raises InputError for either."""
+    try:
+        yield
+    except (InputError, codec.Damaged, KeyError, ValueError) as error:
+        commit = run.data.tags.get(COMMIT, "")
+        by = f" (commit {commit[:COMMIT_SHOWN]})" if commit else ""
+        reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error).rstrip(".")
+        raise InputError(
+            f"run {run.info.run_id} was made by an earlier version{by}, or its files were changed since: {reason}; run "
+            "its experiment again with this version, or ask the one that made it."
+        ) from None
 
 
 def _genome(run: Any) -> Genome:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from aesi.errors import InputError
 from aesi.pipeline.report import tables
-from flows.tracking.store import KIND, Store
+from flows.tracking.store import KIND, Store, without_login
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
 """What tables show with the range over seeds."""
@@ -36,7 +36,7 @@ def tables_of(
     store = Store(uri)
     name = _name(experiment)
     runs = _chosen(store, name, run_ids)
-    summaries = [_summary(store, run.info.run_id) for run in runs]
+    summaries = [_summary(store, run) for run in runs]
     rows = merged([summary["models"] for summary in summaries])
     if figures is not None:
         for run in runs:
@@ -96,7 +96,7 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:
     if experiment_id is None:
         known = sorted(e.name for e in store.client.search_experiments() if e.name != "Default")
         there = f" Tracked so far: {', '.join(known)}." if known else " Nothing is tracked there yet."
-        raise InputError(f"no experiment {name!r} is tracked in {store.uri}.{there}")
+        raise InputError(f"no experiment {name!r} is tracked in {without_login(store.uri)}.{there}")
     condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
     finished = [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
     if run_ids:
@@ -118,8 +118,8 @@ def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:
     return found[0]
 
 
-def _summary(store: Store, run_id: str) -> dict[str, Any]:
-    return dict(json.loads(store.read(run_id, "summary.json").read_text(encoding="utf-8")))
+def _summary(store: Store, run: Any) -> dict[str, Any]:
+    return dict(json.loads(store.read(run, "summary.json").read_text(encoding="utf-8")))
 
 
 def _copy_figures(store: Store, run_id: str, folder: Path) -> None:

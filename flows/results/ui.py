@@ -8,7 +8,7 @@ import sys
 
 from aesi.errors import InputError
 from flows.base import environment
-from flows.tracking.store import Store, default_uri
+from flows.tracking.store import Store, default_uri, without_login
 from flows.tracking.view import VIEW, view_of
 
 TRAINING = "#/experiments?workflowType=machine_learning"
@@ -25,7 +25,7 @@ def serve(port: int, host: str, uri: str | None) -> None:
     """Serve until interrupted. A store that is a server already has its UI there: its address is printed."""
     uri = uri or default_uri()
     if uri.startswith(("http://", "https://")):
-        print(f"The runs are at {uri}")
+        print(f"The runs are at {without_login(uri)}")
         return
     if not _free(host, port):
         raise InputError(f"port {port} on {host} is taken; give another with --port.")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aesi.errors import FitError
+from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.experiment.candidate import ScoredCandidate, genome_space, top_share, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.records import Failed
@@ -162,7 +163,7 @@ def study_key(problem: Problem, config: ExperimentConfig) -> str:
         [search.timeout_s, search.memory_mb],
     ]
     return fingerprint.key(
-        fingerprint.code(), *(record.digest for record in records), json.dumps(settings, default=str)
+        source_digest(), *(record.digest for record in records), json.dumps(settings, default=str)
     )
 
 

@@ -119,33 +119,35 @@ class Store:
                 else "the whole id of a candidate, or the beginning of that of a run"
             )
             raise InputError(
-                f"no run {run_id!r} is tracked in {_without_password(self.uri)}; give {asked}."
+                f"no run {run_id!r} is tracked in {without_login(self.uri)}; give {asked}."
             ) from None
 
     def artifact(self, run: Any, name: str) -> Path | None:
-        """A file among the artifacts of a run, or None where there is none; of a local store without asking it."""
-        from mlflow.utils.file_utils import local_file_uri_to_path
-
-        if not str(run.info.artifact_uri).startswith("file:"):
-            try:
-                return self.read(run.info.run_id, name)
-            except InputError:
-                return None
-        path = Path(local_file_uri_to_path(run.info.artifact_uri)) / name
+        """A file among the artifacts of a run, or None where there is none."""
+        try:
+            path = self.read(run, name)
+        except InputError:
+            return None
         return path if path.is_file() else None
 
-    def read(self, run_id: str, name: str) -> Path:
+    def read(self, run: Any, name: str) -> Path:
         """An artifact of a run, a file or a folder, as it lies on disk or is fetched from a server.
 
         Raises InputError where the run carries none of that name.
         """
         from mlflow.exceptions import MlflowException
+        from mlflow.utils.file_utils import local_file_uri_to_path
 
+        if str(run.info.artifact_uri).startswith("file:"):  # where it lies: MLflow would leave a copy behind
+            path = Path(local_file_uri_to_path(run.info.artifact_uri)) / name
+            if not path.exists():
+                raise InputError(f"run {run.info.run_id} carries no {name}: there is no {path}.")
+            return path
         try:
-            return Path(self.client.download_artifacts(run_id, name))
+            return Path(self.client.download_artifacts(run.info.run_id, name))
         except (OSError, ValueError, MlflowException) as error:
             reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
-            raise InputError(f"run {run_id} carries no readable {name} ({reason}).") from None
+            raise InputError(f"run {run.info.run_id} carries no readable {name} ({reason}).") from None
 
     def find_experiment(self, name: str) -> str | None:
         """Id of the experiment of that name, or None."""
@@ -260,14 +262,15 @@ def _unusable(uri: str, error: Exception) -> StoreAway:
         advice = "free some space, then start again"
     else:
         advice = "check the address, or move the file away to start a new one"
-    return StoreAway(f"the tracking store {_without_password(uri)} cannot be used ({reason}); {advice}.")
+    return StoreAway(f"the tracking store {without_login(uri)} cannot be used ({reason}); {advice}.")
 
 
-def _without_password(uri: str) -> str:
+def without_login(uri: str) -> str:
+    """The address without the user and the password that may be in it, as it may be shown and written."""
     from urllib.parse import urlsplit
 
-    parts = urlsplit(uri)
-    return uri.replace(f":{parts.password}@", ":***@") if parts.password else uri
+    login, at, _ = urlsplit(uri).netloc.rpartition("@")
+    return uri.replace(f"{login}{at}", "", 1)
 
 
 def _passes(error: BaseException | None) -> bool:

@@ -19,7 +19,7 @@ from flows.base import environment
 from flows.tracking.delivery import deliver
 from flows.tracking.outbox import FLUSH_S, Outbox
 from flows.tracking.provenance import source_tags
-from flows.tracking.store import KIND, Store, now_ms
+from flows.tracking.store import KIND, Store, now_ms, without_login
 
 PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 SAMPLE_S = 10.0
@@ -96,7 +96,7 @@ class Tracker:
     @property
     def address(self) -> str:
         """Where MLflow's UI shows the run: on the server, or on the one that `aesi ui` starts."""
-        server = self.store.uri if self.store.uri.startswith("http") else LOCAL_UI
+        server = without_login(self.store.uri) if self.store.uri.startswith("http") else LOCAL_UI
         return f"{server.rstrip('/')}/#/experiments/{self._experiment_id}/runs/{self.run_id}"
 
     def parameters(self, values: Mapping[str, Any], tags: Mapping[str, str] | None = None) -> None:

@@ -145,6 +145,63 @@ def test_formulas_become_mathml_and_code_is_left_alone():
     assert change("costs 5$ or 6$") == "costs 5$ or 6$"
 
 
+def test_a_formula_within_a_list_item_ended_the_list():
+    markdown = pytest.importorskip("markdown", reason="the documentation's own packages are not installed")
+    text = "- one $x$,\n\n    $$x\n    = 1$$\n\n    which is one.\n\n- two\n"
+    html = markdown.markdown(hook("formulas").on_page_markdown(text), extensions=["md_in_html"])
+    assert html.count("<ul>") == 1
+    assert html.count("<li>") == 2
+    assert html.count("<math") == 2
+    for page in sorted((ROOT / "docs" / "theory").glob("*.md")):
+        html = markdown.markdown(hook("formulas").on_page_markdown(page.read_text(encoding="utf-8")))
+        assert not re.search(r"\s- <strong>", html), page.name
+
+
+def test_an_option_of_a_command_broke_behind_its_hyphens():
+    html = '<div class="language-console"><span class="w"> </span>--out<span class="w"> </span>x--y</div> --z'
+    shown = hook("options").on_page_content(html)
+    assert shown == html.replace("--out", '<span class="option">--out</span>')
+
+
+def test_a_table_with_more_figures_than_lines_has_a_figure_a_row(tmp_path, monkeypatch):
+    generate = hook("generate")
+    (tmp_path / "docs").mkdir()
+    monkeypatch.setattr(generate, "ROOT", tmp_path)
+    lines = [
+        {"bench": "spci", "method": name, "coverage_pct": 90.0, "width": 0.5, "fit_s": 1.0}
+        for name in ("split", "aci")
+    ]
+    entry = {"machine": "a machine", "commit": "0123456789", "load": None, "date": "2026-01-01"}
+    (tmp_path / "docs" / "benchmarks.json").write_text(json.dumps({"entries": [{**entry, "lines": lines}]}))
+    page = generate.recorded("spci")
+    assert "| method | split | aci |\n|---|---:|---:|\n| coverage_pct | 90 | 90 |" in page
+
+
+def test_what_the_page_of_the_cells_says_in_short_is_what_its_table_says():
+    page = (ROOT / "docs" / "cells.md").read_text(encoding="utf-8")
+    short, table = page.split("## Every record")
+    rows = [
+        [cell.strip() for cell in line[1:-1].split("|")]
+        for line in table.splitlines()
+        if line.count("|") == 11
+    ]
+    head, unseen = rows[0], [row for row in rows[2:] if "(fitted)" not in row[1]]
+
+    def told(cells, column, *starts):
+        found = [row[head.index(column)] for row in unseen if row[0] in cells and row[1].startswith(starts)]
+        return sorted(round(float(each)) for each in found)
+
+    def said(values):
+        return f"{values[0]} to {values[-1]} mV"
+
+    both, cold = ("panasonic_ncr18650pf", "lg_18650hg2"), ("10degC", "0degC", "n10degC", "40degC")
+    *most, worst = told(both, "with temperature", *cold)
+    assert f"NMC pouch, four records) | {said(told(('about_energy_nmc',), 'declared', ''))} |" in short
+    assert f"| {said(told(both, 'declared', '25degC'))} | {said(told(both, 'declared', *cold))} |" in short
+    assert f"| {said(told(both, 'with temperature', '25degC'))} | {said(most)}, one {worst} |" in short
+    assert f"| {said(told(both, 'aged', '25degC'))} | {said(told(both, 'aged', *cold))} |" in short
+
+
 def test_every_formula_of_the_documentation_is_understood():
     change = hook("formulas").on_page_markdown
     for page in sorted((ROOT / "docs").rglob("*.md")):

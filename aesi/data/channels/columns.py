@@ -163,6 +163,11 @@ class _Finder:
                     f"{self._file}: column {self._table.header[place]!r} cannot be both {seen[place]} and {quantity}."
                 )
             seen[place] = quantity
+        for quantity in self._declared.keys() - self.position.keys():
+            if self.given.get(quantity, quantity) is not None:
+                self.notes.append(
+                    f"A unit was declared for {quantity} ({self._declared[quantity]}), and there is no such column."
+                )
         leave = {"voltage_v": "", "temperature_degc": ", --column temperature_degc= leaves it out"}
         for quantity in sorted(leave.keys() - self.position.keys() - self.given.keys()):
             name = headers.nearest(quantity, self._table.header, doubtful=quantity not in REQUIRED)

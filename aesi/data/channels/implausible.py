@@ -47,6 +47,9 @@ SHORT_RECORD_S = 200.0
 STEP_SHARE = 0.05
 """A step of the current counts where it is above this share of the largest step; ENOUGH_STEPS of them have to."""
 ENOUGH_STEPS = 5
+CLEAR_RESOLUTIONS = 3.0
+"""Of the voltage's smallest change: less may be lost in it. With ENOUGH_STEPS each way a voltage stands still; measured
+records have at most two steps each way without an answer."""
 CLEAR_CORRELATION = 0.5
 """Of current and voltage steps: beyond it they say which sign the current has. Voltage falls with the current, so
 that measured records lie near -1."""
@@ -142,6 +145,32 @@ def check_sign(columns: Columns, context: Context, advice: str) -> None:
             f"{context.at('current_a', row)}: the voltage rises with the current {evidence}, so its sign "
             f"contradicts the one declared{advice}."
         )
+
+
+def check_stuck(columns: Columns, context: Context) -> None:
+    """Refuse a voltage that stands still while the current goes up and down by what moves it elsewhere.
+
+    A voltage that a cycler holds is one value too, but the current of it falls, or rises.
+    """
+    voltage, time = columns["voltage_v"], columns["time_s"]
+    found, answer = _steps(columns), np.abs(np.diff(voltage))
+    if found is None or found[0] >= 0 or not answer.any():
+        return
+    resolution = float(np.min(answer[answer > 0]))
+    expected = -found[0] * np.diff(columns["current_a"])
+    ends = np.concatenate([[-1], np.flatnonzero(answer > 0), [len(answer)]])
+    for k in np.flatnonzero(np.diff(ends) > 2 * ENOUGH_STEPS):
+        first, last = ends[k], ends[k + 1]
+        moves = expected[int(first) + 1 : int(last)]
+        ways = [int(np.sum(way * moves > CLEAR_RESOLUTIONS * resolution)) for way in (1, -1)]
+        if min(ways) >= ENOUGH_STEPS:
+            begin, end = int(first) + 1, int(last)
+            raise DataError(
+                f"{context.at('voltage_v', begin)}: the voltage stands still at {voltage[begin]:.6g} V for "
+                f"{end - begin + 1:,} rows, up to {time[end]:.10g} s, while the current rises {ways[0]} times and "
+                f"falls {ways[1]} times by what moves it elsewhere; check the sensor, or read one side of it: --to-s "
+                f"{time[begin]:.10g} or --from-s {time[end]:.10g}."
+            )
 
 
 def _check_pace(columns: Columns, context: Context) -> None:

@@ -85,6 +85,10 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
             data["current_a"] = way * np.abs(current)  # an empty cell stays one, at rest too
             notes.append(note)
             return
+    if reading.state_words:
+        notes.append(
+            "Words of a state were declared, and the sign of the current comes from itself; name their column: --state."
+        )
     if mapped.bdf_current and reading.sign == "discharge-positive":
         notes.append("The current was declared positive on discharge, which BDF's is not; its sign was left.")
         return

@@ -24,6 +24,7 @@ PARAMETERS = {
         neutral=0.0,
         source="an electrode declared too small by 30 % to half of it gone",
         description="share of the declared active material",
+        counted="share",
         spread=Spread(None, 0.05, "coating weights and cell-to-cell capacity, a few per cent"),
     ),
     "lost_at_soc": Parameter(

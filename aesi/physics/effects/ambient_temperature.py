@@ -22,6 +22,7 @@ PARAMETERS = {
         neutral=0.0,
         source="-40 to 85 degC, what ISO 16750-4 asks of parts in a vehicle, against 25 degC",
         description="true minus declared temperature",
+        shift_of="declared_degc",
     )
 }
 

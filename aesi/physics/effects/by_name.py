@@ -137,7 +137,7 @@ def describe(effect: Effect) -> str:
         vanishes = "" if p.neutral is None else f", vanishes at {p.neutral:g}"
         about = f": {p.description}" if p.description else ""
         lines.append(f"  {key} [{p.unit}] in [{p.bounds[0]:g}, {p.bounds[1]:g}]{scale}{vanishes}{about}")
-        lines.append(f"      typically {p.default:g}; range from {p.source}")
+        lines.append(f"      typically {p.default:g}; range: {p.source}")
     return "\n".join(lines if effect.parameters else lines[:-1])
 
 

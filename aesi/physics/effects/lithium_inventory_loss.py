@@ -23,6 +23,7 @@ PARAMETERS = {
         neutral=0.0,
         source="a cell more than new (declared too low) to its end of life",
         description="share of the declared capacity",
+        counted="share",
         spread=Spread(None, 0.03, "first-cycle losses of cells of one make differ by a few per cent"),
     )
 }

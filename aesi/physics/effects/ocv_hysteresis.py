@@ -6,7 +6,9 @@
 On a long discharge h goes to -1, on a long charge to +1, at rest it stays.
 
 Leaves out minor loops that close faster than the state does, and self-discharge of the state. Holds where the
-open-circuit voltage depends on the direction from which it was reached.
+open-circuit voltage depends on the direction from which it was reached. A fit may take a magnitude below nought, which
+no cell has, so that a cell without hysteresis is seen from both sides; a negative one that is sure of its sign has
+another cause.
 
 Source: Plett, J. Power Sources 134 (2004) 262, doi:10.1016/j.jpowsour.2004.02.032; Axen et al., J. Energy
 Storage 48 (2022) 103985, doi:10.1016/j.est.2022.103985.

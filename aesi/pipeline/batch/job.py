@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from aesi.data.reading import Reading
 from aesi.errors import AesiError
+from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.batch.plan import Job
 from aesi.pipeline.calibrate import Request, calibrate_files
@@ -18,6 +20,8 @@ from aesi.pipeline.discovery.discover import run_case, write_discovery
 from aesi.pipeline.report.words.discoveries import short_finding
 
 ROW = "row.json"
+FINDING = ("discovery.json", "report.html")
+"""What `aesi discover` leaves beside the model: a row without them has been torn out of its folder."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +35,8 @@ class Settings:
 
     @property
     def key(self) -> str:
-        """The settings as text."""
-        return repr(self)
+        """The settings and the program that does the jobs, as text: rows of two versions are not mixed."""
+        return f"{self!r}|{source_digest()}"
 
 
 def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
@@ -47,7 +51,9 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
         if known is not None:
             return known | _about(job, "done")  # whose check-up it is, and when, may be told otherwise by now
         row = _row(job, folder, settings)
-        write_whole(folder / ROW, json.dumps({"key": key, "row": row}, indent=1) + "\n")
+        write_whole(
+            folder / ROW, json.dumps({"key": key, "code": source_digest(), "row": row}, indent=1) + "\n"
+        )
     except AesiError as error:
         return _about(job, "failed") | {"reason": str(error)}
     except OSError as error:
@@ -59,12 +65,26 @@ def _about(job: Job, status: str) -> dict[str, Any]:
     return {"name": job.name, "specimen": job.specimen, "at": job.at, "status": status}
 
 
+def of_other_code(jobs: Iterable[Job], out: Path) -> list[str]:
+    """The names of those jobs that another version of the program did before; they are done again."""
+    kept = {job.name: _kept(out / job.name) for job in jobs}
+    return [name for name, one in kept.items() if one and one.get("code") != source_digest()]
+
+
 def _known(folder: Path, key: str) -> dict[str, Any] | None:
+    """The row of a job that was done with the same files, settings and code, and whose finding is still there."""
+    kept = _kept(folder)
+    whole = kept.get("key") == key and all((folder / name).is_file() for name in FINDING)
+    return kept["row"] if whole else None
+
+
+def _kept(folder: Path) -> dict[str, Any]:
+    """What a job left, nothing where it left none that can be read."""
     try:
         kept = json.loads((folder / ROW).read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        return None
-    return kept["row"] if kept.get("key") == key else None
+        return {}
+    return kept if isinstance(kept, dict) and isinstance(kept.get("row"), dict) else {}
 
 
 def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:

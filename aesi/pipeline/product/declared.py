@@ -6,7 +6,9 @@ from os import PathLike
 from pathlib import Path
 
 from aesi.physics import Cell
+from aesi.physics.belongs import check_belongs
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.records import Measurement
 
 Declared = str | PathLike[str] | Cell | HybridModel
 """A BPX file, the folder of a saved model, a Cell, or a model itself."""
@@ -23,6 +25,11 @@ def declared_model(source: Declared) -> HybridModel:
         return _alone(source)
     path = Path(source)
     return HybridModel.load(path) if path.is_dir() else _alone(Cell.from_bpx(path))
+
+
+def check_of_cell(source: Declared, record: Measurement) -> None:
+    """Raises DataError, one sentence, where a record cannot be of the cell that is declared."""
+    check_belongs(declared_model(source).cell, [record])
 
 
 def _alone(cell: Cell) -> HybridModel:

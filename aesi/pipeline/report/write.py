@@ -37,6 +37,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         view=view,
         chosen=chosen,
         physics=view.model(view.physics) or {"name": view.physics},
+        corrected=view.model(view.corrected) or {"name": view.corrected},
         finding=runs.run_finding(view),
         sentences=[
             sentence

@@ -1,7 +1,7 @@
 """Where fits ended, kept in a file, so that an interrupted search goes on where it was.
 
-The file is keyed on all that a fit depends on: cell, data, own parameters and what each effect *is* (its code, its
-parameters, its bounds), so that an edited effect is fitted again.
+The file is keyed on all that a fit depends on: cell, data, own parameters, what each effect *is* (its code, its
+parameters, its bounds) and the program itself, so that an edited effect, or another version, is fitted again.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.typing import Array
 from aesi.physics.effect import Effect
 from aesi.tracer.case.problem import InverseProblem
@@ -68,7 +69,12 @@ def fit_name(problem: InverseProblem, kind: str, hypothesis: Sequence[str]) -> s
 
 def context_of(problem: InverseProblem) -> str:
     """Changes whenever a stored fit would no longer be the same fit."""
-    text = [repr(problem.cell), problem.model, *(identity(e) for e in problem.effects.values())]
+    text = [
+        source_digest(),
+        repr(problem.cell),
+        problem.model,
+        *(identity(e) for e in problem.effects.values()),
+    ]
     text += [f"fixed {active.values} {identity(active.effect)}" for active in problem.fixed]
     text += [
         f"{r.data.digest} {r.thin.digest} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}" for r in problem.records

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import aesi
 from aesi.errors import InputError
 from flows import cli
 from flows.commands.options import dates, day
@@ -330,3 +331,19 @@ def test_the_shell_is_offered_names(words, offered):
 def test_every_command_is_told_in_one_whole_line(call):
     _, out, _ = call("--help")
     assert "..." not in out.split("Commands:")[1]
+
+
+def test_a_short_record_in_milliseconds_was_converted_without_a_word(call, tmp_path):
+    cell = aesi.Cell.from_bpx(LG_M50)
+    time_s = np.arange(0.0, 1200.0)
+    current = np.repeat(np.random.default_rng(0).normal(3.0, 4.0, 40), 30).clip(-5.0, 12.0)
+    voltage = aesi.simulate(cell, time_s, current, soc0=0.9).voltage_v
+    path, out = tmp_path / "short.csv", tmp_path / "out.csv"
+    pd.DataFrame({"time_s": 1e3 * time_s, "current_a": current, "voltage_v": voltage}).to_csv(
+        path, index=False
+    )
+    code, _, err = call("data", "convert", path, "--cell", LG_M50, "--out", out)
+    assert code == 2
+    assert "--unit time_s=ms" in err
+    assert not out.exists()
+    assert call("data", "convert", path, "--cell", LG_M50, "--unit", "time_s=ms", "--out", out)[0] == 0

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from aesi.calibration.health import HEALTH_WORDS
+from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.batch.job import Settings
 from aesi.pipeline.batch.plan import read_plan
 
@@ -20,7 +21,24 @@ def done(folder, job, ohm):
     row |= {f"{state}_test_mv": 2.0 for state in STATES}
     row |= {f"{key}{end}": ohm for key in HEALTH_WORDS for end in ("", "_low", "_high")}
     folder.mkdir(parents=True)
-    (folder / "row.json").write_text(json.dumps({"key": job.key(Settings().key), "row": row}))
+    for name in ("discovery.json", "report.html"):
+        (folder / name).write_text("")
+    key = job.key(Settings().key)
+    (folder / "row.json").write_text(json.dumps({"key": key, "code": source_digest(), "row": row}))
+
+
+def test_a_batch_that_goes_on_after_an_upgrade_says_what_is_done_again(tracked, capsys):
+    from flows.jobs.batch import batch
+
+    (tracked / "a.csv").write_text("a")
+    (tracked / "plan.csv").write_text("name,data\na,a.csv\n")
+    (job,) = read_plan(tracked / "plan.csv", CELL)
+    done(tracked / "out" / "a", job, 3.0)
+    kept = tracked / "out" / "a" / "row.json"
+    kept.write_text(kept.read_text().replace(source_digest(), "0"))
+    batch(tracked / "plan.csv", tracked / "out", CELL, workers=1)
+    said = capsys.readouterr()
+    assert "a was done by another version of this program" in said.out + said.err
 
 
 @pytest.mark.parametrize("runner", ["local", "dask"])

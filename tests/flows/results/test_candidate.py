@@ -1,5 +1,7 @@
 """A candidate made again from the tracking store, with nothing else of the run left."""
 
+import hashlib
+import io
 import json
 import re
 import shutil
@@ -12,6 +14,7 @@ import aesi
 from aesi.errors import InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.product.hybrid import HybridModel
+from flows.base import codec
 from flows.tracking.store import KIND, Store
 
 PERIOD_S = 300
@@ -71,7 +74,7 @@ def test_a_candidate_could_not_be_made_again_from_what_was_tracked(store_alone, 
     content = json.loads((tmp_path / "back" / "candidate.json").read_text())
     assert content["metrics"]["free_run/valid_mser_pct"] == run.data.metrics["free_run/valid_mser_pct"]
     assert content["metrics"]["loss/oob"] == run.data.metrics["loss/oob"]
-    logged = json.loads(Store(store_alone).read(run.info.run_id, "coefficients.json").read_text())
+    logged = json.loads(Store(store_alone).read(run, "coefficients.json").read_text())
     assert content["coefficients"] == logged
     model = HybridModel.load(tmp_path / "back" / "model")
     prediction = model.predict(np.arange(60.0), np.full(60, 10.0), soc0=0.6)
@@ -94,6 +97,38 @@ def test_another_run_is_refused_in_one_sentence(store_alone):
         rebuild(model.info.run_id, store_alone)
     with pytest.raises(InputError, match="no run 'abc' is tracked"):
         rebuild("abc", store_alone)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("experiment.json", lambda text: text.replace(b'"search"', b'"quest"', 1), "unknown key"),
+        ("inputs/records.bin", lambda data: data[:-9], "checksum"),
+        ("inputs/records.bin", lambda data: renamed(data), "stored by another version"),
+        ("inputs/declared/model.json", lambda text: text.replace(b"aesi.", b"old.", 1), "schema 'old."),
+    ],
+)
+def test_a_run_of_an_earlier_version_was_an_unexpected_error(store_alone, name, change, words):
+    from flows.results.candidate import rebuild
+
+    (run,) = runs_of(store_alone, "run")
+    file = Store(store_alone).read(run, name)
+    file.write_bytes(change(file.read_bytes()))
+    with pytest.raises(InputError, match="was made by an earlier version") as told:
+        rebuild(run.info.run_id, store_alone)
+    assert words in str(told.value)
+
+
+def renamed(data):
+    """Stored records with a field that the class of this version does not have."""
+    head = len(codec.MAGIC) + hashlib.sha256().digest_size
+    with np.load(io.BytesIO(data[head:])) as archive:
+        arrays = {key: archive[key] for key in archive.files}
+    tree = arrays[codec.TREE].tobytes().replace(b'"fields": {"', b'"fields": {"once_', 1)
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays | {codec.TREE: np.frombuffer(tree, dtype=np.uint8)})
+    body = buffer.getvalue()
+    return codec.MAGIC + hashlib.sha256(body).digest() + body
 
 
 def test_coverage_is_tracked_for_both_ensembles(store_alone):

@@ -2,8 +2,10 @@
 
 import shutil
 
+import pytest
+
 from flows.results.tables import tables_of
-from flows.tracking.store import KIND, Store
+from flows.tracking.store import KIND, Store, without_login
 
 
 def copied(source, target):
@@ -50,7 +52,29 @@ def test_a_store_whose_artifacts_stayed_is_left_alone(finished, tmp_path):
     store = Store(f"sqlite:///{alone / 'mlflow.db'}")
     assert not store.notes
     (run,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
-    assert store.read(run.info.run_id, "summary.json").is_file()
+    assert store.read(run, "summary.json").is_file()
+
+
+def test_what_is_read_of_a_local_store_left_a_copy_in_the_folder_for_temporary_files(
+    finished, tmp_path, monkeypatch
+):
+    here = copied(finished, tmp_path / "here")
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    assert tables_of("smoke", uri=f"sqlite:///{here / 'mlflow.db'}")
+    assert not list((tmp_path / "temporary").iterdir())
+
+
+@pytest.mark.parametrize(
+    ("uri", "shown"),
+    [
+        ("https://me:secret@tracking.example:5000/a", "https://tracking.example:5000/a"),
+        ("postgresql://me:secret@host/db", "postgresql://host/db"),
+        ("sqlite:////home/me/a@b.db", "sqlite:////home/me/a@b.db"),
+    ],
+)
+def test_the_password_of_a_server_stood_in_reports(uri, shown):
+    assert without_login(uri) == shown
 
 
 def test_artifacts_go_beside_the_database(tmp_path, empty_store, monkeypatch):

@@ -32,9 +32,17 @@ class Peer:
     soc0: float = SOC0
 
     def solve(
-        self, model="SPMe", options=None, update=None, radial=60, through=20, tolerance=1e-7, graded=False
+        self,
+        model="SPMe",
+        options=None,
+        update=None,
+        radial=60,
+        through=20,
+        tolerance=1e-7,
+        graded=False,
+        stretch=2.0,
     ):
-        """PyBaMM's solution on a fine mesh; graded : finer towards the surfaces of the particles."""
+        """PyBaMM's solution on a fine mesh; graded : finer towards the surfaces of the particles, by exp(stretch)."""
         import pybamm
 
         with warnings.catch_warnings():
@@ -64,7 +72,7 @@ class Peer:
             built = getattr(pybamm.lithium_ion, model)(options or {})
             grids = dict(built.default_submesh_types)
             if graded:
-                towards_surface = {"side": "right", "stretch": 2.0}
+                towards_surface = {"side": "right", "stretch": stretch}
                 for side in ("negative particle", "positive particle"):
                     grids[side] = pybamm.MeshGenerator(
                         pybamm.Exponential1DSubMesh, submesh_params=towards_surface

@@ -1,6 +1,7 @@
 """Calibration over temperatures: recovery, the temperature as an input, intervals, what stays open."""
 
 from dataclasses import replace
+from datetime import date
 
 import numpy as np
 import pytest
@@ -136,3 +137,14 @@ def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of
     (note,) = (n for n in found.notes if "runs empty" in n)
     assert note.startswith("longer: ")
     assert "in the declared cell at" in note
+
+
+def test_the_declared_cell_was_judged_on_a_record_of_another_day_with_a_loss_that_nobody_declared(
+    start, records
+):
+    (record,) = records[:1]
+    plain = calibrate(start, [record], evaluations=1)
+    dated = calibrate(
+        start, [record], evaluations=1, dates={record.name: date(2024, 1, 1)}, as_of=date(2023, 1, 1)
+    )
+    assert dated.errors[0].before_v == plain.errors[0].before_v

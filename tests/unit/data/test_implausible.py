@@ -70,3 +70,19 @@ def test_a_current_in_milliamperes_is_not_taken_for_a_time(tmp_path):
     message = refusal(tmp_path, TIME, 1e3 * DRIVE, voltage(DRIVE))
     assert "--unit current_a=mA" in message
     assert "time_s=ms" not in message
+
+
+def test_a_voltage_that_stood_still_from_the_middle_on_was_taken(tmp_path):
+    stuck = voltage(DRIVE)
+    stuck[900:] = stuck[900]
+    message = refusal(tmp_path, TIME, DRIVE, stuck)
+    assert "row 901 (line 902), column voltage_v: the voltage stands still at" in message
+    assert "--to-s 3600 " in message
+
+
+def test_a_voltage_that_is_held_is_no_sensor_that_stands_still(tmp_path):
+    """The end of a charge: the cycler holds 4.2 V, and the current falls."""
+    pulses = np.where(TIME < 3600.0, np.where((TIME % 400) < 40, 4.0, 0.0), 0.0)
+    current = np.where(TIME < 3600.0, pulses, -3.0 * np.exp(-(TIME - 3600.0) / 900.0))
+    volts = np.where(TIME < 3600.0, voltage(pulses), 4.2)
+    read_measurement(written(tmp_path, TIME, current, np.round(volts, 3)))

@@ -8,7 +8,9 @@ import pytest
 
 from aesi.data import read_measurement
 from aesi.data.current import read_current
+from aesi.data.read import read
 from aesi.data.readers.text import TextTable
+from aesi.data.reading import Reading
 from aesi.errors import DataError
 
 N = 200
@@ -324,3 +326,16 @@ def test_a_gap_in_a_current_alone_was_crossed_in_silence(tmp_path):
     assert [note for note in profile.notes if "No rows for 14401 s from 99 s on" in note]
     corners = written(tmp_path, "time_s,current_a\n0,0\n60,0\n3660,0\n3661,5\n", "corners.csv")
     assert read_current(corners).notes == ()
+
+
+def test_a_unit_without_its_column_and_words_without_theirs_were_passed_over_in_silence(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text("time_s,current_a,voltage_v,mode\n0,1,4.0,D\n1,1,3.99,D\n2,-1,4.02,C\n3,0,4.0,R\n")
+    plain = read_measurement(path)
+    assert plain.notes == ()
+    said = " ".join(read(path, Reading(units={"temperature_degc": "K"})).notes)
+    assert "A unit was declared for temperature_degc (K), and there is no such column" in said
+    said = " ".join(read(path, Reading(state_words={"D": "discharge"})).notes)
+    assert "name their column: --state" in said
+    used = read(path, Reading({"state": "mode"}, state_words={"D": "discharge"})).notes
+    assert not any("Words of a state" in note for note in used)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from scipy.special import erf
 
 from aesi.numerics.modes.galerkin import ohmic_shares, sphere_modes, stack_modes
+from aesi.physics.model import DEFAULT_SOLID_ORDER
 
 PI = np.pi
 
@@ -23,6 +25,16 @@ def test_the_surface_under_a_constant_flux_follows_crank():
     crank = 3.0 * t + 0.2 - 2.0 * np.sum(np.exp(-(z**2) * t) / z**2)
     ours = modes.gain[0] * t + np.sum(modes.gain[1:] * -np.expm1(-modes.lam[1:] * t) / modes.lam[1:])
     assert ours == pytest.approx(crank, rel=1e-5)  # what 16 modes leave at this time
+
+
+def test_the_surface_follows_the_half_space_soon_after_a_step_of_the_flux():
+    # Laplace transform 1 / (s (sqrt(s) - 1)) of a sphere in which nothing has come to the centre yet.
+    modes, t = sphere_modes(DEFAULT_SOLID_ORDER), np.logspace(-5, -2, 50)
+    early = np.exp(t) * (1.0 + erf(np.sqrt(t))) - 1.0
+    grown = -np.expm1(-modes.lam[1:] * t[:, None]) / modes.lam[1:] @ modes.gain[1:]
+    assert modes.gain[0] * t + grown == pytest.approx(
+        early, abs=6e-5
+    )  # 4.1e-5 is reached; radius itself: 9.8e-4
 
 
 def test_projection_and_evaluation_are_inverse_in_the_sphere():

@@ -9,9 +9,10 @@ import pytest
 import aesi
 from aesi.calibration.health import HEALTH_WORDS, health_of
 from aesi.errors import InputError
+from aesi.numerics.files.source_digest import source_digest
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.folded import folded
-from aesi.pipeline.batch.job import Settings, run_job
+from aesi.pipeline.batch.job import Settings, of_other_code, run_job
 from aesi.pipeline.batch.plan import Job, read_plan
 from aesi.pipeline.batch.summary import trends, write_summary
 
@@ -88,17 +89,41 @@ def test_a_job_that_cannot_be_done_is_a_row_with_its_reason(tmp_path):
     assert "bad.csv" in row["reason"]
 
 
+def left(folder, content):
+    """What an earlier run of a batch left of a job."""
+    for name in ("discovery.json", "report.html"):
+        touched(folder / name)
+    (folder / "row.json").write_text(json.dumps(content))
+
+
 def test_what_is_done_is_taken_again_until_a_file_or_a_setting_changes(tmp_path):
     data = touched(tmp_path / "a.csv")
     job, settings = Job("a", CELL, (data,)), Settings()
-    folder = tmp_path / "out" / "a"
-    folder.mkdir(parents=True)
     kept = {"name": "a", "specimen": "", "at": None, "status": "done", "verdict": "none"}
-    (folder / "row.json").write_text(json.dumps({"key": job.key(settings.key), "row": kept}))
+    left(tmp_path / "out" / "a", {"key": job.key(settings.key), "row": kept})
     assert run_job(job, tmp_path / "out", settings) == kept
     assert run_job(job, tmp_path / "out", Settings(seed=1))["status"] == "failed"
     data.write_text("y")
     assert run_job(job, tmp_path / "out", settings)["status"] == "failed"
+
+
+def test_a_row_of_another_version_or_without_its_finding_was_taken_as_done(tmp_path, monkeypatch):
+    job, settings, out = Job("a", CELL, (touched(tmp_path / "a.csv"),)), Settings(), tmp_path / "out"
+    kept = {"name": "a", "specimen": "", "at": None, "status": "done", "verdict": "none"}
+    assert of_other_code([job], out) == []
+    left(
+        out / "a", {"key": job.key(settings.key), "row": kept}
+    )  # as by a version that did not say which it is
+    assert of_other_code([job], out) == ["a"]
+    left(out / "a", {"key": job.key(settings.key), "code": source_digest(), "row": kept})
+    assert of_other_code([job], out) == []
+    assert run_job(job, out, settings) == kept
+    with monkeypatch.context() as later:
+        later.setattr("aesi.pipeline.batch.job.source_digest", lambda: "another")
+        assert of_other_code([job], out) == ["a"]
+        assert run_job(job, out, settings)["status"] == "failed"
+    (out / "a" / "report.html").unlink()
+    assert run_job(job, out, settings)["status"] == "failed"
 
 
 def test_health_shows_what_was_lost():
@@ -150,7 +175,7 @@ def test_a_check_up_that_is_dated_anew_keeps_its_finding_and_not_its_date(tmp_pa
     folder = tmp_path / "out" / "one"
     folder.mkdir(parents=True)
     row = {"name": "one", "specimen": "cell 1", "at": 10.0, "status": "done", "verdict": "none"}
-    (folder / "row.json").write_text(json.dumps({"key": job.key(Settings().key), "row": row}))
+    left(folder, {"key": job.key(Settings().key), "row": row})
     again = run_job(replace(job, specimen="cell 2", at=20.0), tmp_path / "out", Settings())
     assert again == row | {"specimen": "cell 2", "at": 20.0}
 

@@ -152,7 +152,7 @@ def test_the_bootstrap_of_single_samples_is_the_classic_one():
 
 def test_the_caption_of_the_bootstrap_states_mean_and_expectation():
     fig = ensemble.bootstrap_figure(BootstrapView(1000, 10, np.array([0.6, 0.7])))
-    assert "mean 65.0 %" in fig.layout.meta["caption"]
+    assert "mean (full line) 65.0 %" in fig.layout.meta["caption"]
 
 
 def test_the_caption_of_the_terms_says_what_their_names_are_made_of():

@@ -1,7 +1,11 @@
 """A finding is told with its size."""
 
+from dataclasses import replace
+
 import pytest
 
+from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.report.words import sizes
 from aesi.pipeline.report.words.sizes import finding_line, quantity, with_size
 
 
@@ -43,6 +47,22 @@ def test_physics_is_had_and_what_is_off_has_a_size():
     assert with_size("ambient_temperature", told) == (
         "ambient temperature (10.9 degC [9.8, 12.1] instead of 25 degC)"
     )
+
+
+@pytest.mark.parametrize(
+    ("effect", "kind", "values"),
+    [
+        ("series_resistance", "physics", {"resistance_ohm": value(8e-3, 7.9e-3, 8.1e-3, "ohm")}),
+        ("ambient_temperature", "parameter", {"shift_k": value(-14.1, -15.2, -12.9, "K")}),
+    ],
+)
+def test_a_description_may_be_worded_anew(effect, kind, values, monkeypatch):
+    found = discovery(effect, kind, values) | {"declared_degc": 25.0}
+    before = with_size(effect, found)
+    known = CATALOGUE[effect]
+    reworded = {key: replace(p, description="in other words") for key, p in known.parameters.items()}
+    monkeypatch.setattr(sizes, "CATALOGUE", {effect: replace(known, parameters=reworded)})
+    assert with_size(effect, found) == before
 
 
 def test_only_what_differs_from_nothing_is_told():

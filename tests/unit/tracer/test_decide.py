@@ -33,14 +33,18 @@ from aesi.tracer.search.fitted import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.forward import searched
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 
-NEVER = Archive(None, "")
+
+@pytest.fixture
+def archive():
+    """Of one test: a fit is kept by its name, whatever its data."""
+    return Archive(None, "")
 
 
 @pytest.fixture
-def path(cell, few, make):
+def path(cell, few, make, archive):
     data = make((CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006),))
     problem = InverseProblem(cell, prepare_all(cell, [data], 0.9, 0.3), few)
-    return searched(problem, 2, lambda blocks, fit: True, NEVER)
+    return searched(problem, 2, lambda blocks, fit: True, archive)
 
 
 def test_a_search_leaves_what_a_verdict_needs(path):
@@ -84,8 +88,7 @@ def test_what_needs_declared_parameters_that_no_cell_has_is_unknown(path):
     assert consistent(far, verdict) == verdict
 
 
-def test_a_wrong_parameter_is_named_with_what_is_needed_beside_it(cell, few, make):
-    archive = Archive(None, "")
+def test_a_wrong_parameter_is_named_with_what_is_needed_beside_it(cell, few, make, archive):
     hysteresis = CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006)
     slow = CATALOGUE["solid_diffusivity"].activate(negative_factor=0.12, positive_factor=1.0)
     problem = InverseProblem(cell, prepare_all(cell, [make((hysteresis, slow))], 0.9, 0.3), few)
@@ -158,7 +161,9 @@ def test_what_the_data_could_not_have_spoken_against_is_not_found(path):
     assert "other currents" in verdict.reason
 
 
-def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_written(cell, few, make):
+def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_written(
+    cell, few, make, archive
+):
     problem = InverseProblem(cell, prepare_all(cell, [make()], 0.9, 0.3), few)
     assert "rate" in blocks_of(problem).folds
     time = np.arange(0.0, 2400.0, 4.0)
@@ -169,10 +174,10 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     blocks = blocks_of(one)
     assert "rate" not in blocks.folds
     assert "charge" in blocks.folds
-    base = base_of(one, blocks, NEVER)
+    base = base_of(one, blocks, archive)
     assert not Option.of(one, blocks, base).tested
     held = replace(one, trust="measured")
-    assert Option.of(held, blocks, base_of(held, blocks_of(held), NEVER)).tested
+    assert Option.of(held, blocks, base_of(held, blocks_of(held), archive)).tested
     moved = Option.of(one, blocks, base)
     declared = replace(Option.of(one, blocks, None), left_out=LeftOut((1.0,), (1.0,)))
     assert written(declared, [moved])[0] is declared.state
@@ -266,16 +271,16 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert written(declared, [option(5.4, 38.0)], [named, refined]) == (refined.state, None)
 
 
-def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cell, few, make):
+def test_all_that_may_be_written_is_held_against_each_other_on_the_same_rows(cell, few, make, archive):
     effect = CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006)
     problem = InverseProblem(
         cell, prepare_all(cell, [make((effect,)), make((effect,), seed=2)], 0.9, 0.0), few
     )
-    tight = searched(problem, 1, lambda blocks, fit: True, NEVER)
-    measured = searched(replace(problem, trust="measured"), 0, lambda blocks, fit: True, NEVER)
+    tight = searched(problem, 1, lambda blocks, fit: True, archive)
+    measured = searched(replace(problem, trust="measured"), 0, lambda blocks, fit: True, archive)
     assert len(measured.blocks) != len(tight.blocks)
     declared = Option.of(problem, tight.blocks, None)
-    options = named_options(measured, tight, tight.blocks, NEVER)
+    options = named_options(measured, tight, tight.blocks, archive)
     assert [one.state.problem.trust for one in options] == ["measured", "tight"]
     assert {len(one.left_out.by_range) for one in options} == {len(declared.left_out.by_range)}
     assert written(declared, [], options)[1] is None
@@ -334,6 +339,12 @@ def test_running_empty_at_the_end_of_a_discharge_is_no_fault(path, monkeypatch, 
     monkeypatch.setattr("aesi.tracer.decide.carry_over._end", end)
     moved = ModelState(path.problem, {"soc0": {"0": 0.9}})
     assert range_fault(moved) == ("runs empty" if at_fault else None)
+
+
+def test_fits_of_another_version_were_taken_for_this_one_s(path, monkeypatch):
+    here = context_of(path.problem)
+    monkeypatch.setattr("aesi.tracer.search.archive.source_digest", lambda: "another")
+    assert context_of(path.problem) != here
 
 
 def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):

@@ -127,7 +127,7 @@ def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
         )
         if shown:
             _legend_entry(fig, label, symbol)
-    bar = {"title": {"text": "kept by"}, "thickness": 12, "tickformat": ".0%"}
+    bar = {"title": {"text": "kept by<br> "}, "thickness": 12, "tickformat": ".0%"}
     fig.update_layout(coloraxis={"colorscale": style.SEQUENTIAL, "cmin": 0, "cmax": 1, "colorbar": bar})
     fig.update_xaxes(title_text="coefficient, -", zeroline=True)
     return fig
@@ -139,7 +139,7 @@ def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
     expected = 100 * expected_unique_fraction(bootstrap.n, bootstrap.block)
     caption = (
         f"Share of distinct samples in each of {len(share)} resamples of {bootstrap.n:,} samples in blocks "
-        f"of {bootstrap.block}; mean {share.mean():.1f} %, expected {expected:.1f} %."
+        f"of {bootstrap.block}; mean (full line) {share.mean():.1f} %, expected (dashed) {expected:.1f} %."
     )
     fig = style.figure("Coverage of the moving block bootstrap", caption, 300, showlegend=False)
     fig.add_scatter(

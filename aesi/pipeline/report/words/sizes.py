@@ -15,12 +15,6 @@ TELLING = 1.0
 """Standard deviations of its tolerance: a parameter that a refit moved by less counts as declared."""
 MOST_PARAMETERS = 3
 """Of an effect, in one sentence."""
-ADDED = "added to what"
-"""How a parameter's description says that it comes on top of the declared value."""
-SHARE = "share of the declared"
-"""How a parameter's description says that it is a part of something declared, which is told in per cent."""
-INSTEAD = {"true minus declared temperature": ("declared_degc", "degC")}
-"""Description of a parameter that is how far something is from what was declared -> where that stands, and its unit."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
 """Unit -> that of its thousandths or millionths, and how many make one."""
 SMALL = 0.5
@@ -43,7 +37,7 @@ def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = Non
         if row and row["kind"] != "physics":  # what is off, or lies, is not had more or less of
             return f"{name} ({quantity(value)})"
         parameter = known.get(key)
-        more = " more" if parameter is not None and ADDED in parameter.description else " of"
+        more = " more" if parameter is not None and parameter.counted == "added" else " of"
         return f"{quantity(value)}{more} {name}"
     parts = [_part(key, value, known.get(key)) for key, value in list(told.items())[:MOST_PARAMETERS]]
     rest = ", ..." if len(told) > MOST_PARAMETERS else ""
@@ -53,10 +47,10 @@ def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = Non
 def _instead(value: Mapping[str, Any], parameter: Parameter | None, discovery: Mapping[str, Any]) -> str:
     """'14.0 degC [12.1, 15.9] instead of 25 degC', of a parameter that is how far something is from what was declared;
     '' of any other."""
-    key, unit = INSTEAD.get(parameter.description if parameter else "", ("", ""))
+    key = parameter.shift_of if parameter else ""
     if key not in discovery:
         return ""
-    declared = discovery[key]
+    declared, unit = discovery[key], "degC" if key.endswith("_degc") else value["unit"]
     there = {end: declared + value[end] for end in ("value", "low", "high")}
     return f"{quantity({**there, 'unit': unit})} instead of {declared:.4g} {unit}"
 
@@ -135,7 +129,7 @@ def _tells(value: Mapping[str, Any], parameter: Parameter | None) -> bool:
 
 
 def _part(key: str, value: Mapping[str, Any], parameter: Parameter | None) -> str:
-    if parameter is not None and parameter.description.startswith(SHARE):
+    if parameter is not None and parameter.counted == "share":
         percent = {end: 100 * value[end] for end in ("value", "low", "high")}
         return f"{quantity({**percent, 'unit': '%'})} {parameter.description.removeprefix('share ')}"
     words = key.rsplit("_", 1)[0].replace("_", " ") if key.endswith(("_v", "_a", "_k", "_s", "_ohm")) else key

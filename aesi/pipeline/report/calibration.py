@@ -1,0 +1,151 @@
+"""The page of a calibration: what is left of each record, what the records tell of the parameters, and spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from aesi.pipeline.report import style
+from aesi.pipeline.report.nyquist import nyquist_figures
+from aesi.pipeline.report.page import write_page
+from aesi.pipeline.report.plots import maps, records
+from aesi.pipeline.report.views import DiscoveryTrace, Row
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+    from aesi.pipeline.impedance import SpectrumError
+
+STATES = {"before": "start file", "recalibrated": "as the file is simulated", "after": "as fitted"}
+"""Of a trace: the state of the model -> what the page calls it."""
+COURSES = {"diffusivity": "solid diffusivity", "rate": "reaction rate", "film": "film resistance"}
+"""Quantities that follow a course over stoichiometry: in the name of a knot -> in words."""
+SIDES = {"negative": style.BLUE, "positive": style.VERMILLION}
+KNOT, PERCENT = "_at_", "_percent"
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationView:
+    """What the page shows.
+
+    content : of the report in JSON (see `aesi.pipeline.calibrate.calibration_content`).  model : its name in words.
+    traces : each record as it was fitted; `before_v` is of the start file, `recalibrated_v` of the file that was
+    written, as it is simulated, `after_v` of the fit, with what the record has of its own.
+    health : words for the quantities of `content["health"]`.  left : what the records leave open, in a sentence.
+    """
+
+    content: Mapping[str, Any]
+    model: str
+    traces: tuple[DiscoveryTrace, ...]
+    health: Mapping[str, str]
+    left: str = ""
+    spectra: tuple[SpectrumError, ...] = ()
+
+
+def write_calibration_report(path: str | Path, view: CalibrationView) -> Path:
+    """Write the page of a calibration to `path` and return it."""
+    parameters = sorted(
+        ({"name": name, **row} for name, row in view.content["parameters"].items()),
+        key=lambda row: 1.0 if row["of_prior"] is None else row["of_prior"],
+    )
+    nyquist = nyquist_figures(view.spectra)
+    return write_page(
+        path,
+        "calibration.html",
+        _fit_figures(view.traces) | courses(parameters) | nyquist,
+        title=f"Calibration of {view.content['cell']}",
+        view=view,
+        finding=finding(view.content),
+        parameters=[row for row in parameters if KNOT not in row["name"]],
+        knots=[row for row in parameters if KNOT in row["name"]],
+        nyquist=list(nyquist),
+    )
+
+
+def finding(content: Mapping[str, Any]) -> str:
+    """How far off the file is on the records that it was fitted to, and the start file before, in free run."""
+    files = content["files"]
+    after, before = (
+        _range([row[key] for row in files]) for key in ("as_simulated_rmse_mv", "before_rmse_mv")
+    )
+    on = files[0]["name"] if len(files) == 1 else f"the {len(files)} records that it was fitted to"
+    return f"In free run the calibrated file errs by {after} mV RMSE on {on}; the start file erred by {before} mV."
+
+
+def _range(values: Sequence[float]) -> str:
+    least, most = (f"{each:.1f}" for each in (min(values), max(values)))
+    return least if least == most else f"{least} to {most}"
+
+
+def _fit_figures(traces: Sequence[DiscoveryTrace]) -> dict[str, Figure]:
+    """Voltage and residual over time, and the residual against current and state of charge."""
+    if not traces:
+        return {}
+    over_time = records.residual_figure(traces, STATES)
+    over_time.update_layout(
+        meta={
+            "title": "Voltage and residual over time",
+            "caption": "Voltage measured, of the start file and as fitted; current, positive on discharge; residual "
+            "(measured minus model) in free run, on the rows that were fitted.",
+        }
+    )
+    current, soc = (np.concatenate([getattr(t, key) for t in traces]) for key in ("current_a", "soc"))
+    errors = {
+        state: np.concatenate([t.measured_v - getattr(t, f"{state}_v") for t in traces])
+        for state in ("before", "after")
+    }
+    return {
+        "residual": over_time,
+        "against_current": maps.dependence_figure(current, errors, STATES, "current, A (discharge > 0)"),
+        "against_soc": maps.dependence_figure(100.0 * soc, errors, STATES, "state of charge, %"),
+    }
+
+
+def courses(parameters: Sequence[Row]) -> dict[str, Figure]:
+    """The factors at the knots over stoichiometry, both electrodes, a panel a quantity; none without knots."""
+    from plotly.subplots import make_subplots
+
+    found: dict[tuple[str, str], list[tuple[float, Row]]] = {}
+    for row in parameters:
+        course, is_knot, place = row["name"].partition(KNOT)
+        side, _, what = course.partition(".")
+        if is_knot and what in COURSES and side in SIDES:
+            found.setdefault((what, side), []).append((float(place.removesuffix(PERCENT)), row))
+    shown = [what for what in COURSES if any(key[0] == what for key in found)]
+    if not shown:
+        return {}
+    fig = make_subplots(rows=1, cols=len(shown), horizontal_spacing=0.08)
+    for (what, side), knots in sorted(found.items()):
+        knots.sort(key=lambda knot: knot[0])
+        rows = [row for _, row in knots]
+        fig.add_scatter(
+            x=[place for place, _ in knots],
+            y=[row["value"] for row in rows],
+            error_y={
+                "type": "data",
+                "array": [row["high"] - row["value"] for row in rows],
+                "arrayminus": [row["value"] - row["low"] for row in rows],
+                "thickness": 1,
+                "width": 3,
+            },
+            mode="lines+markers",
+            name=f"{side} electrode",
+            legendgroup=side,
+            showlegend=what == shown[0],
+            line={"color": SIDES[side]},
+            row=1,
+            col=1 + shown.index(what),
+        )
+    for column, what in enumerate(shown, start=1):
+        fig.update_xaxes(title_text="place in the window, %", row=1, col=column)
+        fig.update_yaxes(title_text=f"{COURSES[what]}, factor", type="log", dtick=1, row=1, col=column)
+    caption = (
+        "Factors over stoichiometry with 95 % intervals, on top of the factor of the whole electrode in the table. "
+        "0 % is the least stoichiometry of the electrode's window. Where an interval spans a decade, the records say "
+        "little."
+    )
+    return {"courses": style.framed(fig, "Courses over stoichiometry", caption, 340)}

@@ -1,0 +1,130 @@
+"""The page of a calibration: the finding first, every record and parameter, spectra where there are any."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aesi.calibration import calibrate
+from aesi.physics import Cell, simulate
+from aesi.pipeline.calibrate import calibrate_files, fit_traces
+from aesi.pipeline.impedance import SpectrumError
+from aesi.pipeline.report import DiscoveryTrace
+from aesi.pipeline.report.calibration import CalibrationView, courses, finding, write_calibration_report
+from aesi.records import Measurement, Spectrum
+
+START = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
+HEALTH = {"resistance_mohm": "resistance of contacts and films, mohm", "capacity_ah": "capacity, Ah"}
+
+
+def parameter(value=1.0, of_prior=0.3, **more):
+    return {
+        "value": value, "low": 0.5 * value, "high": 2.0 * value, "unit": "factor", "prior_from": "a convention",
+        "of_prior": of_prior, **more,
+    }  # fmt: skip
+
+
+def record(name, **more):
+    return {
+        "name": name, "temperature_degc": None, "before_rmse_mv": 30.0, "after_rmse_mv": 2.0,
+        "as_simulated_rmse_mv": 4.0, "capacity_share": 0.99, **more,
+    }  # fmt: skip
+
+
+@pytest.fixture
+def content():
+    return {
+        "cell": "a <cell>",
+        "declared_degc": 25.0,
+        "files": [record("pulses"), record("slow", temperature_degc=9.5, as_simulated_rmse_mv=6.0)],
+        "parameters": {
+            "negative.rate": parameter(of_prior=0.9),
+            "positive.rate": parameter(of_prior=0.1),
+            **{f"negative.rate_at_{place}_percent": parameter() for place in (0, 50, 100)},
+        },
+        "health": {
+            "resistance_mohm": {"value": 12.0, "low": 10.0, "high": 14.0},
+            "capacity_ah": {"value": 3.0, "low": None, "high": None},
+        },
+        "undetermined": [{"weights": {}, "narrowed": 1.0, "sentence": "the data do not determine it"}],
+        "impedance": [],
+        "at_bounds": ["negative.film"],
+        "notes": ["pulses: no temperature."],
+        "seconds": 3.0,
+    }
+
+
+def traces(names, n=400):
+    time_s = np.arange(n, dtype=float)
+    current_a = np.sign(np.sin(time_s / 30))
+    flat = np.full(n, 3.7)
+    return tuple(
+        DiscoveryTrace(
+            name, "fit", time_s, current_a, 0.9 - 1e-3 * time_s, flat + 1e-3, flat, flat, flat + 9e-4
+        )
+        for name in names
+    )
+
+
+def page(path, view):
+    html = write_calibration_report(path / "report.html", view).read_text("utf-8")
+    placed = re.findall(r'data-figure="([^"]+)"', html)
+    payload = json.loads(re.search(r'id="payload">(.*?)</script>', html, re.DOTALL)[1])
+    assert sorted(placed) == sorted(payload["figures"])
+    return html[: html.index("<script>")]
+
+
+def test_the_finding_comes_first_and_the_best_known_parameter_before_the_others(tmp_path, content):
+    view = CalibrationView(
+        content, "the single particle", traces(["pulses", "slow"]), HEALTH, "these tell 1 of 5"
+    )
+    html = page(tmp_path, view)
+    assert "a &lt;cell&gt;" in html
+    assert html.index("4.0 to 6.0") < html.index("On a bound") < html.index("These tell 1 of 5.")
+    assert html.index("<code>positive.rate</code>") < html.index("<code>negative.rate</code>")
+    assert html.index("<code>negative.rate</code>") < html.index("The 3 knots of the courses")
+    assert "25.0, as declared" in html
+    assert 'data-figure="nyquist_0"' not in html
+
+
+def test_spectra_are_drawn_by_temperature(tmp_path, content):
+    z = 1e-3 * np.exp(1j * np.linspace(0.0, -1.0, 5))
+    hz = np.geomspace(0.01, 100.0, 5)
+    spectra = tuple(
+        SpectrumError(Spectrum(name, hz, z, soc=0.5, temperature_degc=degc), 0.5, 1.1 * z, 0.1)
+        for name, degc in (("a", 25.0), ("b", 25.2), ("c", 10.0))
+    )
+    row = {"name": "a", "soc": 0.5, "temperature_degc": 25.0, "rms_pct": 10.0, "band_hz": [0.01, 100.0]}
+    content["impedance"] = [row, row | {"temperature_degc": None, "rms_pct": None}]
+    html = page(tmp_path, CalibrationView(content, "", traces(["pulses"]), HEALTH, spectra=spectra))
+    assert "Nyquist plot at 25 degC" in html
+    assert "Nyquist plot at 10 degC" in html
+
+
+def test_one_record_is_named_and_its_error_is_no_range(content):
+    content["files"] = content["files"][:1]
+    assert finding(content) == (
+        "In free run the calibrated file errs by 4.0 mV RMSE on pulses; the start file erred by 30.0 mV."
+    )
+
+
+def test_no_knots_are_no_figure():
+    assert courses([{"name": "contact.resistance", **parameter()}]) == {}
+
+
+def test_a_calibration_writes_its_page_with_the_errors_that_it_tells(tmp_path, monkeypatch):
+    cell = Cell.from_bpx(START)
+    time_s = np.arange(0.0, 1200.0)
+    current_a = np.repeat([0.0, 5.0, -3.0, 8.0, 0.0], 240)
+    voltage_v = simulate(cell, time_s, current_a, 0.8).voltage_v - 1e-3 * current_a
+    data = Measurement(time_s, current_a, voltage_v, name="pulses")
+    found = calibrate(cell, [data], evaluations=2)
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", lambda *_, **__: found)
+    calibrate_files(START, [data], tmp_path / "new.json")
+    assert "pulses" in (tmp_path / "new.report.html").read_text("utf-8")
+    (trace,), (error,) = fit_traces(found), found.errors
+    for voltage, rms in ((trace.before_v, error.before_v), (trace.after_v, error.after_v)):
+        assert np.sqrt(np.mean((trace.measured_v - voltage) ** 2)) == pytest.approx(rms, rel=1e-9)
+    assert trace.soc[-1] == pytest.approx(trace.soc[0] - data.charge_ah / found.cell.capacity_ah, abs=0.01)
