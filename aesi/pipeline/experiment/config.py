@@ -80,6 +80,14 @@ class ExperimentConfig(Section):
     def _has_something_to_do(self) -> ExperimentConfig:
         if not self.data.has_roles and self.discover is None:
             raise ValueError(f"data: {NO_ROLES}")
+        if self.fallback is not None and self.data.kind != "catalogue":
+            raise ValueError(
+                f"fallback: it stands in for a data set that cannot be had, and data are of kind: {self.data.kind}; "
+                "leave it out"
+            )
+        named = self.discover and (self.discover.fit or self.discover.test or self.discover.good)
+        if named and self.data.kind == "virtual":
+            raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
         return self
 
     @field_validator("name")
