@@ -127,8 +127,8 @@ def table(rows: Sequence[CaseRow]) -> list[str]:
     """Lines of Markdown, a record a line, the worst in bold."""
     worst = max((row.get("times_better", 0.0) for row in rows), default=0.0)
     lines = [
-        "| cell | left out | verdict | declared | recalibrated | after | after / better |",
-        "|---|---|---|---|---|---|---|",
+        "| cell | left out | verdict | declared, mV | recalibrated, mV | after, mV | after / better |",
+        "|---|---|---|---:|---:|---:|---:|",
     ]
     for row in rows:
         said = row["verdict"] + (f": {', '.join(row['effects'])}" if row.get("effects") else "")

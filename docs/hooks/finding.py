@@ -21,11 +21,9 @@ from typing import Any
 import numpy as np
 from picture import POINTS, Series, nice, series_of
 
-from aesi.constants import ZERO_CELSIUS_K
 from aesi.data import read_measurement
 from aesi.data.catalogue import locate
 from aesi.numerics.typing import Array
-from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report import style
 from aesi.pipeline.report.arrays.decimate import envelope
 from aesi.pipeline.report.words.sizes import finding_line
@@ -71,26 +69,19 @@ def main() -> None:
     asked = parser.parse_args()
     told = asked.witness
     if asked.thermocouple:
-        told = witness(asked.folder, asked.thermocouple, asked.until_s)
+        told = witness(asked.thermocouple, asked.until_s)
     asked.out.write_text(draw(asked.folder, told), encoding="utf-8")
     print(asked.out)
 
 
-def witness(folder: Path, record: str, until_s: float | None) -> str:
-    """The thermocouple's mean, up to `until_s`, beside the temperature of the model that was found."""
+def witness(record: str, until_s: float | None) -> str:
+    """The thermocouple's mean, up to `until_s`."""
     place, _, name = record.partition("/")
     path = Path(record) if Path(record).exists() else locate(place, name)
     measured = read_measurement(path, stop_s=until_s).temperature_degc
     if measured is None:
         raise SystemExit(f"{record} has no temperature.")
-    told = f"thermocouple on the case, not given to the loop: {np.mean(measured):.1f} °C in the mean"
-    content = json.loads((folder / "discovery.json").read_text(encoding="utf-8"))
-    row = next((c for c in content["candidates"] if c["effect"] == "ambient_temperature"), None)
-    if row is None or "ambient_temperature" not in content["effects"]:
-        return told
-    declared = HybridModel.load(folder / "model").cell.initial_temperature_k - ZERO_CELSIUS_K
-    value, low, high = (declared + row["parameters"]["shift_k"][key] for key in ("value", "low", "high"))
-    return f"found: {value:.1f} °C [{low:.1f}, {high:.1f}]; {told}"
+    return f"thermocouple on the case, not given to the loop: {np.mean(measured):.1f} degC in the mean"
 
 
 def draw(folder: Path, told: str) -> str:
@@ -106,6 +97,11 @@ def draw(folder: Path, told: str) -> str:
     body += _panel(voltage, starts, end, VOLTAGE, "voltage, V", symmetric=False)
     body += _panel(residual, starts, end, RESIDUAL, "residual, mV", symmetric=True)
     body += [_label(one, k) for k, one in enumerate(residual[tested])]
+    body.append(_text(WIDTH - RIGHT, VOLTAGE[0] - 8, "black: measured", colour=GREY, anchor="end"))
+    if len(parts) > 1:
+        body.append(
+            _text(WIDTH - RIGHT, RESIDUAL[0] - 8, "RMSE: of the shaded part", colour=GREY, anchor="end")
+        )
     lines = wrap(finding_line(content), LETTERS)
     body += [_text(LEFT, 20 + 19 * k, line, weight=600) for k, line in enumerate(lines)]
     body.append(_text(LEFT, 20 + 19 * len(lines), told))
@@ -167,6 +163,8 @@ def _panel(
         low = -high
     step = nice((high - low) / 3)
     panel = Panel(*place, step * np.floor(low / step), step * np.ceil(high / step), end)
+    if np.nanmin(every) < panel.low or np.nanmax(every) > panel.high:
+        title += ", cut off"
     out = [_level(panel, v) for v in np.arange(panel.low, panel.high + step / 2, step)]
     middle = (panel.top + panel.bottom) / 2
     out.append(

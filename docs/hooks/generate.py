@@ -33,15 +33,15 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
 
 
 def catalogue() -> str:
-    """Every effect of the catalogue, by kind."""
+    """Every effect of the catalogue, by kind: all in short, then each by itself."""
     from aesi.physics.effects import CATALOGUE
 
-    parts = []
-    for kind, title in KINDS.items():
-        effects = [effect for effect in CATALOGUE.values() if effect.kind == kind]
-        if effects:
-            parts.append(f"## {title}\n")
-            parts += [_effect(effect) for effect in effects]
+    kinds = {title: [e for e in CATALOGUE.values() if e.kind == kind] for kind, title in KINDS.items()}
+    parts = ["| effect | what it is |", "|---|---|"]
+    for title, effects in kinds.items():
+        parts += [f"| **{title}** | |", *(f"| [{e.id}](#{e.id}) | {e.summary} |" for e in effects)]
+    for title, effects in kinds.items():
+        parts += [f"\n## {title}\n", *(_effect(effect) for effect in effects)]
     return "\n".join(parts)
 
 

@@ -129,7 +129,8 @@ def _cell(value: Any) -> str:
     if value is None:
         return "–"
     if isinstance(value, float):
-        return f"{value:.4g}"
+        text = f"{value:.4g}"
+        return f"{float(text):,.0f}" if "e+" in text else text
     if isinstance(value, dict | list):
         return f"`{json.dumps(value)}`"
     return str(value).replace("|", "\\|")

@@ -134,7 +134,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Lines of Markdown: the rows, then the protocols of others."""
     protocols = list(dict.fromkeys(r["others"] for r in rows if r.get("others")))
     lines = [f"| cell | record | mean degC | {' | '.join(COLUMNS.values())} | others |"]
-    lines.append("|" + "---|" * (len(COLUMNS) + 4))
+    lines.append("|---|---|" + "---:|" * (len(COLUMNS) + 1) + "---|")
     for row in rows:
         name = row["record"] + (" (fitted)" if row["fitted"] else "")
         shown = [_shown(row, key) for key in COLUMNS]

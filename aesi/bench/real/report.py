@@ -59,16 +59,22 @@ def write_report(path: Path, rows: Sequence[CaseRow], summary: Mapping[str, Any]
         title="Findings on measured cells",
         rows=sorted(rows, key=lambda row: (row["group"], row["case"])),
         summary=summary,
-        lines=[
-            (words, _told(summary, key), _told(summary["reported"], key), aim)
-            for key, (words, aim) in FIGURES.items()
-        ],
+        lines=_lines(summary),
         worst=[f"worst_{k}" for k in range(len(worst))],
         by_kind=_by_kind(rows),
         witnesses=[r for r in rows if "ohmic_off" in r],
         courses=[r for r in rows if "course_rms_k" in r],
         losses=[r for r in rows if "lost_off_pp" in r],
     )
+
+
+def _lines(summary: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
+    """What a figure is, of all cases, of those that chose nothing, and its aim; without figures that no case gave."""
+    return [
+        (words, _told(summary, key), _told(summary["reported"], key), aim)
+        for key, (words, aim) in FIGURES.items()
+        if summary.get(key) is not None
+    ]
 
 
 def _told(rates: Mapping[str, Any], key: str) -> str:

@@ -114,6 +114,6 @@ def _figure(specimens: Mapping[str, Sequence[Mapping[str, float]]]) -> Figure:
                 col=1,
             )
         fig.update_yaxes(title_text=quantities[panel - 1][2], row=panel, col=1)
-    fig.update_xaxes(title_text="at", row=len(titles), col=1)
+    fig.update_xaxes(title_text="at, as in the plan", row=len(titles), col=1)
     caption = "Each check-up calibrated on its own from the same cell file, with 95 % intervals."
     return framed(fig, "State of health", caption, 170 * len(titles))

@@ -80,6 +80,7 @@ def _environment() -> Environment:
         lstrip_blocks=True,
     )
     environment.filters |= FILTERS
+    environment.tests["of_models"] = lambda cell, models: cell.rpartition(", ")[0] in models
     return environment
 
 

@@ -10,8 +10,9 @@ import pytest
 
 from aesi.pipeline.report import sections, write_discovery_report, write_figures, write_run_report
 from aesi.pipeline.report.arrays.embed import STORED, ArrayStore, embed
-from aesi.pipeline.report.page import FILTERS
+from aesi.pipeline.report.page import FILTERS, _environment
 from aesi.pipeline.report.plots import records
+from aesi.pipeline.report.table_formats import Table
 
 
 def payload(html):
@@ -178,3 +179,14 @@ def test_an_interval_narrower_than_a_thousandth_was_shown_as_a_point(interval, d
 def test_thousands_are_written_out():
     shown = [FILTERS["significant"](value) for value in (2049.6, 0.000123, 98.76, 8.82e4, 3.2e7, None)]
     assert shown == ["2,050", "0.000123", "98.8", "88,200", "3.2e+07", "–"]
+
+
+@pytest.mark.parametrize("models", [2, 12])
+def test_a_table_of_many_models_and_horizons_shows_the_models_of_the_headline(models):
+    rows = tuple((f"model, {k}, {horizon} s", "1.0") for k in range(models) for horizon in (1, 10, 60))
+    table = Table("bands", "", ("model", "width, mV"), rows)
+    page = _environment().from_string('{% import "macros.html" as m %}{{ m.data_table(table, names) }}')
+    shown, _, folded = page.render(table=table, names=("model, 1",)).partition("<details>")
+    assert (shown + folded).count("model, 1, 60 s") == (1 if models == 2 else 2)
+    assert shown.count('scope="row"') == (6 if models == 2 else 3)
+    assert folded.count('scope="row"') == (0 if models == 2 else 36)

@@ -34,6 +34,7 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     )
     better = replace(learned, models=(*view.models, {**row, "free_run": {"test_rmse_mv": 9.0}}))
     assert "takes that to 4.1 mV, 79.2 % less mean squared error" in runs.corrected_finding(better)
+    assert "mV of the ESPM and 9.0 mV of the ESPM recalibrated to 4.1 mV RMSE" in runs.run_finding(better)
     assert runs.corrected_finding(view) == ""
     figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
     refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))

@@ -30,9 +30,15 @@ def run_finding(view: RunView) -> str:
             "The data-driven correction does not help here: in free run on the test records the error "
             f"grows from {first} mV to {last} mV. Use the {view.physics} alone."
         )
+    corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
+    if corrected is None or view.corrected in (view.physics, view.chosen):
+        start = f"{first} mV"
+    else:  # else the correction would be credited with what the recalibration does
+        between, last = _told(corrected, after)
+        start = f"{before:.1f} mV of the {view.physics} and {between} mV of the {view.corrected}"
     return (
         f"On test records that chose nothing, run without any measured voltage, {view.chosen} takes the "
-        f"voltage error from {first} mV to {last} mV RMSE: {reduction:.1f} % less mean squared "
+        f"voltage error from {start} to {last} mV RMSE: {reduction:.1f} % less mean squared "
         f"error than the {view.physics} alone."
     )
 
