@@ -85,8 +85,7 @@ class ExperimentConfig(Section):
                 f"fallback: it stands in for a data set that cannot be had, and data are of kind: {self.data.kind}; "
                 "leave it out"
             )
-        named = self.discover and (self.discover.fit or self.discover.test or self.discover.good)
-        if named and self.data.kind == "virtual":
+        if self.data.kind == "virtual" and self.discover is not None and self.discover.names_records:
             raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
         return self
 

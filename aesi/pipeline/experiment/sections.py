@@ -337,6 +337,11 @@ class DiscoverConfig(Section):
     hold: Hold | None = None
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
 
+    @property
+    def names_records(self) -> bool:
+        """Whether it names a record of any role."""
+        return bool(self.fit or self.test or self.good)
+
     @model_validator(mode="after")
     def _cuts_what_is_there(self) -> DiscoverConfig:
         unknown = [name for name in self.fit_until_s if name not in self.fit]
