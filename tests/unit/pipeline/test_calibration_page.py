@@ -41,7 +41,7 @@ def content():
         "files": [record("pulses"), record("slow", temperature_degc=9.5, as_simulated_rmse_mv=6.0)],
         "parameters": {
             "negative.rate": parameter(of_prior=0.9),
-            "positive.rate": parameter(of_prior=0.1),
+            "positive.rate": parameter(of_prior=0.1, posterior_low=0.4, posterior_high=2.1),
             **{f"negative.rate_at_{place}_percent": parameter() for place in (0, 50, 100)},
         },
         "health": {
@@ -86,6 +86,7 @@ def test_the_finding_comes_first_and_the_best_known_parameter_before_the_others(
     assert html.index("<code>positive.rate</code>") < html.index("<code>negative.rate</code>")
     assert html.index("<code>negative.rate</code>") < html.index("The 3 knots of the courses")
     assert "25.0, as declared" in html
+    assert html.count("sampled [") == 1
     assert 'data-figure="nyquist_0"' not in html
 
 
