@@ -82,7 +82,12 @@ def test_the_finding_comes_first_and_the_best_known_parameter_before_the_others(
     )
     html = page(tmp_path, view)
     assert "a &lt;cell&gt;" in html
-    assert html.index("4.0 to 6.0") < html.index("On a bound") < html.index("These tell 1 of 5.")
+    assert (
+        html.index("by 2.0\u00a0mV RMSE")
+        < html.index("4.0 to 6.0")
+        < html.index("On a bound")
+        < html.index("These tell 1 of 5.")
+    )
     assert html.index("<code>positive.rate</code>") < html.index("<code>negative.rate</code>")
     assert html.index("<code>negative.rate</code>") < html.index("The 3 knots of the courses")
     assert "25.0, as declared" in html
@@ -107,7 +112,8 @@ def test_spectra_are_drawn_by_temperature(tmp_path, content):
 def test_one_record_is_named_and_its_error_is_no_range(content):
     content["files"] = content["files"][:1]
     assert finding(content) == (
-        "In free run the calibrated file errs by 4.0 mV RMSE on pulses; the start file erred by 30.0 mV."
+        "In free run the calibrated model errs by 2.0 mV RMSE on pulses, where the start file erred by 30.0 mV. "
+        "Simulated without what a record has of its own, the file errs by 4.0 mV."
     )
 
 
