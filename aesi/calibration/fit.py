@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 
 import numpy as np
@@ -81,8 +82,9 @@ def calibrate(
     declared = _declared_errors(cell, model)
     fitted, simulated = ([_rms(e) for e in each] for each in (errors, model.errors(model.as_simulated(x))))
     found, warmth = with_heat(rewound(model, x), model.records)
+    shares = capacities(model, x)
     return Calibration(
-        cell=found,
+        cell=replace(found, fitted_with=physics, capacity_shares=tuple(shares.items())),
         declared=cell,
         parameters=intervals(model, x, covariance),
         undetermined=undetermined(model, scaled),
@@ -91,7 +93,7 @@ def calibrate(
             RecordError(r.name, _degc(r), *three)
             for r, *three in zip(model.records, declared, fitted, simulated, strict=True)
         ),
-        capacities=capacities(model, x),
+        capacities=shares,
         notes=(*notes, *_told(model, x), *_ran_out(cell, model, x), *warmth),
         seconds=time.perf_counter() - began,
         model=model,

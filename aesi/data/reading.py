@@ -60,9 +60,9 @@ def bounds(name: str, text: str | None) -> tuple[float, float] | None:
     """'3' as (3, 3), '3:5' as (3, 5); None for None.  Raises DataError for anything else."""
     if text is None:
         return None
-    first, _, last = str(text).partition(":")
+    first, to, last = str(text).partition(":")
     try:
-        return float(first), float(last or first)
+        return float(first), float(last if to else first)
     except ValueError:
         raise DataError(f"{name} = {text!r} has to be a number, or from:to, as in 3 or 3:5.") from None
 

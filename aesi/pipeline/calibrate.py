@@ -82,9 +82,7 @@ def calibrate_files(
         as_of=asked.as_of,
     )
     name = declared.name if asked.title is None else asked.title
-    described = replace(found.cell, name=name, description=_made_from(found), fitted_with=found.model.physics)
-    shares = tuple((e.name, found.capacities[e.name]) for e in found.errors)
-    found = replace(found, cell=replace(described, capacity_shares=shares))
+    found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra, told = held_against(found.cell, asked.impedance, model=model)
     content = calibration_content(

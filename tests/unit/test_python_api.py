@@ -127,8 +127,8 @@ def test_a_discovery_that_kept_nothing_back_showed_errors_that_are_no_number(
     monkeypatch.setattr("aesi.pipeline.discovery.discover.known_effects", lambda files: few)
     found = aesi.discover(cell, record, soc0=SOC0, holdout=0.0)
     shown, page = repr(found), (found.save(tmp_path) / "report.html").read_text()
-    assert "RMSE, fit" in page
-    assert "RMSE, test" not in page
+    assert "RMSE, free run, fit" in page
+    assert "RMSE, free run, test" not in page
     assert shown.endswith("mV after, on the data that were fitted)")
     assert "nan" not in shown
 

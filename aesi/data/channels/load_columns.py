@@ -141,7 +141,7 @@ def _window(data: Columns, context: Context, reading: Reading, notes: list[str])
     low = -np.inf if reading.start_s is None else reading.start_s
     high = np.inf if reading.stop_s is None else reading.stop_s
     time = data["time_s"]
-    keep = np.flatnonzero((time >= low) & (time <= high))
+    keep = np.flatnonzero(~((time < low) | (time > high)))  # a row without a time is not asked away
     if len(keep) < 2:
         raise DataError(
             f"{context.file}: {' '.join(_asked(reading))} leaves {len(keep)} of its rows, and a record needs two; its "

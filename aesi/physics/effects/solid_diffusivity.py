@@ -13,7 +13,7 @@ from aesi.physics.cell.relations import scaled
 from aesi.physics.effect import Effect
 from aesi.physics.model import EspmModel
 
-RANGE = "an order of magnitude either way, the scatter of published values"
+RANGE = "two orders of magnitude either way: how far published values lie apart; the spread says how likely that is"
 SPREAD = Spread(
     tight=0.43,
     loose=1.0,
@@ -24,7 +24,7 @@ PARAMETERS = {
     name: Parameter(
         0.5,
         "dimensionless",
-        (0.1, 10.0),
+        (0.01, 100.0),
         RANGE,
         log=True,
         neutral=1.0,

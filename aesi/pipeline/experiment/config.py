@@ -80,6 +80,13 @@ class ExperimentConfig(Section):
     def _has_something_to_do(self) -> ExperimentConfig:
         if not self.data.has_roles and self.discover is None:
             raise ValueError(f"data: {NO_ROLES}")
+        if self.fallback is not None and self.data.kind != "catalogue":
+            raise ValueError(
+                f"fallback: it stands in for a data set that cannot be had, and data are of kind: {self.data.kind}; "
+                "leave it out"
+            )
+        if self.data.kind == "virtual" and self.discover is not None and self.discover.names_records:
+            raise ValueError("discover: kind: virtual brings its own records; leave out fit, test and good")
         return self
 
     @field_validator("name")

@@ -65,6 +65,10 @@ class VirtualConfig(Section):
     seed: Annotated[int, Field(ge=0)] = 0
 
 
+READING_KEYS = ("columns", "units", "sign", "state_words", "duplicates")
+"""Of a data section: how its files are read."""
+
+
 class DataConfig(Section):
     """Records by role, or one record cut by repeats.
 
@@ -98,8 +102,26 @@ class DataConfig(Section):
         if self.kind == "virtual":
             if self.repeats or self.record or self.train or self.valid or self.test:
                 raise ValueError("kind: virtual brings its own records; leave out record, repeats and roles")
-        elif self.repeats and not self.record:
+            if unread := [name for name in READING_KEYS if getattr(self, name)]:
+                raise ValueError(f"`{unread[0]}` is about files, and kind: virtual reads none; leave it out")
+            return self
+        if self.virtual != VirtualConfig():
+            raise ValueError(f"`virtual` is of kind: virtual, and this is kind: {self.kind}; leave it out")
+        if self.kind == "files" and self.set:
+            raise ValueError("`set` is of kind: catalogue, and this is kind: files; leave one of them out")
+        return self
+
+    @model_validator(mode="after")
+    def _each_in_one_role(self) -> DataConfig:
+        if self.repeats and not self.record:
             raise ValueError("`repeats` needs `record`, the record to cut")
+        if self.record and (self.train or self.valid or self.test):
+            raise ValueError(
+                "`record` is cut by `repeats`, which say what trains and tests; give it, or train, valid and test"
+            )
+        both = next((name for name in self.valid if name in self.train), None)
+        if both is not None:
+            raise ValueError(f"{both} is in train and in valid; what is fitted cannot validate")
         return self
 
     @property
@@ -298,7 +320,7 @@ class RunnerConfig(Section):
 class DiscoverConfig(Section):
     """What `aesi discover` needs beyond cell and data.
 
-    fit, test : names of records (kind: virtual has them by role); a record in both goes on where the fit ends.
+    fit, test : names of records; a record in both goes on where the fit ends. kind: virtual has them by role.
     fit_until_s : record -> time up to which fits see it.  until_s : what comes later is left out of every test record.
     good : records of the cell that are known to be good; what is sought is what those in `fit` have beside them.
     holdout : the last share of each record, kept back where there are no test records; None takes 0.3.
@@ -314,6 +336,20 @@ class DiscoverConfig(Section):
     holdout: Annotated[float, Field(ge=0, le=0.9)] | None = None
     hold: Hold | None = None
     max_effects: Annotated[int, Field(ge=0, le=10)] = 3
+
+    @property
+    def names_records(self) -> bool:
+        """Whether it names a record of any role."""
+        return bool(self.fit or self.test or self.good)
+
+    @model_validator(mode="after")
+    def _cuts_what_is_there(self) -> DiscoverConfig:
+        unknown = [name for name in self.fit_until_s if name not in self.fit]
+        if unknown:
+            raise ValueError(
+                f"fit_until_s cuts {unknown[0]}, which is not in fit: {', '.join(self.fit) or 'none'}"
+            )
+        return self
 
 
 class FallbackConfig(Section):

@@ -22,13 +22,19 @@ if TYPE_CHECKING:
 TELLING_SHARE = 0.01
 """A share of the residual's variance below this is not worth a bar."""
 
+NOT_COMPARED: dict[str, Any] = {"free_run": None, "one_step": None, "intervals": None}
+"""Of a model that the experiment does not name among those that it compares: there are no figures."""
+
 
 def write_run_report(path: str | Path, view: RunView) -> Path:
     """Write the report of one run to `path` and return it."""
     figures = paper_figures(view)
     for section in sections.SECTIONS:
         figures.update(section.figures(view))
-    chosen = view.model(view.chosen) or {"name": view.chosen}
+    chosen, physics, corrected = (
+        view.model(name) or NOT_COMPARED | {"name": name}
+        for name in (view.chosen, view.physics, view.corrected)
+    )
     return write_page(
         path,
         "run.html",
@@ -36,8 +42,8 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
         title=f"{view.experiment}: hybrid model of {view.cell}",
         view=view,
         chosen=chosen,
-        physics=view.model(view.physics) or {"name": view.physics},
-        corrected=view.model(view.corrected) or {"name": view.corrected},
+        physics=physics,
+        corrected=corrected,
         finding=runs.run_finding(view),
         sentences=[
             sentence

@@ -210,6 +210,20 @@ class InverseProblem:
         )
 
     @cached_property
+    def start_slope_v(self) -> Array:
+        """(n,) V: what one standard deviation of each record's initial state of charge is worth in the declared model;
+        nought of a record that cannot be simulated there."""
+        return np.concatenate([self._start_slope_v(i) for i in range(len(self.records))])
+
+    def _start_slope_v(self, i: int) -> Array:
+        record, here = self.records[i], self._declared[i]
+        try:
+            there = self.run(self.seen[i], record.other_soc0, self.fixed, record.thin_hold)
+        except AesiError:
+            return np.zeros(len(here.voltage_v))
+        return np.asarray(there.voltage_v - here.voltage_v)
+
+    @cached_property
     def declared_soc(self) -> Array:
         """(n,) state of charge by the declared cell's coulombs."""
         return np.concatenate([run.series["soc"] for run in self._declared])

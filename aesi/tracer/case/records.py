@@ -24,6 +24,8 @@ THINNED_SHARE = 0.5
 0.48 of it are left on eight drives of blind cases at 10 Hz (seeds 13 and 18)."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
+HALF_FULL = 0.5
+"""State of charge from which a smaller one is the safer to simulate: the middle, whatever the cell."""
 SMALLEST_NOISE_V = 5e-5
 """No cycler writes less: a virtual record without noise would count each microvolt."""
 
@@ -67,6 +69,12 @@ class PreparedRecord:
     def soc0_sd(self) -> float:
         """What it is uncertain by, standard deviation."""
         return self.start.sd
+
+    @property
+    def other_soc0(self) -> float:
+        """A state of charge one standard deviation from that, towards the middle: the side that is safe to
+        simulate."""
+        return self.soc0 + (-self.soc0_sd if self.soc0 > HALF_FULL else self.soc0_sd)
 
     @property
     def noise_v(self) -> float:

@@ -15,7 +15,7 @@ from aesi.records import Measurement
 from aesi.tracer.case.blocks import RANGES, Blocks
 from aesi.tracer.case.problem import INDEPENDENT_CHARGE, InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
-from aesi.tracer.likelihood.model_error import MOST_MEASURED_V
+from aesi.tracer.likelihood.model_error import MEASURED_V, MOST_MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.fitted import values_without
 
@@ -37,7 +37,8 @@ STEP_S = 10.0
 class LeftOut:
     """What one model leaves on data that it has not seen, V RMS; infinite where it could not be simulated.
 
-    by_record : (k,) each record where the others put the model.  by_range : (p,) those in turn, by range of charge.
+    by_record : (k,) each record where the others put the model.  by_range : (p,) those in turn, by range of charge, as
+    far as where they begin is known.
     """
 
     by_record: tuple[float, ...]
@@ -60,13 +61,27 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
     the model as declared."""
     folds = blocks.folds["record" if len(problem.records) > 1 else "end"]
     charges = [np.isin(blocks.of_row, charge) for charge in blocks.folds["charge"]]
+    tells = np.sqrt(_tells(problem))
     by_record, by_range = [], []
     for k, fold in enumerate(folds):
-        residual = _left_out_residual(problem, blocks, one, k, fold)
         out = np.isin(blocks.of_row, fold)
+        residual = _left_out_residual(problem, blocks, one, k, fold)
         by_record.append(_rms(residual))
-        by_range += [_rms(residual[charge[out]]) for charge in charges if charge[out].any()]
+        told = tells[out] * residual
+        by_range += [_rms(told[charge[out]]) for charge in charges if charge[out].any()]
     return LeftOut(tuple(by_record), tuple(by_range))
+
+
+def _tells(problem: InverseProblem) -> Array:
+    """(n,) how far the error of a model in each row tells of a fault of the model where its record is left out.
+
+    The record then begins at the state of charge that its first voltage is read as. Where what that is uncertain by is
+    worth more than models of measured cells are off by, as on the knee at the end of a discharge, an error is no
+    evidence of harm. What is left out of a single record begins where the rest of it ends.
+    """
+    if len(problem.records) == 1:
+        return np.ones(len(problem.measured))
+    return np.asarray(MEASURED_V**2 / (MEASURED_V**2 + problem.start_slope_v**2))
 
 
 def _rms(values: Array) -> float:

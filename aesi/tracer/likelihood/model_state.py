@@ -19,9 +19,6 @@ from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.growth import Explanation, linear_values
 
-HALF_FULL = 0.5
-"""State of charge from which a smaller one is the safer to simulate: the middle, whatever the cell."""
-
 
 @dataclass(frozen=True, eq=False)
 class ModelState:
@@ -69,10 +66,9 @@ class ModelState:
         """(n,) V of a whole record that was not fitted: what one standard deviation of its initial state of charge is
         worth.  Raises AesiError where it cannot be simulated there."""
         run, effects = self.problem.run, self.effects(record.good)
-        inward = -record.soc0_sd if record.soc0 > HALF_FULL else record.soc0_sd
         here, there = (
             run(record.data, soc0, effects, record.hold).voltage_v
-            for soc0 in (record.soc0, record.soc0 + inward)
+            for soc0 in (record.soc0, record.other_soc0)
         )
         return np.asarray(there - here)
 

@@ -31,7 +31,7 @@ FULL = {
         "hold": "linear",
         "columns": {},
         "units": {},
-        "sign": "discharge-positive",
+        "sign": None,
         "state_words": {},
         "duplicates": None,
         "virtual": VIRTUAL,

@@ -148,3 +148,10 @@ def test_the_declared_cell_was_judged_on_a_record_of_another_day_with_a_loss_tha
         start, [record], evaluations=1, dates={record.name: date(2024, 1, 1)}, as_of=date(2023, 1, 1)
     )
     assert dated.errors[0].before_v == plain.errors[0].before_v
+
+
+def test_a_cell_calibrated_in_python_did_not_say_which_model_it_was_fitted_with(found, start, records):
+    assert found.cell.fitted_with == "espm"
+    assert dict(found.cell.capacity_shares) == found.capacities
+    other = calibrate(replace(start, fitted_with="dfn"), records[:1], evaluations=1)
+    assert other.cell.fitted_with == "espm"

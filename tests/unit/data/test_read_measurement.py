@@ -339,3 +339,18 @@ def test_a_unit_without_its_column_and_words_without_theirs_were_passed_over_in_
     assert "name their column: --state" in said
     used = read(path, Reading({"state": "mode"}, state_words={"D": "discharge"})).notes
     assert not any("Words of a state" in note for note in used)
+
+
+def test_a_row_without_a_time_was_left_out_as_if_asked(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text("time_s,current_a,voltage_v\n0,1,4.0\n1,1,3.99\n,1,3.98\n3,1,3.97\n4,0,4.0\n")
+    with pytest.raises(DataError, match=r"row 3 \(line 4\), column time_s is empty"):
+        read_measurement(path, start_s=0.5)
+
+
+def test_an_open_range_of_cycles_was_taken_for_its_first(tmp_path):
+    path = tmp_path / "drive.csv"
+    path.write_text("time_s,current_a,voltage_v,cycle\n0,1,4.0,1\n1,1,3.9,1\n2,1,3.8,2\n3,0,3.9,2\n")
+    with pytest.raises(DataError, match="cycle = '1:' has to be a number, or from:to"):
+        read_measurement(path, cycle="1:")
+    assert len(read_measurement(path, cycle="1:2")) == 4

@@ -71,7 +71,12 @@ def test_effects_of_the_cell_and_files_with_effects_were_passed_over_in_silence(
         case_of_experiment(
             read_experiment(EXPERIMENTS / "measured_nmc.yaml", ["cell.effects={series_resistance: {}}"])
         )
-    overrides = ["discover.fit=[C2]", "discover.test=[]", "cell.effect_files=[mine.py]"]
+    overrides = [
+        "discover.fit=[C2]",
+        "discover.fit_until_s={}",
+        "discover.test=[]",
+        "cell.effect_files=[mine.py]",
+    ]
     case = case_of_experiment(read_experiment(EXPERIMENTS / "measured_nmc.yaml", overrides))
     assert case.effect_files == (EXPERIMENTS / "mine.py",)
 

@@ -99,6 +99,29 @@ def test_an_inadmissible_value_is_named(changes, words):
     assert words in sentence(changes)
 
 
+FILES = {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"data": FILES | {"valid": ["a.csv"]}}, "a.csv is in train and in valid"),
+        ({"data": FILES | {"set": "lg_18650hg2"}}, "`set` is of kind: catalogue"),
+        ({"data": FILES | {"virtual": {"seed": 3}}}, "`virtual` is of kind: virtual"),
+        ({"data": FILES | {"record": "c.csv"}}, "`record` is cut by `repeats`"),
+        ({"data": {"kind": "virtual", "sign": "charge-positive"}}, "`sign` is about files"),
+        (
+            {"discover": {"fit": ["a.csv"], "fit_until_s": {"a": 60}}},
+            "fit_until_s cuts a, which is not in fit",
+        ),
+        ({"data": {"kind": "virtual"}, "discover": {"test": ["a"]}}, "leave out fit, test and good"),
+        ({"fallback": {"data": {"kind": "virtual"}, "cell": {}}}, "fallback: it stands in for a data set"),
+    ],
+)
+def test_what_an_experiment_says_and_nothing_reads_was_passed_over_in_silence(changes, words):
+    assert words in sentence(changes)
+
+
 @pytest.mark.parametrize("name", ["../escape", "a/b", "", ".hidden", "a" * 200, "x\n"])
 def test_a_name_cannot_leave_the_folder_of_runs(name):
     with pytest.raises(ConfigError):

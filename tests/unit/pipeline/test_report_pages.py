@@ -42,6 +42,16 @@ def test_the_finding_comes_before_the_evidence(run_html, discovery_html):
     assert discovery_html.index("self-heating") < discovery_html.index('data-figure="residual_test"')
 
 
+def test_a_run_whose_physics_is_not_among_its_models_ended_without_a_report(views, tmp_path):
+    view = views.run_view(600)
+    alone = replace(
+        view,
+        models=tuple(row for row in view.models if row["name"] == view.chosen),
+        corrected="ESPM recalibrated",
+    )
+    assert "<h1>" in write_run_report(tmp_path / "report.html", alone).read_text("utf-8")
+
+
 def test_nothing_is_loaded_from_elsewhere(run_html, discovery_html):
     for html in (run_html, discovery_html):
         assert not re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"(?!data:)", html)

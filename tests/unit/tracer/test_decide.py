@@ -25,6 +25,7 @@ from aesi.tracer.decide.verdict import (
 from aesi.tracer.decide.written import Option, carries_best, stand_ins, worst_ratio, written
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
+from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
@@ -214,6 +215,30 @@ def test_what_was_fitted_carries_to_a_part_left_out(path):
     error = left_out_errors(path.problem, path.blocks, path.chosen)
     assert error.pooled_v < 1.3e-3 < left_out_errors(path.problem, path.blocks, None).pooled_v
     assert range_fault(ModelState.of(path.problem, path.chosen)) is None
+
+
+def test_harm_counts_as_far_as_the_start_of_a_record_left_out_is_known(cell, few, make):
+    lost = (CATALOGUE["series_resistance"].activate(resistance_ohm=5e-4),)
+    prepared = prepare_all(cell, [make(lost), make(lost, seed=2)], 0.9, 0.0)
+
+    def left(sd, records=prepared):
+        known = tuple(replace(r, start=replace(r.start, sd=sd)) for r in records)
+        problem = InverseProblem(cell, known, few)
+        return problem, left_out_errors(problem, blocks_of(problem), None)
+
+    problem, known = left(1e-6)
+    unsure, told = left(0.02)
+    error_v = problem.measured - problem.predict({"soc0": {"0": 0.9, "1": 0.9}})
+    plain = tuple(np.sqrt(np.mean(error_v[rows] ** 2)) for rows in problem.slices)
+    assert known.by_record == told.by_record == pytest.approx(plain)
+    worth_v = np.abs(unsure.start_slope_v)
+    assert 1e-3 < worth_v.min() < worth_v.max() < 1.0
+    shares = 1.0 / (1.0 + (worth_v / MEASURED_V) ** 2)
+    ratios = np.square(told.by_range) / np.square(known.by_range)
+    assert shares.min() < ratios.min() < ratios.max() < shares.max() < 0.9
+    assert (
+        left(0.02, prepared[:1])[1] == left(1e-6, prepared[:1])[1]
+    )  # begins where the rest of its record ends
 
 
 def test_a_hypothesis_is_put_where_the_data_without_a_part_put_it(path):
