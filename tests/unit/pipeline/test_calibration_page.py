@@ -41,7 +41,7 @@ def content():
         "files": [record("pulses"), record("slow", temperature_degc=9.5, as_simulated_rmse_mv=6.0)],
         "parameters": {
             "negative.rate": parameter(of_prior=0.9),
-            "positive.rate": parameter(of_prior=0.1),
+            "positive.rate": parameter(of_prior=0.1, posterior_low=0.4, posterior_high=2.1),
             **{f"negative.rate_at_{place}_percent": parameter() for place in (0, 50, 100)},
         },
         "health": {
@@ -82,10 +82,16 @@ def test_the_finding_comes_first_and_the_best_known_parameter_before_the_others(
     )
     html = page(tmp_path, view)
     assert "a &lt;cell&gt;" in html
-    assert html.index("4.0 to 6.0") < html.index("On a bound") < html.index("These tell 1 of 5.")
+    assert (
+        html.index("by 2.0\u00a0mV RMSE")
+        < html.index("4.0 to 6.0")
+        < html.index("On a bound")
+        < html.index("These tell 1 of 5.")
+    )
     assert html.index("<code>positive.rate</code>") < html.index("<code>negative.rate</code>")
     assert html.index("<code>negative.rate</code>") < html.index("The 3 knots of the courses")
     assert "25.0, as declared" in html
+    assert html.count("sampled [") == 1
     assert 'data-figure="nyquist_0"' not in html
 
 
@@ -106,7 +112,8 @@ def test_spectra_are_drawn_by_temperature(tmp_path, content):
 def test_one_record_is_named_and_its_error_is_no_range(content):
     content["files"] = content["files"][:1]
     assert finding(content) == (
-        "In free run the calibrated file errs by 4.0 mV RMSE on pulses; the start file erred by 30.0 mV."
+        "In free run the calibrated model errs by 2.0 mV RMSE on pulses, where the start file erred by 30.0 mV. "
+        "Simulated without what a record has of its own, the file errs by 4.0 mV."
     )
 
 
