@@ -163,7 +163,9 @@ def _cause(ratio: float, record: Measurement) -> str:
     if ratio > 200.0:
         return "the current is in mA or the time in ms; declare it: --unit current_a=mA, or --unit time_s=ms"
     if ratio < 1.0 / 1000.0:
-        return "the time is in hours; declare it: --unit time_s=h"
+        return (
+            "the time is in hours or the current in kA; declare it: --unit time_s=h, or --unit current_a=kA"
+        )
     if ratio < 1.0 / 15.0:
         return "the time is in minutes or hours (declare it: --unit time_s=min or h), or the cell file is another's"
     if ratio > 15.0:

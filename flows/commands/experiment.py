@@ -65,15 +65,18 @@ def tables(
     figures: Annotated[
         Path | None, typer.Option(help="Also write the tracked figures and reports to this folder.")
     ] = None,
-    uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
+    uri: Annotated[
+        str | None,
+        typer.Option(help="Tracking store; without it that of the experiment's file, else the workspace's."),
+    ] = None,
 ) -> None:
     """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
     from flows.base.console import Console
-    from flows.results.tables import tables_of
+    from flows.results.tables import tables_of, tracked_as
     from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.store import Store
 
-    deliver_leftovers(Store(uri), Console().say)
+    deliver_leftovers(Store(uri or tracked_as(experiment)[1]), Console().say)
     typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
 
 

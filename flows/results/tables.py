@@ -33,8 +33,8 @@ def tables_of(
     figures : a folder that gets the tracked reports and figures.
     Raises InputError where nothing of that name was tracked.
     """
-    store = Store(uri)
-    name = _name(experiment)
+    name, place = tracked_as(experiment)
+    store = Store(uri or place)
     runs = _chosen(store, name, run_ids)
     summaries = [_summary(store, run) for run in runs]
     rows = merged([summary["models"] for summary in summaries])
@@ -78,13 +78,17 @@ def _ends(values: Sequence[float | None]) -> list[float] | None:
     return [min(present), max(present)] if present else None
 
 
-def _name(experiment: str) -> str:
+def tracked_as(experiment: str) -> tuple[str, str | None]:
+    """The name of an experiment that is given by its name or its file, and the store that its file names, if any."""
     path = Path(experiment)
-    if path.suffix in (".yaml", ".yml"):
-        from aesi.pipeline.experiment.config import read_experiment
+    if path.suffix not in (".yaml", ".yml"):
+        return experiment, None
+    if not path.exists():
+        return path.stem, None
+    from aesi.pipeline.experiment.config import read_experiment
 
-        return read_experiment(path).name if path.exists() else path.stem
-    return experiment
+    config = read_experiment(path)
+    return config.name, config.tracking.uri
 
 
 def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:

@@ -137,6 +137,15 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
             raise InputError(f"{table}, line {line}: {column} = {text!r} is no number.")
         return value
 
+    def share(column: str) -> float | None:
+        value = number(column)
+        if value is not None and not 0.0 <= value <= 1.0:
+            raise InputError(
+                f"{table}, line {line}: {column} = {value:g}: a state of charge is a share of the capacity, from 0 "
+                "(empty) to 1 (full); 90 % is 0.9."
+            )
+        return value
+
     own = files("cell")
     if not own and cell is None:
         raise InputError(
@@ -154,7 +163,7 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
         own[0] if own else cell or Path(),
         data,
         files("test"),
-        number("soc0"),
+        share("soc0"),
         specimen,
         number("at"),
         number("soh"),

@@ -84,3 +84,14 @@ def test_artifacts_go_beside_the_database(tmp_path, empty_store, monkeypatch):
     store = Store(f"sqlite:///{other / 'mlflow.db'}")
     run_id = store.create_run(store.experiment("one"), "run", {})
     assert store.client.get_run(run_id).info.artifact_uri.startswith((other / "mlartifacts" / "one").as_uri())
+
+
+def test_the_store_that_an_experiment_file_names_was_not_looked_into(finished, tmp_path, call):
+    here = copied(finished, tmp_path / "here")
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "name: smoke\ndata: {kind: virtual}\n" + f"tracking: {{uri: 'sqlite:///{here / 'mlflow.db'}'}}\n"
+    )
+    code, out, err = call("tables", file)
+    assert code == 0, err
+    assert "tracked run" in out

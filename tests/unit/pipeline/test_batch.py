@@ -70,6 +70,7 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
         ("name,data\na,nowhere.csv\n", "line 2: there is no file"),
         ("name,data\na,s.csv\na,s.csv\n", "named 'a'"),
         ("name,data,at\na,s.csv,old\n", "is no number"),
+        ("name,data,soc0\na,s.csv,90\n", "line 2: soc0 = 90: a state of charge is a share"),
         ("name,data\n,s.csv\n", "have to be given"),
         ("name,data\n../a,s.csv\n", "without slashes"),
         ("name,data\n..,s.csv\n", "starts with no dot"),
