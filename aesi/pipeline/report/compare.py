@@ -137,8 +137,8 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
     return PageTable(
         "metrics",
         "What came of it",
-        "Of each run's chosen model, on its test records. MSER: by how much it lowers the mean squared error of the declared "
-        "model. A click on a heading sorts.",
+        "Of each run's chosen model, on its test records. MSER: by how much it lowers the mean squared error of the "
+        "declared model. A click on a heading sorts.",
         ("run", "model", *(COLUMNS[name] for name in names)),
         tuple(
             (
