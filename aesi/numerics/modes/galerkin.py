@@ -37,7 +37,7 @@ so many more do to round-off, at any order (four modes without them: rates off b
 class SphereModes:
     """Diffusion in the unit sphere with a prescribed outward flux, in even Legendre polynomials of x.
 
-    r = x (1 + (1 - s) (1 - x**2) / 2), of slope s = `SURFACE_SLOPE` at the surface and (3 - s) / 2 in the centre.
+    r = x (1 + (1 - s) (1 - x**2) / 2), of slope s at the surface and (3 - s) / 2 in the centre.
     With z_k the surface value of mode k:  dz_k/dt = -lam_k (D/R^2) z_k - gain_k (flux/R),  surface = sum z_k.
     lam : (n,) ascending, lam[0] = 0.  gain : (n,) gain[0] = 3.
     r : (m,) collocation points in [0, 1], r[-1] = 1.  at : (m, n) values at r from z.
@@ -52,11 +52,11 @@ class SphereModes:
 
 
 @lru_cache(maxsize=32)
-def sphere_modes(order: int) -> SphereModes:
-    """Modes of the projection on P_0, P_2, ..., P_{2 (order - 1)}."""
+def sphere_modes(order: int, surface_slope: float = SURFACE_SLOPE) -> SphereModes:
+    """Modes of the projection on P_0, P_2, ..., P_{2 (order - 1)} of a coordinate of this slope at the surface."""
     x, w = legendre.leggauss(4 * order + QUADRATURE_POINTS)
     x, w = 0.5 * (x + 1.0), 0.5 * w  # [0, 1]
-    r, r_slope = _radius(x)
+    r, r_slope = _radius(x, surface_slope)
     basis = np.eye(2 * order - 1)[::2]
     value = np.array([legendre.legval(x, c) for c in basis])
     slope = np.array([legendre.legval(x, legendre.legder(c)) for c in basis])
@@ -72,15 +72,15 @@ def sphere_modes(order: int) -> SphereModes:
     return SphereModes(
         lam=_locked(lam),
         gain=_locked(at_surface**2),
-        r=_locked(_radius(nodes)[0]),
+        r=_locked(_radius(nodes, surface_slope)[0]),
         at=_locked(at),
         project=_locked(np.linalg.inv(at)),
     )
 
 
-def _radius(x: Array) -> tuple[Array, Array]:
+def _radius(x: Array, surface_slope: float) -> tuple[Array, Array]:
     """Radius at the coordinate x of the polynomials, and its slope there; see `SphereModes`."""
-    bend = 0.5 * (1.0 - SURFACE_SLOPE)
+    bend = 0.5 * (1.0 - surface_slope)
     return x * (1.0 + bend * (1.0 - x**2)), 1.0 + bend * (1.0 - 3.0 * x**2)
 
 
