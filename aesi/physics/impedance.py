@@ -17,7 +17,7 @@ Source: Meddings et al., J. Power Sources 480 (2020) 228742, doi:10.1016/j.jpows
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import cast
 
@@ -29,17 +29,20 @@ from aesi.numerics.typing import Array, ComplexArray, Numbers
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
-from aesi.physics.effect import ActiveEffect, Record, Trace
+from aesi.physics.effect import ActiveEffect, Contribution, Record, Trace
 from aesi.physics.espm.extended import interface_capacity, ohmic_drops, particle_units
 from aesi.physics.espm.layout import Units
 from aesi.physics.espm.plain import rate_factor, shifted_ocp, stack_of
 from aesi.physics.espm.tables import solid_diffusion
 from aesi.physics.model import EspmModel
-from aesi.physics.simulation import ModelName, model_with
+from aesi.physics.simulation import ModelName, model_with, simulate
+from aesi.records import Run
 from aesi.records.checked import numbers
 
 SLOPE_STEP = 1e-4
 """Of stoichiometry: tables of potentials have steps of 1.2e-4."""
+INSTANT_S = np.array([0.0, 1e-9])
+"""Over which a current has moved no charge to speak of."""
 SMALL_A = 1e-6
 """Current whose response is a slope: far below any exchange current, far above round-off."""
 
@@ -89,7 +92,14 @@ def impedance(
         z = porous_impedance(changed, _slopes(changed.cell, rest, kelvin), rest, kelvin, omega)
     else:
         z = _Linear(changed, rest, kelvin).impedance(omega)
-    return z + _series(changed, active)
+    acting = [(one, one.effect.on_voltage) for one in active if one.effect.on_voltage is not None]
+    if not acting:
+        return z
+    on_model = [one for one in active if one.effect.on_model is not None]
+    rest_run = simulate(
+        cell, INSTANT_S, np.zeros(2), soc, on_model, temperature_degc, "backward", model=model
+    )
+    return z + sum(_series_ohm(changed, one, function, rest_run) for one, function in acting)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,15 +224,15 @@ def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
     return float(cast(Array, record.temperature_k)[0])
 
 
-def _series(model: EspmModel, effects: tuple[ActiveEffect, ...]) -> float:
-    """Ohm of effects that act on the voltage: what they answer to a small current at once."""
-    time, current = np.array([0.0, 1e-9]), np.full(2, SMALL_A)
-    ohm = 0.0
-    for active in effects:
-        if active.effect.on_voltage is not None:
-            driven = [
-                active.effect.on_voltage(Trace(model, time, i, np.zeros(2), {}, True), **active.parameters)
-                for i in (current, 0.0 * current)
-            ]
-            ohm -= float(driven[0].voltage_v[-1] - driven[1].voltage_v[-1]) / SMALL_A
-    return ohm
+def _series_ohm(
+    model: EspmModel, active: ActiveEffect, function: Callable[..., Contribution], rest: Run
+) -> float:
+    """Ohm of an effect that acts on the voltage: what it answers to a small current at once.
+
+    rest : of the cell without a current, over `INSTANT_S`.
+    """
+    at_rest, driven = (
+        active.act(function, Trace(model, rest.time_s, current, rest.voltage_v, dict(rest.series), True))
+        for current in (np.zeros(2), np.full(2, SMALL_A))
+    )
+    return -float(driven.voltage_v[-1] - at_rest.voltage_v[-1]) / SMALL_A

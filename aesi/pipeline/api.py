@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 from os import PathLike
 from pathlib import Path
@@ -17,7 +18,7 @@ from aesi.errors import DataError, InputError
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.belongs import check_belongs
-from aesi.pipeline.calibrate import check_records
+from aesi.pipeline.calibrate import check_records, effects_left
 from aesi.pipeline.discovery.cases import MOST_ROWS
 from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
@@ -108,7 +109,7 @@ def calibrate(
     measurements = [_read(one, None, hold) for one in _listed(data)]
     check_records(measurements, temperatures_degc)
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    return fit_cell(
+    found = fit_cell(
         declared,
         measurements,
         soc0=soc0,
@@ -117,6 +118,7 @@ def calibrate(
         dates=dates,
         as_of=as_of,
     )
+    return replace(found, notes=(*effects_left(given), *found.notes))
 
 
 def _check_asked(soc0: float | None, holdout: float | None, max_effects: int, seed: int) -> None:

@@ -26,6 +26,7 @@ from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace
 from aesi.records import Measurement, Spectrum
 from aesi.tracer.case.checks import SHORTEST_S
@@ -85,9 +86,8 @@ def calibrate_files(
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
     spectra, told = held_against(found.cell, asked.impedance, model=model)
-    content = calibration_content(
-        found, [*(note for m in measurements for note in m.notes), *told], posterior, spectra
-    )
+    read = [note for m in measurements for note in m.notes]
+    content = calibration_content(found, [*effects_left(given), *read, *told], posterior, spectra)
     write_whole(out, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
     write_whole(out.with_suffix(".report.json"), json.dumps(content, indent=1, allow_nan=False) + "\n")
     write_whole(out.with_suffix(".report.md"), to_text(content))
@@ -133,6 +133,17 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
             )
         )
     return tuple(out)
+
+
+def effects_left(given: HybridModel) -> tuple[str, ...]:
+    """A sentence on the effects of a saved model: what is fitted is the cell that it holds, without them."""
+    if not given.effects:
+        return ()
+    names = ", ".join(effect.id for effect in given.effects)
+    what = "the effect" if len(given.effects) == 1 else "the effects"
+    return (
+        f"{what} {names} of the saved model: left out, since what is fitted and written is what a cell's file holds.",
+    )
 
 
 def check_records(measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None) -> None:

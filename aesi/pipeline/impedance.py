@@ -60,9 +60,17 @@ def impedance_file(
     active = (*declared.effects, *activated(effects, effect_files))
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
-    if say_notes is not None and hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
-        say_notes([NO_DOUBLE_LAYER])
+    if say_notes is not None:
+        say_notes(_left_out(active))
+        if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
+            say_notes([NO_DOUBLE_LAYER])
     return z
+
+
+def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:
+    """A sentence on the effects that act on a record or a reading alone."""
+    names = [one.id for one in effects if one.effect.on_model is None and one.effect.on_voltage is None]
+    return [f"{', '.join(names)}: of a record, not of the cell, and not in its impedance."] if names else []
 
 
 def _has_double_layer(cell: Cell, effects: Sequence[ActiveEffect]) -> bool:

@@ -64,6 +64,8 @@ def simulate_file(
     profile = read_current(current, reading)
     say(profile.notes)
     declared = declared_model(cell).with_soh(soh)
+    if declared.correction is not None:
+        say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
     active = (*declared.effects, *activated(effects, effect_files))
     if self_heating:
         active = warmed(declared.cell, active)

@@ -10,8 +10,8 @@ import numpy as np
 import pint
 import pytest
 
-from aesi.errors import CellError, InputError, ParameterError
-from aesi.physics import Cell, simulate
+from aesi.errors import CellError, InputError, ParameterError, SimulationError
+from aesi.physics import Cell, impedance, simulate
 from aesi.physics.effects import CATALOGUE, active_effect, describe, find_effect, load_effect
 
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
@@ -274,3 +274,14 @@ def test_a_file_that_is_no_effect_says_why(tmp_path, text, words):
         load_effect(path)
     with pytest.raises(InputError, match="no effect file"):
         load_effect(tmp_path / "nowhere.py")
+
+
+@each
+@both
+def test_it_has_an_impedance_or_says_why_not(effect, model):
+    skip_what_the_model_holds(effect, model)
+    if effect.id == "lithium_plating":
+        with pytest.raises(SimulationError, match="no linear answer at rest"):
+            impedance(CELL, [0.01, 10.0], 0.5, effects=[effect.activate()], model=model)
+        return
+    assert np.isfinite(impedance(CELL, [0.01, 10.0], 0.5, effects=[effect.activate()], model=model)).all()

@@ -161,6 +161,9 @@ def test_an_option_of_a_command_broke_behind_its_hyphens():
     html = '<div class="language-console"><span class="w"> </span>--out<span class="w"> </span>x--y</div> --z'
     shown = hook("options").on_page_content(html)
     assert shown == html.replace("--out", '<span class="option">--out</span>')
+    assert hook("options").on_page_content("<code>--set a=1</code> --b") == (
+        '<code><span class="option">--set</span> a=1</code> --b'
+    )
 
 
 def test_a_table_with_more_figures_than_lines_has_a_figure_a_row(tmp_path, monkeypatch):

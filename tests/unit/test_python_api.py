@@ -1,5 +1,6 @@
 """`import aesi` at a prompt: what it offers, what it shows, and what it says of what cannot be meant."""
 
+from functools import partial
 from pathlib import Path
 from typing import get_type_hints
 
@@ -8,6 +9,7 @@ import pandas as pd
 import pytest
 
 import aesi
+from aesi.calibration import calibrate as fit_cell
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Spectrum
@@ -301,3 +303,16 @@ def test_a_type_checker_lets_through_what_the_functions_take():
         (aesi.cross_check, ("time_s", "current_a")),
     ):
         assert {get_type_hints(function)[name] for name in names} == {Numbers}, function
+
+
+def test_the_effects_of_a_saved_model_were_left_out_of_its_calibration_without_a_word(
+    cell, record, monkeypatch
+):
+    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    model = aesi.HybridModel(cell, (CATALOGUE["ocv_hysteresis"].activate(),))
+    assert (
+        aesi.calibrate(model, record)
+        .notes[0]
+        .startswith("the effect ocv_hysteresis of the saved model: left out")
+    )
+    assert not any("saved model" in note for note in aesi.calibrate(cell, record).notes)

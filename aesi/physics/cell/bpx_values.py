@@ -15,9 +15,22 @@ from aesi.physics.cell.relations import Relation
 
 POINTS = 101
 """Stoichiometries between empty and full at which relations are looked at."""
+ELECTRODE_ENERGIES = ("diffusivity_ea_j_mol", "rate_ea_j_mol", "film_ea_j_mol")
+ELECTROLYTE_ENERGIES = ("conductivity_ea_j_mol", "diffusivity_ea_j_mol")
 OTHER_UNIT = 10.0
 """Nominal capacity over that of an electrode's window, or the other way round: units differ by thousands, cells by
 less."""
+
+FARTHEST_V = 1.0
+"""Of the open-circuit voltage of a full cell from the upper cut-off: the shipped files are within 0.025 V, and who
+cycles a part of the range cuts off some 0.6 V less."""
+LEAST_ENERGY_J_MOL = 100.0
+"""Of the largest activation energy: published ones are 4 to 90 kJ/mol, which without the kilo are less."""
+LARGEST_ENTROPIC_V_K = 0.01
+"""Published entropic coefficients stay within 0.001 V/K; in mV/K they are a thousand times that."""
+HEAT_J_K_AH = (0.5, 1000.0)
+"""Heat capacity over nominal capacity: 9 to 52 J/(K Ah) in the shipped files, and a thousand times more or less where
+one of its factors is in another unit."""
 
 
 def check_values(cell: CellParameters, where: str) -> None:
@@ -35,6 +48,7 @@ def check_values(cell: CellParameters, where: str) -> None:
         electrolyte_concentration_mol_m3=cell.electrolyte.c0_mol_m3,
     )
     _check_share(f"{where}: Separator", "porosity", cell.separator.porosity)
+    _check_share(f"{where}: Electrolyte", "transference", cell.electrolyte.transference)
     at_rest = np.array([cell.electrolyte.c0_mol_m3])
     for name in ("conductivity", "diffusivity"):
         _check_positive(getattr(cell.electrolyte, name), at_rest, f"{where}: Electrolyte: {name}", "mol/m3")
@@ -57,6 +71,71 @@ def check_values(cell: CellParameters, where: str) -> None:
                 f"{window:.4g} A.h between its stoichiometry limits; one of them is in another unit, or the number of "
                 "electrode pairs is another."
             )
+    _check_full(cell, where)
+    _check_temperature_dependence(cell, where)
+    _check_thermal(cell, where)
+
+
+def _check_full(cell: CellParameters, where: str) -> None:
+    """The potentials of the full cell make about the upper cut-off."""
+    full = 1.0 - 1.0 / POINTS  # potentials may be infinite at the very end
+    positive, negative = cell.positive, cell.negative
+    theta_p = positive.theta_max - full * (positive.theta_max - positive.theta_min)
+    theta_n = negative.theta_min + full * (negative.theta_max - negative.theta_min)
+    rest_v = float(positive.ocp(np.array([theta_p]))[0] - negative.ocp(np.array([theta_n]))[0])
+    if abs(rest_v - cell.upper_voltage_v) > FARTHEST_V:
+        raise CellError(
+            f"{where}: the full cell rests at {rest_v:.4g} V by its open-circuit potentials, and the upper cut-off is "
+            f"{cell.upper_voltage_v:g} V; one of them is in another unit, or the electrodes are swapped."
+        )
+
+
+def _check_temperature_dependence(cell: CellParameters, where: str) -> None:
+    """Activation energies in J/mol, entropic coefficients in V/K."""
+    energies = {
+        f"{side}: {name}": getattr(part, name)
+        for side, part, names in (
+            ("Negative electrode", cell.negative, ELECTRODE_ENERGIES),
+            ("Positive electrode", cell.positive, ELECTRODE_ENERGIES),
+            ("Electrolyte", cell.electrolyte, ELECTROLYTE_ENERGIES),
+        )
+        for name in names
+    }
+    for name, value in energies.items():
+        if not value >= 0.0:
+            raise CellError(f"{where}: {name} = {value:g} has to be 0 or more: with warmth all of them rise.")
+    name = max(energies, key=lambda one: energies[one])
+    if 0.0 < energies[name] < LEAST_ENERGY_J_MOL:
+        raise CellError(
+            f"{where}: {name} = {energies[name]:g} is the largest activation energy, and as good as none; they are in "
+            "J/mol, so that 30 kJ/mol is 30000."
+        )
+    for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
+        inside = np.linspace(electrode.theta_min, electrode.theta_max, POINTS)[1:-1]
+        largest = float(np.max(np.abs(electrode.entropic(inside))))
+        if not largest <= LARGEST_ENTROPIC_V_K:
+            raise CellError(
+                f"{where}: {side} electrode: the entropic change coefficient is {largest:g} V/K, more than any "
+                "electrode's; it is in V/K, so that 0.1 mV/K is 0.0001."
+            )
+
+
+def _check_thermal(cell: CellParameters, where: str) -> None:
+    """What is there of mass, heat capacity and surface is positive, and together that of a cell."""
+    names = ("density_kg_m3", "specific_heat_j_kg_k", "volume_m3")
+    there = {
+        name: value for name in (*names, "surface_area_m2") if (value := getattr(cell, name)) is not None
+    }
+    require_positive(where, **there)
+    if not all(name in there for name in names):
+        return
+    least, most = HEAT_J_K_AH
+    heat = float(np.prod([there[name] for name in names])) / cell.nominal_capacity_ah
+    if not least <= heat <= most:
+        raise CellError(
+            f"{where}: density, specific heat capacity and volume make {heat:.3g} J/K for each ampere-hour, and "
+            "cells have 9 to 52; one of them is in another unit than kg/m3, J/(kg K) and m3."
+        )
 
 
 def _check_electrode(electrode: Electrode, what: str) -> None:

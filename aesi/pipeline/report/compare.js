@@ -36,5 +36,7 @@
   const seen = new IntersectionObserver((entries) => entries.forEach((entry) => {
     if (entry.isIntersecting) { draw(entry.target); seen.unobserve(entry.target); }
   }), { rootMargin: "400px" });
-  document.querySelectorAll("canvas[data-map]").forEach((canvas) => seen.observe(canvas));
+  const maps = document.querySelectorAll("canvas[data-map]");
+  maps.forEach((canvas) => seen.observe(canvas));
+  window.addEventListener("beforeprint", () => maps.forEach(draw));
 })();

@@ -137,7 +137,8 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
     return PageTable(
         "metrics",
         "What came of it",
-        "Of each run's chosen model, on its test records. A click on a heading sorts.",
+        "Of each run's chosen model, on its test records. MSER: by how much it lowers the mean squared error of the "
+        "declared model. A click on a heading sorts.",
         ("run", "model", *(COLUMNS[name] for name in names)),
         tuple(
             (
@@ -226,6 +227,8 @@ def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
         (term for term in count if count[term] < len(having)), key=lambda term: (-count[term], term)
     )
     shared = len(count) - len(differing)
+    if not differing:
+        return PageTable("terms", "Terms", f"All {len(having)} runs hold the same {shared} terms.", (), ())
     caption = (
         f"Coefficients of the terms that not all runs hold; the other {shared} are in all {len(having)} runs."
     )

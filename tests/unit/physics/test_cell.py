@@ -176,12 +176,39 @@ def test_a_negative_thickness_is_refused(content):
             {"Nominal cell capacity [A.h]": 5000.0},
             "the nominal capacity is 5000 A.h, but the negative electrode holds 5.153 A.h",
         ),
+        ("Electrolyte", {"Cation transference number": 38.0}, "transference = 38 has to be a share below 1"),
+        ("Cell", {"Upper voltage cut-off [V]": 4200.0}, "rests at 4.182 V .* the upper cut-off is 4200 V"),
+        (
+            "Negative electrode",
+            {"Reaction rate constant activation energy [J.mol-1]": -35000.0},
+            "rate_ea_j_mol = -35000 has to be 0 or more",
+        ),
+        (
+            "Positive electrode",
+            {"Entropic change coefficient [V.K-1]": -0.1},
+            r"coefficient is 0.1 V/K, more than any electrode's; .* 0.1 mV/K is 0.0001",
+        ),
+        ("Cell", {"Density [kg.m-3]": -5.0}, "density_kg_m3 = -5 has to be a positive number"),
+        ("Cell", {"Volume [m3]": 24.2}, "density, specific heat capacity and volume make 8.56e"),
     ],
 )
 def test_values_that_no_cell_has_are_refused(content, section, changes, sentence):
     content["Parameterisation"][section] |= changes
     with pytest.raises(CellError, match=sentence):
         Cell.from_bpx(content)
+
+
+def test_electrodes_that_are_swapped_and_energies_in_kilojoule_are_refused(content):
+    parts = content["Parameterisation"]
+    negative, positive = parts["Negative electrode"], parts["Positive electrode"]
+    swapped = content | {
+        "Parameterisation": parts | {"Negative electrode": positive, "Positive electrode": negative}
+    }
+    assert "or the electrodes are swapped" in fault(swapped)
+    for part in (negative, positive):
+        part["Diffusivity activation energy [J.mol-1]"] = 30.0
+        part["Reaction rate constant activation energy [J.mol-1]"] = 35.0
+    assert "30 kJ/mol is 30000" in fault(content)
 
 
 def test_a_file_with_a_byte_order_mark_is_read(content, tmp_path):

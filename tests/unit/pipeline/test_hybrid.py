@@ -9,10 +9,11 @@ from small_experiment import SOC0, experiment, fitted, write_record
 import aesi
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
-from aesi.pipeline.simulation import predict_file
+from aesi.pipeline.simulation import predict_file, simulate_file
 from aesi.sparse import SparseModel
 
 
@@ -100,6 +101,17 @@ def test_a_first_voltage_that_no_such_cell_has_started_a_prediction_without_a_wo
     voltage_v[0] = 1.5
     with pytest.raises(DataError, match=r"1.500 V at 0 s \(row 1, counted from 1\) is outside the range of"):
         model.predict(data.time_s, data.current_a, SOC0, voltage_v)
+
+
+def test_a_simulation_or_a_discovery_of_a_hybrid_left_its_correction_out_without_a_word(
+    model, record, tmp_path
+):
+    folder, said = model.save(tmp_path / "model"), []
+    simulate_file(folder, record, tmp_path / "out.csv", say_notes=said.extend)
+    assert any("learnt correction is no part of a simulation" in note for note in said)
+    assert any("learnt correction is left out" in note for note in case_of_files(folder, [record]).notes)
+    bare = HybridModel(model.cell).save(tmp_path / "bare")
+    assert not any("correction" in note for note in case_of_files(bare, [record]).notes)
 
 
 def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
