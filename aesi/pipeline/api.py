@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import date
+from itertools import islice
 from os import PathLike
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from aesi.calibration import Calibration
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, read
+from aesi.data.reading import record_names
 from aesi.errors import DataError, InputError
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
@@ -70,8 +72,9 @@ def discover(
     _check_asked(soc0, holdout, max_effects, seed)
     folder = None if out is None else _folder(out)
     given, parts = declared_model(cell).with_soh(soh), [_listed(part) for part in (data, tests, good)]
-    rows = MOST_ROWS // max(1, sum(len(part) for part in parts))
-    measurements, judged, known = (tuple(_read(one, rows, hold) for one in part) for part in parts)
+    asked = [one for part in parts for one in part]
+    found = iter(_read_all(asked, MOST_ROWS // max(1, len(asked)), hold))
+    measurements, judged, known = (tuple(islice(found, len(part))) for part in parts)
     check_belongs(given.cell, [*measurements, *judged, *known])
     named = [effect_files] if isinstance(effect_files, str | PathLike) else effect_files
     files = tuple(Path(file) for file in named)
@@ -106,7 +109,7 @@ def calibrate(
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
     declared, physics = given.cell, model or given.model
-    measurements = [_read(one, None, hold) for one in _listed(data)]
+    measurements = _read_all(_listed(data), None, hold)
     check_records(measurements, temperatures_degc)
     check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     found = fit_cell(
@@ -165,10 +168,19 @@ def _listed(records: Data) -> list[FileOrRecord]:
     return listed  # type: ignore[return-value]
 
 
-def _read(record: FileOrRecord, rows: int | None, hold: Hold | None) -> Measurement:
+def _read_all(records: Sequence[FileOrRecord], rows: int | None, hold: Hold | None) -> list[Measurement]:
+    """The records in their order; files of one name in several folders are called after folder and file."""
     if hold is not None:
         check_choice("hold", hold, Hold)
-    found = record if isinstance(record, Measurement) else read(Path(record), Reading(), max_rows=rows)
+    names = iter(record_names([Path(one) for one in records if not isinstance(one, Measurement)]))
+    return [
+        _checked(one if isinstance(one, Measurement) else read(Path(one), Reading(), rows, next(names)), hold)
+        for one in records
+    ]
+
+
+def _checked(found: Measurement, hold: Hold | None) -> Measurement:
+    """The record with how its current was declared to run.  Raises DataError where a voltage is missing."""
     if len(found) < 2:
         raise DataError(f"{found.name} has too few rows ({len(found)}); a record needs at least two.")
     unknown = np.isnan(found.voltage_v)

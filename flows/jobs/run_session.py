@@ -10,8 +10,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aesi.errors import AesiError
+from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.experiment.config import ExperimentConfig
-from flows.base import environment
+from flows.base import environment, fingerprint
 from flows.base.console import Console
 from flows.base.interrupt import kept_on_interrupt
 from flows.jobs.run_request import RunRequest
@@ -101,7 +102,7 @@ def _begin(
     record = (
         replace(old, status="running")
         if old
-        else RunRecord(tracker.run_id, config.name, config.digest, store.uri, time.time())
+        else RunRecord(tracker.run_id, config.name, resume_key(config), store.uri, time.time())
     )
     record.write()
     console.say(f"run {tracker.run_id} {'resumed' if old else 'started'}")
@@ -129,18 +130,35 @@ def _close(record: RunRecord, tracker: Tracker, status: str, wait_s: float) -> N
         tracker.end(status.upper(), wait_s)
 
 
+def resume_key(config: ExperimentConfig) -> str:
+    """What a run has to share to be gone on with: the settings, the content of the files that they name, the program.
+
+    What a run has tracked is not tracked again, so that candidates of other data or of another version would stand
+    beside the new ones.
+    """
+    from aesi.pipeline.experiment.sources import named_files
+
+    parts: list[bytes | str] = [config.digest, source_digest()]
+    for path in named_files(config).values():
+        files = sorted(path.iterdir()) if path.is_dir() else [path]
+        parts += [file.read_bytes() for file in files if file.is_file()]
+    return fingerprint.key(*parts)
+
+
 def _unfinished(config: ExperimentConfig, store: Store, console: Console) -> RunRecord | None:
-    """The newest unfinished run of the same experiment and settings that nobody works on."""
+    """The newest unfinished run of the same experiment, settings, files and program that nobody works on."""
     for record in records(config.name):
         if record.status not in UNFINISHED or record.uri != store.uri:
             continue
-        if record.config_digest != config.digest:
+        if record.config_digest != resume_key(config):
             continue
         lock = RunLock(record.run_id)
         if lock.acquire():
             lock.release()
             return record
-    console.say("There is no unfinished run with these settings; a new one is started.")
+    console.say(
+        "There is no unfinished run of these settings and files by this version; a new one is started."
+    )
     return None
 
 

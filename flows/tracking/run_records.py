@@ -19,7 +19,10 @@ from flows.base import environment
 
 @dataclass(frozen=True)
 class RunRecord:
-    """One flow run. status : running, killed, failed or finished; started_s : seconds since the epoch."""
+    """One flow run. status : running, killed, failed or finished; started_s : seconds since the epoch.
+
+    config_digest : what another run has to share to go on with it.
+    """
 
     run_id: str
     experiment: str

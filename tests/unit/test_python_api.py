@@ -1,5 +1,6 @@
 """`import aesi` at a prompt: what it offers, what it shows, and what it says of what cannot be meant."""
 
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import get_type_hints
@@ -316,3 +317,12 @@ def test_the_effects_of_a_saved_model_were_left_out_of_its_calibration_without_a
         .startswith("the effect ocv_hysteresis of the saved model: left out")
     )
     assert not any("saved model" in note for note in aesi.calibrate(cell, record).notes)
+
+
+def test_files_of_one_name_in_two_folders_had_one_name_in_python(cell, record, monkeypatch, tmp_path):
+    monkeypatch.setattr("aesi.pipeline.api.fit_cell", partial(fit_cell, evaluations=1))
+    files = [tmp_path / folder / "drive.csv" for folder in ("cold", "warm")]
+    for file, shift in zip(files, (0.0, 1e-3), strict=True):
+        file.parent.mkdir()
+        replace(record, voltage_v=record.voltage_v + shift).to_frame().to_csv(file, index=False)
+    assert [one.name for one in aesi.calibrate(cell, files).errors] == ["cold drive", "warm drive"]

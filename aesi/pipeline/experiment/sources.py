@@ -66,20 +66,25 @@ def check_roles(config: ExperimentConfig) -> None:
         raise ConfigError(f"{config.name}: data: {NO_ROLES}; as it is, it is for `aesi discover` alone.")
 
 
-def check_there(config: ExperimentConfig) -> None:
-    """Raises ConfigError for a file of one's own that the experiment names and that is not there, with the nearest:
-    what can be known before anything is started."""
-    named = {} if config.cell.bpx == "catalogue" or config.fallback else {"cell": config.cell.bpx}
+def named_files(config: ExperimentConfig) -> dict[str, Path]:
+    """The files of one's own that an experiment names (a saved model is a folder), by the key that names them."""
+    names = {} if config.cell.bpx == "catalogue" else {"cell": config.cell.bpx}
+    names |= {f"cell: effect_files: {name}": name for name in config.cell.effect_files}
     if config.data.kind == "files":
         listed = (
             (config.data.record,)
             if config.data.record
             else tuple(n for r in ROLES for n in getattr(config.data, r))
         )
-        named |= {f"data: {name}": name for name in listed}
-    for what, name in named.items():
-        path = config.path(name)
-        if not path.exists():
+        names |= {f"data: {name}": name for name in listed}
+    return {key: config.path(name) for key, name in names.items()}
+
+
+def check_there(config: ExperimentConfig) -> None:
+    """Raises ConfigError for a file of one's own that the experiment names and that is not there, with the nearest:
+    what can be known before anything is started."""
+    for what, path in named_files(config).items():
+        if not path.exists() and not (what == "cell" and config.fallback):
             beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
             raise ConfigError(
                 f"{config.name}: {what}: there is no file {path}{did_you_mean(path.name, beside)}"

@@ -3,7 +3,9 @@
 import pytest
 
 from aesi.errors import ConfigError, InputError
+from aesi.pipeline.experiment.config import parse_experiment
 from flows.jobs.run_request import RunRequest
+from flows.jobs.run_session import resume_key
 
 THERE, ELSEWHERE = "tcp://there:8786", "tcp://elsewhere:8786"
 
@@ -36,3 +38,21 @@ def test_an_address_that_nobody_would_go_to_is_refused(path):
         RunRequest(path, runner="local", address=ELSEWHERE).config()
     with pytest.raises(ConfigError, match="runner: `address` names a Dask scheduler; give `kind: dask`"):
         RunRequest(path, ("runner.kind=local",)).config()
+
+
+def test_a_run_was_gone_on_with_on_other_data_or_by_another_version(tmp_path, monkeypatch):
+    for name in ("cell.json", "a.csv", "b.csv"):
+        (tmp_path / name).write_text(name)
+    content = {
+        "name": "x",
+        "cell": "cell.json",
+        "data": {"kind": "files", "train": ["a.csv"], "test": ["b.csv"]},
+    }
+    config = parse_experiment(content, base=tmp_path)
+    before = resume_key(config)
+    assert resume_key(config) == before
+    (tmp_path / "a.csv").write_text("corrected")
+    changed = resume_key(config)
+    assert changed != before
+    monkeypatch.setattr("flows.jobs.run_session.source_digest", lambda: "another")
+    assert resume_key(config) != changed
