@@ -354,3 +354,21 @@ def test_an_open_range_of_cycles_was_taken_for_its_first(tmp_path):
     with pytest.raises(DataError, match="cycle = '1:' has to be a number, or from:to"):
         read_measurement(path, cycle="1:")
     assert len(read_measurement(path, cycle="1:2")) == 4
+
+
+def test_a_bad_cell_left_a_thread_behind_that_aborted_the_process(tmp_path, monkeypatch):
+    def streamed(*_, **__):
+        pytest.fail("a Python file in pyarrow's hands is read ahead in a thread")
+
+    monkeypatch.setattr("pyarrow.PythonFile", streamed)
+    with pytest.raises(DataError, match="'OVR'"):
+        read_measurement(written(tmp_path, with_line(50, "48.0,5.0,OVR")))
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_file_of_many_blocks_is_read_whole(tmp_path, monkeypatch, end):
+    monkeypatch.setattr("aesi.data.readers.text.BLOCK_BYTES", 101)
+    for packed in (str.encode, lambda content: gzip.compress(content.encode()), lambda c: c.encode("utf-16")):
+        data = read_measurement(written(tmp_path, packed(text(end=end))))
+        np.testing.assert_array_equal(data.voltage_v, VOLTAGE)
+        np.testing.assert_array_equal(data.time_s, TIME)
