@@ -221,5 +221,7 @@ def _advice(cell: str) -> str:
             "--unit 'time_s=%m/%d/%Y %H:%M:%S.%f'"
         )
     if "," in cell:
-        return ": write nothing between the thousands and a decimal point, or separate the cells by semicolons"
+        return (
+            ": write nothing between the thousands and a decimal point, or separate the cells by semicolons"
+        )
     return ""
