@@ -19,7 +19,7 @@ from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
-from aesi.physics.belongs import check_belongs
+from aesi.physics.belongs import check_measured
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.pipeline.digits import resolving
 from aesi.pipeline.distinct import check_distinct
@@ -71,7 +71,7 @@ def calibrate_files(
     check_records(measurements, asked.temperatures_degc)
     given = declared_model(cell)
     declared, model = given.cell, asked.model or given.model
-    check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     found = calibrate(
         declared,
         measurements,

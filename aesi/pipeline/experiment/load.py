@@ -14,7 +14,7 @@ from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
-from aesi.physics.belongs import check_belongs
+from aesi.physics.belongs import check_measured
 from aesi.physics.effects import activated
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, training_drives
@@ -107,7 +107,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     notes: list[str] = []
     records: dict[str, FitRecord] = {}
     for name, (measurement, known_soc0) in sources.records.items():
-        check_belongs(cell, [measurement])
+        check_measured(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, config.data.hold, effects, model=model)
         soc0[name] = start.soc

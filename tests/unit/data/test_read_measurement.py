@@ -319,6 +319,15 @@ def test_a_room_in_fahrenheit_is_doubted(tmp_path):
     assert not any("starts at" in note for note in converted.notes)
 
 
+def test_a_thermocouple_that_drops_out_is_doubted(tmp_path):
+    temperature = np.where((TIME == 50) | (TIME == 120), 0.0, 25.0)
+    columns = zip(TIME, CURRENT, VOLTAGE, temperature, strict=True)
+    rows = "".join(f"{t},{i},{v},{k}\n" for t, i, v, k in columns)
+    (note,) = read_measurement(written(tmp_path, f"{HEADER},temperature_degc\n{rows}")).notes
+    assert "goes from 25 to 0 degC within 1 s at row 51 (line 52)" in note
+    assert "jumps like it: 4" in note
+
+
 def test_a_gap_in_a_current_alone_was_crossed_in_silence(tmp_path):
     time = np.where(TIME < 100, TIME, TIME + 14_400.0)
     rows = "\n".join(f"{t},{i}" for t, i in zip(time, CURRENT, strict=True))
