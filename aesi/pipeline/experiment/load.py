@@ -22,8 +22,9 @@ from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sources import cell_path, check_roles, sources_of
+from aesi.pipeline.notes import temperature_sentence
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import Hold, LeftOutDrives, Split
+from aesi.records import Hold, LeftOutDrives, Split, hold_sentence
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
@@ -111,7 +112,13 @@ def _load(config: ExperimentConfig) -> Loaded:
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, config.data.hold, effects, model=model)
         soc0[name] = start.soc
-        notes.append(start.sentence)
+        notes += [
+            start.sentence,
+            hold_sentence(
+                measurement.name, config.data.hold, "hold" in config.data.model_fields_set, "data.hold: "
+            ),
+            temperature_sentence(cell, measurement, effects),
+        ]
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         records[name] = no_rows(even, start.soc)
