@@ -221,7 +221,7 @@ def closest_finding(view: DiscoveryView) -> str:
     ]
     behind = max(ours) - closest["score"]
     if behind <= 0.0:
-        return f"Of those without it, {listed(names)} scores {-behind:.1f} nats higher and was not taken; its remark says why."
+        return f"{listed(names)} scores {-behind:.1f} nats higher and was not taken; its remark says why."
     return f"No other hypothesis explains these data as well: {listed(names)} comes closest, {behind:.1f} nats behind."
 
 
