@@ -136,12 +136,14 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
 
 
 def effects_left(given: HybridModel) -> tuple[str, ...]:
-    """A sentence on the effects of a saved model: what is fitted is the cell that it holds, without them."""
+    """What of a cell or a saved model is not fitted, in sentences: what its file declares and no simulation takes, and
+    the model's effects."""
     if not given.effects:
-        return ()
+        return given.cell.unread
     names = ", ".join(effect.id for effect in given.effects)
     what = "the effect" if len(given.effects) == 1 else "the effects"
     return (
+        *given.cell.unread,
         f"{what} {names} of the saved model: left out, since what is fitted and written is what a cell's file holds.",
     )
 

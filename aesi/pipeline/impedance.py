@@ -61,7 +61,7 @@ def impedance_file(
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:
-        say_notes(_left_out(active))
+        say_notes([*declared.cell.unread, *_left_out(active)])
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])
     return z

@@ -105,7 +105,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     model = config.cell.model or given.model
     sources = sources_of(config, path)
     soc0: dict[str, float] = {}
-    notes: list[str] = []
+    notes = [*cell.unread]
     records: dict[str, FitRecord] = {}
     for name, (measurement, known_soc0) in sources.records.items():
         check_measured(cell, [measurement])
