@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, IntArray
 from aesi.physics.cell import Cell
@@ -94,7 +93,7 @@ def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
 def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
     """What the voltages and the charge of a record say of the capacity: 0 and infinity where they say nothing."""
     rows = np.unique(np.linspace(0, len(record) - 1, ROWS).astype(int))
-    charge = _charge_ah(record)[rows]
+    charge = record.discharged_ah("backward")[rows]  # as loggers write
     drop = _largest_drop_v(cell, record, rows)
     current, voltage = record.current_a[rows], record.voltage_v[rows]
     calm = np.abs(current) < SMALL_C_RATE * cell.nominal_capacity_ah
@@ -158,7 +157,7 @@ def _check_capacity(cell: Cell, record: Measurement) -> None:
 def _moved(record: Measurement, rows: tuple[int, int]) -> str:
     """What flows between two rows, the fuller first, and the voltages there: one of them may be what is wrong."""
     first, last = sorted(rows)
-    charge = _charge_ah(record)
+    charge = record.discharged_ah("backward")
     amount, way = abs(charge[last] - charge[first]), "leave" if rows[0] == first else "enter"
     ends = " and ".join(
         f"{record.time_s[row]:.6g} s ({record.voltage_v[row]:.3f} V)" for row in (first, last)
@@ -191,12 +190,6 @@ def _cause(ratio: float, record: Measurement) -> str:
         "the cell file is another cell's, the current is that of several cells in parallel, or its sign is the other "
         "one (discharge is positive here)"
     )
-
-
-def _charge_ah(record: Measurement) -> Array:
-    """(n,) Ah discharged since the first row; a row's current has held since the row before, as loggers write."""
-    step = np.diff(record.time_s)
-    return np.concatenate([[0.0], np.cumsum(record.current_a[1:] * step)]) / SECONDS_PER_HOUR
 
 
 def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray) -> Array:

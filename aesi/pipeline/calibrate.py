@@ -15,7 +15,7 @@ from aesi.calibration import Calibration, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, sampled
 from aesi.calibration.start import sized
-from aesi.constants import MV_PER_V, SECONDS_PER_HOUR, ZERO_CELSIUS_K
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
@@ -123,10 +123,8 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
         rows = record.rows
         start, simulated, fitted = (model.run(i, cell, at)[0] for cell, at in states)
         capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
-        current = rows.current_a
-        mean = current[1:] if record.hold == "backward" else 0.5 * (current[1:] + current[:-1])
-        moved_ah = np.concatenate([[0.0], np.cumsum(mean * np.diff(rows.time_s))]) / SECONDS_PER_HOUR
-        soc = record.start.soc + record.soc_sd * float(x[model.layout.soc(i)]) - moved_ah / capacity_ah
+        soc0 = record.start.soc + record.soc_sd * float(x[model.layout.soc(i)])
+        soc = soc0 - rows.discharged_ah(record.hold) / capacity_ah
         out.append(
             DiscoveryTrace(
                 record.name, "fit", rows.time_s, rows.current_a, soc, rows.voltage_v, start, simulated, fitted

@@ -109,6 +109,15 @@ class Measurement:
         """Charge taken out over the record, its current in straight lines between rows."""
         return float(np.trapezoid(self.current_a, self.time_s)) / SECONDS_PER_HOUR
 
+    def discharged_ah(self, hold: Hold) -> Array:
+        """(n,) Ah taken out since the first row, less what was put in.
+
+        Exact for a current that runs as `hold` says: where rows are minutes apart, straight lines make a triangle of a
+        pulse.
+        """
+        mean = self.current_a[1:] if hold == "backward" else 0.5 * (self.current_a[1:] + self.current_a[:-1])
+        return np.concatenate([[0.0], np.cumsum(mean * np.diff(self.time_s))]) / SECONDS_PER_HOUR
+
     def __repr__(self) -> str:
         warm = "" if self.temperature_degc is None else ", with temperature"
         return f"Measurement({self.name!r}, {extent(self.time_s)}{warm})"

@@ -72,8 +72,8 @@ class Discovery:
 
     model_effects : what `after` simulates with: the effects found, and the tolerated parameters where they
     settled.
-    written : ids of the effects that `after` has beside the declared model; not those of the verdict where these do not
-    carry over.
+    written : the effects that `after` has beside the declared model, by id with their parameters; not those of the
+    verdict where these do not carry over.
     own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
     soc0, hold : of the first record, fitted.  effects : by id, all that may be tried or moved.  tried : ids of those
     that competed, none where none may be added.  files : errors by file and part.
@@ -99,7 +99,7 @@ class Discovery:
     notes: tuple[str, ...] = ()
     contradicted: bool = False
     warnings: tuple[str, ...] = ()
-    written: tuple[str, ...] = ()
+    written: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
     seconds: float = 0.0
@@ -253,7 +253,7 @@ def _told(
         notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=warnings(files, verdict),
-        written=tuple(evidence.after.hypothesis),
+        written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),
         seconds=seconds,

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from aesi import bench
 from aesi.bench import CaseRow
+from aesi.numerics.files.source_digest import source_digest
+from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.sections import TrackingConfig
+from flows.base import fingerprint
+from flows.base.console import Console
 from flows.evaluation.spread import in_processes, on_dask
 
 
@@ -37,7 +43,6 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
     workers : processes on this machine.  address : of a Dask scheduler, whose workers see the same files.
     """
     from flows.base import environment
-    from flows.base.console import Console
     from flows.tracking.store import Store
     from flows.tracking.tracker import Subject, Tracker
 
@@ -65,27 +70,61 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
     yield last
 
 
-def judged_once(case: Any, judge: Callable[[Any], CaseRow], keep: str | None) -> CaseRow:
-    """The row of a case, from the folder `keep` where it is there; case.name names its file.
+def judged_once(
+    case: Any,
+    judge: Callable[[Any], CaseRow],
+    keep: str | None,
+    files: Callable[[Any], Iterable[Path]] = lambda case: (),
+) -> CaseRow:
+    """The row of a case, from the folder `keep` where this program judged it before, as it is asked now.
 
-    keep : of one state of the code; None to judge every time.
+    case : of a repr that says all of it; case.name names its file.  judge : a function, or a partial of one, whose
+    arguments count.  keep : None to judge every time.  files : of a case, what its row depends on beside the program;
+    their content counts. What cannot be run here, for want of its data, is not kept.
     """
     if keep is None:
         return judge(case)
     path = Path(keep) / f"{case.name}.json"
-    if path.exists():
-        return dict(json.loads(path.read_text(encoding="utf-8")))
+    asked = repr(judge.keywords) if isinstance(judge, partial) else ""
+    key = fingerprint.key(repr(case), asked, *(file.read_bytes() for file in files(case) if file.is_file()))
+    of_this = {"program": _program(), "key": key}
+    known = _read(path)
+    if {name: known.get(name) for name in of_this} == of_this:
+        return dict(known["row"])
+    if known:
+        Console().say(f"{case.name}: {path} is of another program, other settings or files; judged again.")
     row = judge(case)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draft = path.with_suffix(".part")
-    draft.write_text(json.dumps(row), encoding="utf-8")
-    draft.replace(path)
+    if row.get("verdict") != "not run":
+        write_whole(path, json.dumps(of_this | {"row": row}))
     return row
 
 
 def kept(folder: str) -> list[CaseRow]:
-    """The rows that `judged_once` has kept there, by name."""
-    return [json.loads(path.read_text(encoding="utf-8")) for path in sorted(Path(folder).glob("*.json"))]
+    """The rows that this program has kept there, by name."""
+    rows, other = [], []
+    for path in sorted(Path(folder).rglob("*.json")):
+        known = _read(path)
+        if known.get("program") == _program():
+            rows.append(known["row"])
+        else:
+            other.append(path.stem)
+    if other:
+        Console().say(f"{folder}: of another program, and left out: {'; '.join(other)}.")
+    return rows
+
+
+def _program() -> str:
+    """The package, its benchmarks, and the search that they run."""
+    flows = Path(__file__).resolve().parents[1]
+    return source_digest(Path(bench.__file__).parent, flows / "benchmarks", flows / "search")
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """What the file of a row holds: row, program and key; nothing where there is no file that can be read."""
+    try:
+        return dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return {}
 
 
 def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow]:

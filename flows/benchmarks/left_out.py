@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from pathlib import Path
 from typing import Any
 
-from aesi.bench.left_out import LIMIT_S, judged, plan, summary, table
+from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, plan, summary, table
 from flows.benchmarks.cases import Cases, judged_once, tracked
 from flows.benchmarks.page import write_between
 
@@ -27,14 +28,24 @@ def run(
 
     cells : folder of the declared cell files.  only : substring of the case, which is set/record.  limit_s : processor
     seconds a case.  workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two
-    marks becomes the table.  keep : a folder for what each case gave; a case that is in it is not judged again, so that
-    an interrupted run goes on. It is of one state of the code: empty it after a change.
+    marks becomes the table.  keep : a folder for what each case gave; a case that is in it is not judged again by the
+    same program, as it was asked, so that an interrupted run goes on.
     """
     rows = []
-    judge = partial(judged_once, judge=partial(judged, cells=cells, limit_s=limit_s), keep=keep)
+    judge = partial(
+        judged_once,
+        judge=partial(judged, cells=cells, limit_s=limit_s),
+        keep=keep,
+        files=partial(_files, cells=cells),
+    )
     for row in tracked(Cases("left_out", 0, plan(only), judge, summary, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:
         order = {case.name: k for k, case in enumerate(plan(only))}
         write_between(write, BEGIN, END, table(sorted(rows[:-1], key=lambda row: order[row["case"]])))
+
+
+def _files(case: LeftOutCase, cells: str) -> tuple[Path, ...]:
+    """The file of a case's cell, where it lies in the folder of cell files."""
+    return () if case.set.cell is None else (Path(cells) / case.set.cell,)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.bench.real import chosen, judged, summary, table, write_report
+from aesi.bench.real.case import RealCase
 from aesi.bench.real.judge import LIMIT_S
 from flows.benchmarks.cases import Cases, judged_once, tracked
 from flows.benchmarks.page import write_between
@@ -37,11 +38,16 @@ def run(
     cells : folder of the declared cell files.  cases, only, development, every : which cases, see `chosen`.
     limit_s : processor seconds a case.  workers, address : processes here, or a Dask scheduler.
     report : an HTML file to write.  write : a page whose part between the two marks becomes the table.  keep : a folder
-    for what each case gave; a case that is in it is not judged again, so that an interrupted run goes on. It is of one
-    state of the code: empty it after a change.
+    for what each case gave; a case that is in it is not judged again by the same program, as it was asked, so that an
+    interrupted run goes on.
     """
     specs = chosen(cases, only, development, every)
-    judge = partial(judged_once, judge=partial(judged, cells=cells, limit_s=limit_s), keep=keep)
+    judge = partial(
+        judged_once,
+        judge=partial(judged, cells=cells, limit_s=limit_s),
+        keep=keep,
+        files=partial(_files, cells=cells),
+    )
     rows = []
     for row in tracked(Cases("real", 0, specs, judge, summary, SHOWN), workers, address):
         if row.get("summary"):
@@ -54,3 +60,8 @@ def run(
     if write is not None:
         order = {spec.name: k for k, spec in enumerate(specs)}
         write_between(write, BEGIN, END, table(sorted(rows, key=lambda row: order[row["case"]])))
+
+
+def _files(case: RealCase, cells: str) -> tuple[Path, ...]:
+    """The file of a case's cell, where it lies in the folder of cell files."""
+    return () if ":" in case.cell else (Path(cells) / case.cell,)

@@ -21,6 +21,7 @@ from aesi.errors import AesiError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
+from aesi.pipeline.experiment.sources import named_files
 from flows.benchmarks.cases import Cases, judged_once, kept, tracked
 from flows.benchmarks.page import write_between
 
@@ -83,8 +84,8 @@ def run(
     the files have them; otherwise five splits of a cell, one seed, few candidates and rows of 1 s.
     cells, a_cell, only, development : which splits.  models : which rows of Table 1.  overrides : laid over all files.
     workers, address : processes here, or a Dask scheduler.  write : a page whose part between the two marks becomes
-    the table.  keep : a folder for what each split gave; one that is in it is not run again, so that an interrupted run
-    goes on, and the table is of all that it holds. It is of one state of the code: empty it after a change.
+    the table.  keep : a folder for what each split gave; one that is in it is not run again by the same program, as it
+    was asked, so that an interrupted run goes on, and the table is of all that the program has kept there.
     """
     asked = {"a_cell": a_cell, "seeds": seeds, "candidates": candidates, "resamples": resamples, "dt_s": dt_s}
     standing = {"seeds": 3} if whole else QUICK
@@ -95,12 +96,18 @@ def run(
         for seed in range(int(settings["seeds"]))
     ]
     rows = []
-    judge = partial(judged_once, judge=_row, keep=keep)
+    judge = partial(judged_once, judge=_row, keep=keep, files=_files)
     for row in tracked(Cases("splits", 0, runs, judge, summary, SHOWN), workers, address):
         rows.append(row)
         yield row
     if write is not None:
         write_between(write, BEGIN, END, table(kept(keep) if keep else rows[:-1]))
+
+
+def _files(run: SplitRun) -> Iterator[Path]:
+    """The file of its experiment, and those that this names."""
+    yield Path(run.folder) / run.split.experiment
+    yield from named_files(run.config).values()
 
 
 def _laid(case: SplitCase, seed: int, settings: Mapping[str, Any], models: Sequence[str]) -> tuple[str, ...]:

@@ -102,6 +102,10 @@ def test_it_is_found_reported_saved_simulated_and_predicted(file, cell, measured
     found = discover(cell, [measured[1]], soc0=SOC0, effects=effects)
     assert found.verdict.effects == ("lead",)
     content = write_discovery(tmp_path, Case(CELL, (measured[1],), effect_files=(file,)), found)
+    assert list(content["written_parameters"]) == content["written"] == content["effects"]
+    for effect, values in content["written_parameters"].items():
+        named = next(c["parameters"] for c in content["candidates"] if c["effect"] == effect)
+        assert values == {name: pytest.approx(p["value"]) for name, p in named.items()}
     assert content["effects"] == ["lead"]
     assert "V_cell - I R" in (tmp_path / "report.html").read_text()
     simulate_file(tmp_path / "model", measured[0], tmp_path / "simulated.csv", soc0=SOC0)

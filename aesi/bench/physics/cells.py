@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.physics.tested import soh_on_its_day
-from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
+from aesi.constants import MV_PER_V
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError
@@ -224,10 +224,7 @@ def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
 
     That is the record's first less the charge passed since: what one who gives the state of charge has.
     """
-    moved_ah = (
-        np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(data.time_s))]) / SECONDS_PER_HOUR
-    )
-    soc = initial_state(cell, data).soc - moved_ah / cell.capacity_ah
+    soc = initial_state(cell, data).soc - data.discharged_ah("backward") / cell.capacity_ah
     parts = [slice(k, k + rows) for k in range(0, len(data), rows)]
     errors = [_errors(cell, data.take(part), float(soc[part.start]))[0] for part in parts]
     return round(MV_PER_V * float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), 2)

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from aesi.bench.physics.cells import HG2, NCR, cell_of
-from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError, DataError
@@ -53,12 +52,10 @@ def run(cells: str = "experiments/cells", cuts: int = 40, seed: int = 0) -> Iter
 
 def readings(cell: Cell, record: Measurement, cuts: int, rng: np.random.Generator) -> list[dict[str, Any]]:
     """One dict a cut: on what its reading rests, how far it is off the reference, and what it contradicts."""
-    t, i = record.time_s, record.current_a
-    passed = np.concatenate([[0.0], np.cumsum(i[1:] * np.diff(t))]) / SECONDS_PER_HOUR
-    truth = initial_state(cell, record).soc - passed / cell.capacity_ah
+    truth = initial_state(cell, record).soc - record.discharged_ah("backward") / cell.capacity_ah
     return [
         _read(cell, record.take(slice(int(row), None)), float(truth[row]))
-        for row in np.sort(rng.choice(len(t) - LEAST_ROWS, cuts, replace=False))
+        for row in np.sort(rng.choice(len(record) - LEAST_ROWS, cuts, replace=False))
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from aesi.calibration.records.thinning import thinned
 from aesi.calibration.records.zero import is_slow
 from aesi.calibration.start import flowing
-from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.belongs import SOC_MARGIN
@@ -153,11 +153,7 @@ def with_temperatures(
 def check_charge(cell: Cell, record: Prepared) -> None:
     """Refuse charge that takes the cell far beyond full or empty."""
     rows = record.rows
-    mean = (
-        rows.current_a[1:] if record.hold == "backward" else 0.5 * (rows.current_a[1:] + rows.current_a[:-1])
-    )
-    moved_ah = np.concatenate([[0.0], np.cumsum(mean * np.diff(rows.time_s))]) / SECONDS_PER_HOUR
-    soc = record.start.soc - moved_ah / cell.capacity_ah
+    soc = record.start.soc - rows.discharged_ah(record.hold) / cell.capacity_ah
     wrong = (soc < -SOC_MARGIN) | (soc > 1.0 + SOC_MARGIN)
     if wrong.any():
         row = int(np.argmax(wrong))

@@ -48,8 +48,10 @@ STEP_SHARE = 0.05
 """A step of the current counts where it is above this share of the largest step; ENOUGH_STEPS of them have to."""
 ENOUGH_STEPS = 5
 CLEAR_RESOLUTIONS = 3.0
-"""Of the voltage's smallest change: less may be lost in it. With ENOUGH_STEPS each way a voltage stands still; measured
-records have at most two steps each way without an answer."""
+"""Of the voltage's smallest change: less may be lost in it. With ENOUGH_STEPS each way a voltage stands still. In 34
+measured and virtual records at most two steps each way have no answer, at any multiple from 0.5 to 10; rounded to 1 to
+20 mV at most three at 0.5, one at 1 and none from 2 on. Of voltages that were made to stand still for 60 (600) of their
+rows 2, 3 and 5 find 41, 32 and 26 % (82, 78 and 76 %): the cell rests in most of the others."""
 CLEAR_CORRELATION = 0.5
 """Of current and voltage steps: beyond it they say which sign the current has. Voltage falls with the current, so
 that measured records lie near -1."""

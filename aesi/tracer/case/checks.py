@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import AesiError, DataError
 from aesi.numerics.typing import Array
 from aesi.physics.belongs import SOC_MARGIN
@@ -60,7 +59,7 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
             f"{record.name}: the current never exceeds {rate:.2g} C, so the cell does not respond and nothing can be "
             "decided; give data with load steps."
         )
-    charge = record.soc0 - _discharged_ah(record) / cell.capacity_ah
+    charge = record.soc0 - record.data.discharged_ah(record.hold) / cell.capacity_ah
     wrong = (charge < -SOC_MARGIN) | (charge > 1.0 + SOC_MARGIN)
     if wrong.any():
         row = int(np.argmax(wrong))
@@ -70,14 +69,6 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
             f"({row_words(row)}), from {start:.0f} % at the start and with {cell.capacity_ah:.3g} Ah; check the cell "
             "file, soc0 and the sign and unit of the current."
         )
-
-
-def _discharged_ah(record: PreparedRecord) -> Array:
-    """(n,) Ah discharged since the first row. Between rows the current is linear or constant, by the record's `hold`:
-    where rows are minutes apart, straight lines would make a triangle of a pulse."""
-    current = record.data.current_a
-    mean = current[1:] if record.hold == "backward" else 0.5 * (current[1:] + current[:-1])
-    return np.concatenate([[0.0], np.cumsum(mean * np.diff(record.data.time_s))]) / SECONDS_PER_HOUR
 
 
 def check_same_cell(problem: InverseProblem, record: PreparedRecord, declared: Run) -> None:

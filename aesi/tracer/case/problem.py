@@ -213,15 +213,23 @@ class InverseProblem:
     def start_slope_v(self) -> Array:
         """(n,) V: what one standard deviation of each record's initial state of charge is worth in the declared model;
         nought of a record that cannot be simulated there."""
-        return np.concatenate([self._start_slope_v(i) for i in range(len(self.records))])
+        out = []
+        for record, data in zip(self.records, self.seen, strict=True):
+            try:
+                out.append(self.start_slope_of_v(record, data, self.fixed, record.thin_hold))
+            except AesiError:
+                out.append(np.zeros(len(data)))
+        return np.concatenate(out)
 
-    def _start_slope_v(self, i: int) -> Array:
-        record, here = self.records[i], self._declared[i]
-        try:
-            there = self.run(self.seen[i], record.other_soc0, self.fixed, record.thin_hold)
-        except AesiError:
-            return np.zeros(len(here.voltage_v))
-        return np.asarray(there.voltage_v - here.voltage_v)
+    def start_slope_of_v(
+        self, record: PreparedRecord, data: Measurement, effects: tuple[ActiveEffect, ...], hold: Hold
+    ) -> Array:
+        """(n,) V: what one standard deviation of a record's initial state of charge is worth on these rows of it, of
+        the cell with these effects.  Raises AesiError where it cannot be simulated there."""
+        here, there = (
+            self.run(data, soc0, effects, hold).voltage_v for soc0 in (record.soc0, record.other_soc0)
+        )
+        return np.asarray(there - here)
 
     @cached_property
     def declared_soc(self) -> Array:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import same_rest
@@ -65,12 +63,7 @@ class ModelState:
     def start_slope_v(self, record: PreparedRecord) -> Array:
         """(n,) V of a whole record that was not fitted: what one standard deviation of its initial state of charge is
         worth.  Raises AesiError where it cannot be simulated there."""
-        run, effects = self.problem.run, self.effects(record.good)
-        here, there = (
-            run(record.data, soc0, effects, record.hold).voltage_v
-            for soc0 in (record.soc0, record.other_soc0)
-        )
-        return np.asarray(there - here)
+        return self.problem.start_slope_of_v(record, record.data, self.effects(record.good), record.hold)
 
     def _full(self, otherwise: float) -> float:
         """State of charge that counts as full: the mean fitted start of the records that begin fully charged."""

@@ -1,5 +1,6 @@
 """Ctrl-C in the midst of a search, under Prefect: one line, nothing left running, and the next command goes on."""
 
+import json
 import os
 import signal
 import subprocess
@@ -14,6 +15,7 @@ import pytest
 
 import aesi
 from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.discovery.discover import ARCHIVE
 
 ROOT = Path(__file__).resolve().parents[3]
 CELL = ROOT / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
@@ -45,9 +47,7 @@ def interrupted(arguments, at, after_s=1.0):
         text=True,
         start_new_session=True,
     )
-    for line in process.stderr:
-        if at in line:
-            break
+    assert any(at in line for line in process.stderr), "it ended before"
     time.sleep(after_s)
     family = psutil.Process(process.pid).children(recursive=True)
     assert family  # Prefect's temporary server at least
@@ -74,11 +74,20 @@ def test_a_run_interrupted_in_its_search_goes_on(aesi, arguments, tracked):
 
 
 def test_a_discovery_interrupted_in_its_search_goes_on(aesi, record, tracked):
+    """At its first hypothesis: all of them take some seconds, of which none is to spare."""
+    archive = tracked / "found" / ARCHIVE
     command = ["discover", "--cell", str(CELL), "--data", str(record), "--out", "found", "--model", "dfn"]
     command += ["--only", "series_resistance", "--only", "ocv_hysteresis"]
-    said = interrupted([*command, "--prefect"], "hypotheses: 1 in", after_s=3.0)
+    said = interrupted([*command, "--prefect"], "hypotheses: 1 in", after_s=0.0)
     assert said == ["Stopped. What was fitted is kept in found; the same command goes on from there."]
+    kept = archive.read_text().splitlines()
     done = aesi(*command, "--no-prefect")
     _, said = done.communicate(timeout=240)
     assert done.returncode == 0, said
+    assert "found holds an earlier search" in said
     assert "Report: found" in said
+    fits = archive.read_text().splitlines()
+    assert 0 < len(kept) < len(fits)  # within the search, not before or after
+    assert fits[: len(kept)] == kept
+    entries = [json.loads(line) for line in fits]
+    assert len({one["fit"] for one in entries}) == len(entries)  # what was kept is not fitted again

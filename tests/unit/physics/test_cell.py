@@ -227,10 +227,11 @@ def test_electrodes_that_are_swapped_and_energies_in_kilojoule_are_refused(conte
         "Parameterisation": parts | {"Negative electrode": positive, "Positive electrode": negative}
     }
     assert "or the electrodes are swapped" in fault(swapped)
-    for part in (negative, positive):
-        part["Diffusivity activation energy [J.mol-1]"] = 30.0
-        part["Reaction rate constant activation energy [J.mol-1]"] = 35.0
-    assert "30 kJ/mol is 30000" in fault(content)
+    for diffusivity, rate in ((30.0, 35.0), (110.0, 90.0)):
+        for part in (negative, positive):
+            part["Diffusivity activation energy [J.mol-1]"] = diffusivity
+            part["Reaction rate constant activation energy [J.mol-1]"] = rate
+        assert "30 kJ/mol is 30000" in fault(content)
 
 
 def test_a_file_with_a_byte_order_mark_is_read(content, tmp_path):

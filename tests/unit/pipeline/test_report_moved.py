@@ -62,3 +62,53 @@ def test_a_parameter_that_is_named_by_its_effect_is_not_named_twice():
         parameter_words(row("resistance_ohm", 8e-3, 2.0, effect="series_resistance")) == "series resistance"
     )
     assert parameter_words(FAR) == "solid diffusivity (negative)"
+
+
+def estimate(value, low, high, unit):
+    return {"value": value, "low": low, "high": high, "unit": unit}
+
+
+def colder(written_k):
+    shift = {"shift_k": estimate(-13.2, -16.2, -10.1, "K")}
+    return {
+        "effects": ["ambient_temperature"],
+        "declared_degc": 25.0,
+        "written": ["ambient_temperature"],
+        "written_parameters": {"ambient_temperature": {"shift_k": written_k}},
+        "candidates": [{"effect": "ambient_temperature", "kind": "parameter", "parameters": shift}],
+    }
+
+
+def test_a_written_model_with_what_was_found_at_another_size_is_told_as_such():
+    """The cold drive of a Panasonic: the finding was 11.8 degC, the model beside it ran at 13.3 degC."""
+    assert moved_findings(colder(-11.7)) == [
+        "The model that is written was fitted with the declared parameters open, by which it does better on data left "
+        "out, and so has what was found at another size: ambient temperature 13.3 degC instead of 11.8 degC."
+    ]
+    assert moved_findings(colder(-13.21)) == []  # the same as it is shown
+    assert moved_findings(colder(-11.7) | {"written_parameters": {}}) == []  # something else is written
+
+
+def test_another_size_is_told_in_the_units_of_the_finding():
+    parameters = {
+        "loss": estimate(0.05, 0.04, 0.06, "dimensionless"),
+        "resistance_ohm": estimate(8e-3, 7.9e-3, 8.1e-3, "ohm"),
+    }
+    discovery = {
+        "effects": ["lithium_inventory_loss", "series_resistance"],
+        "written_parameters": {
+            "lithium_inventory_loss": {"loss": 0.09},
+            "series_resistance": {"resistance_ohm": 6e-3},
+        },
+        "candidates": [
+            {"effect": effect, "kind": "physics", "parameters": {name: parameters[name]}}
+            for effect, name in (
+                ("lithium_inventory_loss", "loss"),
+                ("series_resistance", "resistance_ohm"),
+            )
+        ],
+    }
+    (text,) = moved_findings(discovery)
+    assert text.endswith(
+        "lithium inventory loss 9.0 % instead of 5.0 %; series resistance 6.00 mohm instead of 8.00 mohm."
+    )

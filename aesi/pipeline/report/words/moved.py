@@ -7,7 +7,7 @@ from typing import Any
 
 from aesi.pipeline.report.views import Row
 from aesi.pipeline.report.words.discoveries import WITH_FINDING, states_of
-from aesi.pipeline.report.words.sizes import TELLING, rounded
+from aesi.pipeline.report.words.sizes import TELLING, resized, rounded
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""
@@ -23,7 +23,20 @@ def moved_findings(discovery: Mapping[str, Any]) -> list[str]:
     shown, after = {"recalibrated": RECALIBRATING}, states_of(discovery).get("after")
     if after is not None:
         shown["after"] = BESIDE if after == WITH_FINDING else WRITTEN
-    return [_sentence(words, own[state]) for state, words in shown.items() if own.get(state)]
+    moved = [_sentence(words, own[state]) for state, words in shown.items() if own.get(state)]
+    return [*moved, *([resized_finding(discovery)] if resized_finding(discovery) else [])]
+
+
+def resized_finding(discovery: Mapping[str, Any]) -> str:
+    """Where the model that is written has what was found at another size, both of them; '' where it has not."""
+    sizes = [one for effect in discovery["effects"] for one in resized(effect, discovery)]
+    if not sizes:
+        return ""
+    told = "; ".join(f"{name} {there} instead of {found}" for name, there, found in sizes)
+    return (
+        "The model that is written was fitted with the declared parameters open, by which it does better on data left "
+        f"out, and so has what was found at another size: {told}."
+    )
 
 
 def _sentence(words: str, rows: Sequence[Row]) -> str:

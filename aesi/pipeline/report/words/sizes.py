@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import floor, log10
 from typing import Any
 
@@ -17,6 +17,7 @@ MOST_PARAMETERS = 3
 """Of an effect, in one sentence."""
 PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um", 1e6)}
 """Unit -> that of its thousandths or millionths, and how many make one."""
+PERCENT = 100.0
 SMALL = 0.5
 """In its own unit; what is less is written in thousandths."""
 
@@ -24,17 +25,15 @@ SMALL = 0.5
 def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
     """The effect's name with its fitted parameters and their 90 % intervals; the name alone where there are none."""
     name = title or effect.replace("_", " ")
-    row = next((c for c in discovery["candidates"] if c["effect"] == effect), None)
-    known = CATALOGUE[effect].parameters if effect in CATALOGUE else {}
-    fitted = dict(row.get("parameters", {})) if row else {}
-    told = {key: value for key, value in fitted.items() if _tells(value, known.get(key))} or fitted
+    known, told = _known(effect), _told(effect, discovery)
     if not told:
         return name
     ((key, value), *others) = told.items()
     if not others and value["unit"] != "dimensionless":
-        if row and (said := _instead(value, known.get(key), discovery)):
-            return f"{name} ({said})"
-        if row and row["kind"] != "physics":  # what is off, or lies, is not had more or less of
+        if (shift := _declared_of(known.get(key), discovery)) is not None:
+            declared, unit = shift
+            return f"{name} ({quantity(_with_ends(value, 1.0, *shift))} instead of {declared:.4g} {unit})"
+        if _row(effect, discovery)["kind"] != "physics":  # what is off, or lies, is not had more or less of
             return f"{name} ({quantity(value)})"
         parameter = known.get(key)
         more = " more" if parameter is not None and parameter.counted == "added" else " of"
@@ -44,27 +43,75 @@ def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = Non
     return f"{name} ({', '.join(parts)}{rest})"
 
 
-def _instead(value: Mapping[str, Any], parameter: Parameter | None, discovery: Mapping[str, Any]) -> str:
-    """'14.0 degC [12.1, 15.9] instead of 25 degC', of a parameter that is how far something is from what was declared;
-    '' of any other."""
+def resized(effect: str, discovery: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """What the written model has of an effect at another size than the finding, as far as one sees it: the parameter in
+    words, its value there, and the finding's; ('ambient temperature', '14.0 degC', '11.8 degC')."""
+    written = discovery.get("written_parameters", {}).get(effect, {})
+    name, told, out = effect.replace("_", " "), _told(effect, discovery), []
+    for key, value in list(told.items())[:MOST_PARAMETERS]:
+        if key not in written:
+            continue
+        parameter = _known(effect).get(key)
+        times = PERCENT if _is_share(parameter) else 1.0
+        declared, unit = _declared_of(parameter, discovery) or (
+            0.0,
+            "%" if _is_share(parameter) else value["unit"],
+        )
+        shown = _with_ends(value, times, declared, unit)
+        unit, (there, found) = _digits_of(shown, [declared + times * written[key], shown["value"]])
+        if there != found:
+            words = name if len(told) == 1 else f"{name} ({_words(key)})"
+            out.append((words, f"{there}{unit}", f"{found}{unit}"))
+    return out
+
+
+def _row(effect: str, discovery: Mapping[str, Any]) -> Mapping[str, Any]:
+    """What is known of an effect, empty where it could not be tried."""
+    return next((c for c in discovery.get("candidates", ()) if c["effect"] == effect), {})
+
+
+def _known(effect: str) -> Mapping[str, Parameter]:
+    return CATALOGUE[effect].parameters if effect in CATALOGUE else {}
+
+
+def _told(effect: str, discovery: Mapping[str, Any]) -> dict[str, Any]:
+    """The fitted parameters of an effect that say something, all where none does."""
+    fitted, known = dict(_row(effect, discovery).get("parameters", {})), _known(effect)
+    return {key: value for key, value in fitted.items() if _tells(value, known.get(key))} or fitted
+
+
+def _declared_of(parameter: Parameter | None, discovery: Mapping[str, Any]) -> tuple[float, str] | None:
+    """What a parameter is a shift of, as it was declared, with its unit; None of one that is no shift."""
     key = parameter.shift_of if parameter else ""
-    if key not in discovery:
-        return ""
-    declared, unit = discovery[key], "degC" if key.endswith("_degc") else value["unit"]
-    there = {end: declared + value[end] for end in ("value", "low", "high")}
-    return f"{quantity({**there, 'unit': unit})} instead of {declared:.4g} {unit}"
+    if parameter is None or key not in discovery:
+        return None
+    return discovery[key], "degC" if key.endswith("_degc") else parameter.unit
+
+
+def _is_share(parameter: Parameter | None) -> bool:
+    return parameter is not None and parameter.counted == "share"
+
+
+def _with_ends(value: Mapping[str, Any], times: float, plus: float, unit: str) -> dict[str, Any]:
+    """A value and its interval in another unit, from another nought."""
+    return {**{end: plus + times * value[end] for end in ("value", "low", "high")}, "unit": unit}
 
 
 def quantity(value: Mapping[str, Any]) -> str:
     """A value with its interval and unit: '8.0 mohm [7.9, 8.1]'."""
+    unit, (middle, low, high) = _digits_of(value, [value[key] for key in ("value", "low", "high")])
+    return f"{middle}{unit} [{low}, {high}]"
+
+
+def _digits_of(value: Mapping[str, Any], numbers: Sequence[float]) -> tuple[str, list[str]]:
+    """The unit behind a number, with its space, and numbers in it, as precise as the value's interval."""
     unit, factor = value["unit"], 1.0
     largest = max(abs(value[key]) for key in ("value", "low", "high"))
     if unit in PREFIXES and largest < SMALL:
         unit, factor = PREFIXES[unit]
     digits = _digits(factor * (value["high"] - value["low"]), factor * value["value"])
-    middle, low, high = (f"{factor * value[key]:.{digits}f}" for key in ("value", "low", "high"))
     shown = "" if unit == "dimensionless" else f" {unit}"
-    return f"{middle}{shown} [{low}, {high}]"
+    return shown, [f"{factor * number:.{digits}f}" for number in numbers]
 
 
 def rounded(value: float, unit: str) -> str:
@@ -129,13 +176,17 @@ def _tells(value: Mapping[str, Any], parameter: Parameter | None) -> bool:
 
 
 def _part(key: str, value: Mapping[str, Any], parameter: Parameter | None) -> str:
-    if parameter is not None and parameter.counted == "share":
-        percent = {end: 100 * value[end] for end in ("value", "low", "high")}
-        return f"{quantity({**percent, 'unit': '%'})} {parameter.description.removeprefix('share ')}"
-    words = key.rsplit("_", 1)[0].replace("_", " ") if key.endswith(("_v", "_a", "_k", "_s", "_ohm")) else key
-    words = words.replace("_factor", "").replace("_", " ")
+    if parameter is not None and _is_share(parameter):
+        percent = _with_ends(value, PERCENT, 0.0, "%")
+        return f"{quantity(percent)} {parameter.description.removeprefix('share ')}"
     times = " times" if parameter is not None and parameter.neutral == 1.0 else ""
-    return f"{words} {quantity(value)}{times}"
+    return f"{_words(key)} {quantity(value)}{times}"
+
+
+def _words(key: str) -> str:
+    """A parameter's name without its unit."""
+    words = key.rsplit("_", 1)[0] if key.endswith(("_v", "_a", "_k", "_s", "_ohm")) else key
+    return words.replace("_factor", "").replace("_", " ")
 
 
 def _digits(width: float, value: float) -> int:
