@@ -68,13 +68,11 @@ In `aesi bench calibrate --set evaluations=8`, whose truth has contacts of 8 moh
 half of it 3.7 [0, 7.9], with twice 7.3 [3.9, 10.6], at 12.3, 12.7 and 12.7 mV on the unseen drive. With 0.06 V, and
 kinetics and electrolyte left as much wider, the calibration of an LG 18650HG2 ended at kinetics a hundred times quicker
 and an electrolyte a third slower, 80 mV off at 0 degC."""
-CONTACTS = "12 mohm of a cell of 2.9 Ah, from pulses at four temperatures (CONTACT_V)"
+CONTACTS = "12 mohm of a cell of 2.9 Ah, from pulses at four temperatures"
 FULLEST = 0.95
 """Stoichiometry of an electrode that is as full as a charged cell's may be: beyond, its kinetics stand still."""
-RATES = (
-    "convention: rates of cells of one chemistry scatter by a factor of three either way; no source opened"
-)
-TORTUOSITY = "convention: tortuosities scatter by a third; no source opened"
+RATES = "convention: rates of cells of one chemistry scatter by a factor of three either way; no source"
+TORTUOSITY = "convention: tortuosities scatter by a third; no source"
 SOLID_EA, SALT_EA = 20e3, 5e3
 """J/mol, deviations of the prior: a convention, with the sources below between 12 and 81, and 12 and 21 kJ/mol."""
 ENERGIES = (
@@ -103,11 +101,11 @@ and 111 mV, with 50 by 18, 33 and 57, with 40 by 14, 20 and 34; its file over te
 impedance at 10 degC from 0.95 to 0.2 of charge by 11 to 15 % with 50 and by 14 to 17 % with 40."""
 FILM_ENERGIES = (
     "0.61 to 0.66 eV (59 to 64 kJ/mol) of the film on graphite, J. Power Sources 153 (2006) 391, "
-    "doi:10.1016/j.jpowsour.2005.05.034, abstract; 38 and 57 fitted to a cell's pulses (FILM_ENERGY)"
+    "doi:10.1016/j.jpowsour.2005.05.034, abstract; 38 and 57 fitted to a cell's pulses"
 )
-FILM_COURSES = "convention: a factor of seven either way; no source opened"
+FILM_COURSES = "convention: a factor of seven either way; no source"
 COURSES = "factors of 59 and 11 over the windows of graphite and NCO, Ecker et al. 2015, as PyBaMM has them"
-RATE_COURSES = "convention: exchange currents leave the square root by factors; no source opened"
+RATE_COURSES = "convention: exchange currents leave the square root by factors; no source"
 COURSE_SD = 1.2
 """Of a logarithm: a decade over the window is two of them. With 0.8 the rates of a Panasonic NCR18650PF, fitted to its
 pulses, ended at three deviations."""
@@ -122,7 +120,7 @@ FULL_SD = {"negative": 0.015, "positive": 0.03}
 AGED_FULL_SD = {"negative": 0.15, "positive": 0.15}
 """The same in a check-up of the cell of the file: a tenth of its lithium lost moves the negative electrode's by 0.09.
 Measured on three made check-ups of an LG M50 with up to that: with FULL_SD a tenth of the material counts as lost."""
-HALF_CELLS = "convention: cells of one chemistry are balanced alike within a tenth; no source opened"
+HALF_CELLS = "convention: cells of one chemistry are balanced alike within a tenth; no source"
 
 
 def free_parameters(cell: Cell, span_k: float, same_cell: bool = False) -> tuple[Free, ...]:

@@ -11,21 +11,19 @@ from aesi.data.channels.columns import REQUIRED, Mapped
 from aesi.data.channels.gaps import without_gaps
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed, check_stuck
 from aesi.data.channels.load_columns import load_columns
+from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, record_name
 from aesi.data.resample import decimate
 from aesi.errors import InputError
-from aesi.numerics.typing import Array
 from aesi.records import Measurement
 
 __all__ = ["Duplicates", "Reading", "Sign", "read", "read_measurement"]
 
 MAX_ROWS = 2_000_000
 """A tenth of a second for two days; more rows are decimated, and a note says so."""
-WARMEST_START_DEGC = 62.0
-"""Tests of cells are at most at 60 degC; a room is at 68 to 77 degF."""
 
 
 def read_measurement(
@@ -96,8 +94,7 @@ def measurement_in(
     check_ranges(data, context)
     data = without_gaps(data, context, notes)
     check_alive(data, context)
-    if "temperature_degc" in data:
-        notes.extend(_doubts(data["temperature_degc"]))
+    notes.extend(temperature_doubts(data, context))
     check_scale(data, context)
     check_signed(data, context, table.header)
     check_sign(data, context, _sign_advice(mapped, reading))
@@ -112,21 +109,6 @@ def measurement_in(
         notes=tuple(f"{context.file}: {note}" for note in notes),
     )
     return measurement if max_rows is None else decimate(measurement, max_rows)
-
-
-def _doubts(temperature_degc: Array) -> list[str]:
-    """A sentence on a temperature that may be, and is more likely something else."""
-    if not temperature_degc.any():
-        return [
-            "Its temperature is 0 degC in every row, which loggers write where no sensor is connected: "
-            "--column temperature_degc= leaves it out."
-        ]
-    if temperature_degc[0] > WARMEST_START_DEGC:
-        return [
-            f"Its temperature starts at {temperature_degc[0]:.4g} degC, warmer than cells are tested; if that is in "
-            "Fahrenheit: --unit temperature_degc=F."
-        ]
-    return []
 
 
 def _sign_advice(mapped: Mapped, reading: Reading) -> str:

@@ -8,7 +8,7 @@ another unit.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,11 +66,19 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
     outside = np.flatnonzero((data.voltage_v < low) | (data.voltage_v > high))
     if len(outside):
         row = int(outside[0])
+        like = f"; rows like it: {len(outside):,}" if len(outside) > 1 else ""
         raise DataError(
-            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s ({row_words(row)}) is "
-            f"outside the range of {cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V); the data "
-            "belong to another cell, or the voltage is not in volts."
+            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s ({row_words(row)}{like}) is "
+            f"outside the range of {cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V): the record "
+            "and the cell file are of different cells, or the row is no measurement of the cell."
         )
+
+
+def check_measured(cell: Cell, records: Sequence[Measurement]) -> None:
+    """Both checks, for what fits a record or is judged on it; a simulation needs only its current."""
+    check_belongs(cell, records)
+    for record in records:
+        check_voltage(cell, record)
 
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:

@@ -29,7 +29,7 @@ def sentence(
     cell = model.cell
     head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
     where = f"at {time_s[at]:.6g} s"  # of a row the file may know nothing: models run on rows of their own
-    amperes = abs(float(current_a[at]))
+    amperes = float(np.max(np.abs(current_a[max(at - 1, 0) : at + 1])))  # on the way there
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
     if what == SALT or (what == NO_SOLUTION and driest < DRY_SHARE):
         told = _no_salt(model, kelvin, amperes, where)

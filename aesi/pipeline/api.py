@@ -19,7 +19,7 @@ from aesi.data.reading import record_names
 from aesi.errors import DataError, InputError
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
-from aesi.physics.belongs import check_belongs
+from aesi.physics.belongs import check_measured
 from aesi.pipeline.calibrate import check_records, effects_left
 from aesi.pipeline.discovery.cases import MOST_ROWS
 from aesi.pipeline.discovery.discover import Case, run_case
@@ -75,7 +75,7 @@ def discover(
     asked = [one for part in parts for one in part]
     found = iter(_read_all(asked, MOST_ROWS // max(1, len(asked)), hold))
     measurements, judged, known = (tuple(islice(found, len(part))) for part in parts)
-    check_belongs(given.cell, [*measurements, *judged, *known])
+    check_measured(given.cell, [*measurements, *judged, *known])
     named = [effect_files] if isinstance(effect_files, str | PathLike) else effect_files
     files = tuple(Path(file) for file in named)
     case = Case(given, measurements, judged, soc0, holdout, max_effects, seed, files, model=model, good=known)
@@ -111,7 +111,7 @@ def calibrate(
     declared, physics = given.cell, model or given.model
     measurements = _read_all(_listed(data), None, hold)
     check_records(measurements, temperatures_degc)
-    check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     found = fit_cell(
         declared,
         measurements,

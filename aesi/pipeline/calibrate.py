@@ -19,7 +19,7 @@ from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
-from aesi.physics.belongs import check_belongs
+from aesi.physics.belongs import check_measured
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.pipeline.digits import resolving
 from aesi.pipeline.distinct import check_distinct
@@ -71,7 +71,7 @@ def calibrate_files(
     check_records(measurements, asked.temperatures_degc)
     given = declared_model(cell)
     declared, model = given.cell, asked.model or given.model
-    check_belongs(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
     found = calibrate(
         declared,
         measurements,
@@ -132,12 +132,14 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
 
 
 def effects_left(given: HybridModel) -> tuple[str, ...]:
-    """A sentence on the effects of a saved model: what is fitted is the cell that it holds, without them."""
+    """What of a cell or a saved model is not fitted, in sentences: what its file declares and no simulation takes, and
+    the model's effects."""
     if not given.effects:
-        return ()
+        return given.cell.unread
     names = ", ".join(effect.id for effect in given.effects)
     what = "the effect" if len(given.effects) == 1 else "the effects"
     return (
+        *given.cell.unread,
         f"{what} {names} of the saved model: left out, since what is fitted and written is what a cell's file holds.",
     )
 

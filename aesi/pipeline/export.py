@@ -48,7 +48,7 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
         raise InputError(f"{out} has to end in {SUFFIX[to]} for --to {to}.")
     declared = declared_model(model)
     found = folded(declared.cell, declared.effects)
-    held = [f"{_said(effect)}: written into the cell." for effect in found.held]
+    held = [*declared.cell.unread, *(f"{_said(effect)}: written into the cell." for effect in found.held)]
     left = (
         []
         if declared.correction is None

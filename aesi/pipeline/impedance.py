@@ -61,7 +61,7 @@ def impedance_file(
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:
-        say_notes(_left_out(active))
+        say_notes([*declared.cell.unread, *_left_out(active)])
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])
     return z
@@ -81,12 +81,14 @@ def _has_double_layer(cell: Cell, effects: Sequence[ActiveEffect]) -> bool:
 
 def read_frequencies(text: str) -> Array:
     """Hz, of LOW:HIGH:N or of a file.  Raises InputError or DataError for what is neither."""
-    if ":" in text and not Path(text).exists():
+    if not Path(text).exists():
         try:
             lowest, highest, count = text.split(":")
             low, high, n = float(lowest), float(highest), int(count)
         except ValueError:
-            raise InputError(f"--frequencies {text}: has to read LOW:HIGH:N, as in 0.001:1000:61.") from None
+            raise InputError(
+                f"--frequencies {text}: has to read LOW:HIGH:N, as in 0.001:1000:61, or to be a file that is there."
+            ) from None
         if not 0.0 < low < high < np.inf or n < 2:
             raise InputError(f"--frequencies {text}: needs 0 < LOW < HIGH in Hz and at least two of them.")
         return np.geomspace(low, high, n)

@@ -76,6 +76,7 @@ def simulate_file(
     start = _start(used, record, soc0)
     say(
         [
+            *declared.cell.unread,
             start.sentence,
             hold_sentence(record.name, taken, hold is not None),
             temperature_sentence(declared.cell, record, active),
@@ -128,6 +129,7 @@ def predict_file(
     start = _start(hybrid, record, soc0)
     say(
         [
+            *hybrid.cell.unread,
             start.sentence,
             hold_sentence(record.name, hybrid.hold, hold is not None),
             temperature_sentence(hybrid.cell, record, hybrid.effects),

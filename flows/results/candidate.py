@@ -140,9 +140,10 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
 def said(rebuilt: Rebuilt, out: Path) -> str:
     """What came back, in one line."""
     candidate = rebuilt.candidate
+    less = candidate.free_run_valid_mser_pct
     return (
         f"candidate {rebuilt.number}: {len(candidate.bagging.terms)} and {len(candidate.stability.terms)} terms, "
-        f"{candidate.free_run_valid_mser_pct:.2f} % less squared error on validation in free run; "
+        f"{abs(less):.2f} % {'less' if less >= 0.0 else 'more'} squared error on validation in free run; "
         f"{candidate.better.name} is in {out / 'model'}"
     )
 

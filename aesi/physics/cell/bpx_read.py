@@ -8,6 +8,7 @@ from typing import Any
 
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
+from aesi.physics.cell.bpx_unread import unread
 from aesi.physics.cell.bpx_values import check_values
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
@@ -74,6 +75,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
+        unread=unread(v1),
     )
     check_values(cell, where)
     return cell
@@ -86,6 +88,10 @@ def _optional(fields: Fields, name: str) -> float | None:
 
 def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode:
     what = f"{where}: {side} electrode"
+    if fields["OCP [V]"] == 0:
+        raise CellError(
+            f"{what}, OCP [V] is 0 at all stoichiometries; write there the open-circuit potential against lithium."
+        )
     factor, film = user.get(RATE_FACTORS[side]), user.get(FILM_RESISTANCES[side])
 
     def optional_relation(name: str) -> Relation | None:

@@ -5,7 +5,7 @@ Sign convention of the whole package: current is positive on discharge.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -108,6 +108,7 @@ class CellParameters:
     contact_resistance_ohm : in series with the whole cell; that of metal, the same at any temperature.
     fitted_with : "espm" or "dfn", the model that the parameters were fitted with, where they were.
     capacity_shares : (record, share of this capacity that the cell had then), of the records of that fit.
+    unread : sentences on what the file declares and no simulation takes, as a hysteresis or a state of ageing.
     """
 
     negative: Electrode
@@ -133,6 +134,7 @@ class CellParameters:
     name: str = "cell"
     description: str = ""
     references: str = ""
+    unread: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def total_area_m2(self) -> float:

@@ -9,7 +9,7 @@ from aesi.data.read import Reading, read
 from aesi.data.reading import record_names
 from aesi.errors import ConfigError
 from aesi.physics import ModelName
-from aesi.physics.belongs import check_belongs
+from aesi.physics.belongs import check_measured
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
@@ -50,7 +50,7 @@ def case_of_files(
     rows = MOST_ROWS // max(1, len(paths))
     named = zip(paths, record_names(paths), strict=True)
     records = [read(path, reading or Reading(), rows, name).held(hold) for path, name in named]
-    check_belongs(declared_model(cell).with_soh(soh).cell, records)
+    check_measured(declared_model(cell).with_soh(soh).cell, records)
     return Case(
         cell,
         measurements=tuple(records[: len(data)]),

@@ -99,12 +99,16 @@ class Case:
 
     @cached_property
     def assumed(self) -> tuple[str, ...]:
-        """Sentences on the temperature of the records that hold none, and on a correction that is not taken."""
+        """Sentences on the temperature of the records that hold none, and on what of the declared cell is not taken."""
         given = self.declared()
         untold = (m for m in self.records if m.temperature_degc is None)
         without = "the saved model's learnt correction is left out: what is sought is what its physics lacks."
         left = () if given.correction is None else (without,)
-        return (*left, *(temperature_sentence(given.cell, m, given.effects) for m in untold))
+        return (
+            *given.cell.unread,
+            *left,
+            *(temperature_sentence(given.cell, m, given.effects) for m in untold),
+        )
 
     @property
     def notes(self) -> tuple[str, ...]:

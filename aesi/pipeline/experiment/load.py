@@ -14,7 +14,7 @@ from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
-from aesi.physics.belongs import check_belongs
+from aesi.physics.belongs import check_measured
 from aesi.physics.effects import activated
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, training_drives
@@ -22,8 +22,9 @@ from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sources import cell_path, check_roles, sources_of
+from aesi.pipeline.notes import temperature_sentence
 from aesi.pipeline.product.declared import declared_model
-from aesi.records import Hold, LeftOutDrives, Split
+from aesi.records import Hold, LeftOutDrives, Split, hold_sentence
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
 
@@ -104,14 +105,20 @@ def _load(config: ExperimentConfig) -> Loaded:
     model = config.cell.model or given.model
     sources = sources_of(config, path)
     soc0: dict[str, float] = {}
-    notes: list[str] = []
+    notes = [*cell.unread]
     records: dict[str, FitRecord] = {}
     for name, (measurement, known_soc0) in sources.records.items():
-        check_belongs(cell, [measurement])
+        check_measured(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, config.data.hold, effects, model=model)
         soc0[name] = start.soc
-        notes.append(start.sentence)
+        notes += [
+            start.sentence,
+            hold_sentence(
+                measurement.name, config.data.hold, "hold" in config.data.model_fields_set, "data.hold: "
+            ),
+            temperature_sentence(cell, measurement, effects),
+        ]
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         records[name] = no_rows(even, start.soc)

@@ -6,7 +6,7 @@ from os import PathLike
 from pathlib import Path
 
 from aesi.physics import Cell
-from aesi.physics.belongs import check_belongs
+from aesi.physics.belongs import check_measured
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 
@@ -29,7 +29,7 @@ def declared_model(source: Declared) -> HybridModel:
 
 def check_of_cell(source: Declared, record: Measurement) -> None:
     """Raises DataError, one sentence, where a record cannot be of the cell that is declared."""
-    check_belongs(declared_model(source).cell, [record])
+    check_measured(declared_model(source).cell, [record])
 
 
 def _alone(cell: Cell) -> HybridModel:

@@ -54,6 +54,7 @@ def write_run_report(path: str | Path, view: RunView) -> Path:
                 runs.persistence_finding(chosen),
                 runs.interval_finding(chosen),
                 runs.outside_finding(chosen),
+                runs.validation_finding(view),
             )
             if sentence
         ],
@@ -86,6 +87,7 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
             if sentence
         ],
         rest=discoveries.rest_finding(view.discovery),
+        closest=discoveries.closest_finding(view),
         moved=_moved_rows(view.discovery),
         candidates=[
             row | {"title": hypotheses.hypothesis_title(row, view.titles)}

@@ -319,6 +319,15 @@ def test_a_room_in_fahrenheit_is_doubted(tmp_path):
     assert not any("starts at" in note for note in converted.notes)
 
 
+def test_a_thermocouple_that_drops_out_is_doubted(tmp_path):
+    temperature = np.where((TIME == 50) | (TIME == 120), 0.0, 25.0)
+    columns = zip(TIME, CURRENT, VOLTAGE, temperature, strict=True)
+    rows = "".join(f"{t},{i},{v},{k}\n" for t, i, v, k in columns)
+    (note,) = read_measurement(written(tmp_path, f"{HEADER},temperature_degc\n{rows}")).notes
+    assert "goes from 25 to 0 degC within 1 s at row 51 (line 52)" in note
+    assert "jumps like it: 4" in note
+
+
 def test_a_gap_in_a_current_alone_was_crossed_in_silence(tmp_path):
     time = np.where(TIME < 100, TIME, TIME + 14_400.0)
     rows = "\n".join(f"{t},{i}" for t, i in zip(time, CURRENT, strict=True))
@@ -354,3 +363,21 @@ def test_an_open_range_of_cycles_was_taken_for_its_first(tmp_path):
     with pytest.raises(DataError, match="cycle = '1:' has to be a number, or from:to"):
         read_measurement(path, cycle="1:")
     assert len(read_measurement(path, cycle="1:2")) == 4
+
+
+def test_a_bad_cell_left_a_thread_behind_that_aborted_the_process(tmp_path, monkeypatch):
+    def streamed(*_, **__):
+        pytest.fail("a Python file in pyarrow's hands is read ahead in a thread")
+
+    monkeypatch.setattr("pyarrow.PythonFile", streamed)
+    with pytest.raises(DataError, match="'OVR'"):
+        read_measurement(written(tmp_path, with_line(50, "48.0,5.0,OVR")))
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_a_file_of_many_blocks_is_read_whole(tmp_path, monkeypatch, end):
+    monkeypatch.setattr("aesi.data.readers.text.BLOCK_BYTES", 101)
+    for packed in (str.encode, lambda content: gzip.compress(content.encode()), lambda c: c.encode("utf-16")):
+        data = read_measurement(written(tmp_path, packed(text(end=end))))
+        np.testing.assert_array_equal(data.voltage_v, VOLTAGE)
+        np.testing.assert_array_equal(data.time_s, TIME)

@@ -8,7 +8,7 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
-from aesi.physics.belongs import capacity_bounds, check_belongs
+from aesi.physics.belongs import capacity_bounds, check_belongs, check_measured
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -99,3 +99,14 @@ def test_a_discharge_of_the_other_sign_is_asked_about_its_sign(m50):
     turned = Measurement(time, -current, aesi.simulate(m50, time, current, soc0=0.8).voltage_v)
     with pytest.raises(DataError, match="the sign of the current is the other one"):
         check_belongs(m50, [turned])
+
+
+def test_a_row_that_is_no_measurement_was_fitted_by_a_run_and_converted(m50, record):
+    voltage = record.voltage_v.copy()
+    voltage[[700, 900]] = 0.5
+    spiked = replace(record, voltage_v=voltage)
+    check_belongs(m50, [spiked])  # a simulation needs its current alone
+    with pytest.raises(
+        DataError, match=r"^drive: 0.500 V at 1400 s \(row 701, counted from 1; rows like it: 2\) is outside"
+    ):
+        check_measured(m50, [record, spiked])

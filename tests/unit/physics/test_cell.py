@@ -131,6 +131,28 @@ def test_a_blend_is_refused(content):
     assert "blend" in fault(content)
 
 
+def test_what_a_file_declares_beyond_the_model_was_passed_over_in_silence(content):
+    assert Cell.from_bpx(content).unread == ()
+    negative = content["Parameterisation"]["Negative electrode"]
+    negative["OCP (lithiation) [V]"] = negative["OCP (delithiation) [V]"] = negative["OCP [V]"]
+    content["State"]["Degradation"] = {
+        "LLI": 0.05,
+        "LAM: Positive electrode": 0.0,
+        "LAM: Negative electrode": 0,
+    }
+    content["Parameterisation"]["User-defined"] = {"Contact resistance [Ohm]": 1e-3, "Swelling": 0.1}
+    hysteresis, aged, own = Cell.from_bpx(content).unread
+    assert "declares a hysteresis (Negative electrode" in hysteresis
+    assert "(LLI 0.05)" in aged
+    assert own.endswith("(User-defined): Swelling.")
+
+
+def test_a_placeholder_for_an_open_circuit_potential_is_refused(content):
+    content["Parameterisation"]["Negative electrode"]["OCP [V]"] = 0
+    with pytest.raises(CellError, match="OCP \\[V\\] is 0 at all stoichiometries"):
+        Cell.from_bpx(content)
+
+
 def test_stoichiometry_limits_in_the_wrong_order_are_refused(content):
     content["Parameterisation"]["Negative electrode"]["Minimum stoichiometry"] = 0.99
     assert "stoichiometry limits" in fault(content)

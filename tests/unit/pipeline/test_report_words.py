@@ -28,10 +28,12 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     view = views.run_view(200)
     row = {"name": "ESPM recalibrated", "free_run": {"test_rmse_mv": 3.9}}
     learned = replace(view, models=(*view.models, row), corrected="ESPM recalibrated")
-    assert runs.corrected_finding(learned) == (
-        "The correction was learnt on the ESPM recalibrated, which alone errs by 3.9 mV there: it does not help beyond "
-        "that."
+    assert runs.run_finding(learned) == (
+        "On test records that chose nothing, run without any measured voltage, the ESPM recalibrated takes the voltage "
+        "error from 13.2 mV of the ESPM to 3.9 mV RMSE; the correction learnt on top of it does not help: "
+        f"{view.chosen} leaves 4.1 mV."
     )
+    assert runs.corrected_finding(learned) == ""
     better = replace(learned, models=(*view.models, {**row, "free_run": {"test_rmse_mv": 9.0}}))
     assert "takes that to 4.1 mV, 79.2 % less mean squared error" in runs.corrected_finding(better)
     assert "mV of the ESPM and 9.0 mV of the ESPM recalibrated to 4.1 mV RMSE" in runs.run_finding(better)
@@ -39,6 +41,17 @@ def test_a_correction_that_does_not_beat_the_physics_it_was_learned_on_is_told_s
     figures = view.models[1]["free_run"] | {"test_rmse_mv": 4.0, "test_mser_recalibrated_pct": -300.0}
     refit_does = replace(view, models=(view.models[0], {**view.models[1], "free_run": figures}))
     assert "errs by 2.0 mV there: recalibrate it first" in runs.corrected_finding(refit_does)
+
+
+def test_training_records_of_another_cell_than_the_validation_ones_are_told_of(views):
+    view = views.run_view(200)
+    declared, refitted = (
+        {"name": name, "free_run": {"test_rmse_mv": 3.0, "valid_rmse_mv": error}}
+        for name, error in (("ESPM", 1.4), ("ESPM recalibrated", 31.4))
+    )
+    foreign = replace(view, models=(declared, refitted), corrected="ESPM recalibrated")
+    assert "the ESPM recalibrated errs by 31.4 mV and the ESPM by 1.4 mV" in runs.validation_finding(foreign)
+    assert runs.validation_finding(view) == ""
 
 
 def test_what_a_mere_refit_and_a_constant_leave_stands_beside_the_gain(views):
@@ -289,3 +302,15 @@ def test_an_unknown_says_which_effects_were_tried(views, tried, phrase):
     rest = phrase.removeprefix("misses something real").removesuffix(".").removesuffix(" beyond doubt")
     assert finding_line(view.discovery).endswith(rest.strip())
     assert ("list of hypotheses" in discoveries.reason_finding(view.discovery)) == bool(tried)
+
+
+def test_the_closest_rival_of_a_finding_is_named_with_its_distance(views):
+    view = views.discovery_view(200)
+    assert discoveries.closest_finding(view) == (
+        "No other hypothesis explains these data as well: ambient temperature comes closest, 7.0 nats behind."
+    )
+    beside = views.discovery_row("series_resistance", "physics", 413.0, 1.1)
+    beside |= {"hypothesis": ["self_heating", "series_resistance"]}
+    rows = [row for row in view.discovery["candidates"] if row["effect"] == "self_heating"]
+    alone = replace(view, discovery=view.discovery | {"candidates": [*rows, beside]})
+    assert discoveries.closest_finding(alone) == "No other hypothesis explains these data as well."

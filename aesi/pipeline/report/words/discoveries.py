@@ -207,6 +207,24 @@ def look_alike_finding(view: DiscoveryView) -> str:
     return f"These data cannot tell apart {'; nor '.join(listed(group) for group in groups)}."
 
 
+def closest_finding(view: DiscoveryView) -> str:
+    """Which hypothesis without the finding comes closest to it, and by how much."""
+    effects = set(view.discovery["effects"])
+    rows = view.discovery["candidates"]
+    without = [row for row in rows if not effects <= {row["effect"], *row.get("hypothesis", ())}]
+    ours = [row["score"] for row in rows if effects == {row["effect"], *row.get("hypothesis", ())}]
+    if not without or not ours:
+        return "No other hypothesis explains these data as well."
+    closest = max(without, key=lambda row: float(row["score"]))
+    names = [
+        _title(view.titles, e) for e in dict.fromkeys((closest["effect"], *closest.get("hypothesis", ())))
+    ]
+    behind = max(ours) - closest["score"]
+    if behind <= 0.0:
+        return f"{listed(names)} scores {-behind:.1f} nats higher and was not taken; its remark says why."
+    return f"No other hypothesis explains these data as well: {listed(names)} comes closest, {behind:.1f} nats behind."
+
+
 def rest_finding(discovery: Mapping[str, Any]) -> str:
     """What a data-driven correction could still explain."""
     rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")

@@ -24,13 +24,20 @@ def run_finding(view: RunView) -> str:
             f"No correction of the voltage error was chosen: the {view.physics} alone errs by {before:.1f} "
             "mV RMSE on the test records."
         )
+    corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
+    if corrected is not None and view.corrected != view.chosen and corrected < min(before, after):
+        between, last = _told(corrected, after)
+        return (
+            f"On test records that chose nothing, run without any measured voltage, the {view.corrected} takes the "
+            f"voltage error from {before:.1f} mV of the {view.physics} to {between} mV RMSE; the correction learnt on "
+            f"top of it does not help: {view.chosen} leaves {last} mV."
+        )
     first, last = _told(before, after)
     if reduction <= 0:
         return (
             "The data-driven correction does not help here: in free run on the test records the error "
             f"grows from {first} mV to {last} mV. Use the {view.physics} alone."
         )
-    corrected = _figure(view.model(view.corrected), "free_run", "test_rmse_mv")
     if corrected is None or view.corrected in (view.physics, view.chosen):
         start = f"{first} mV"
     else:  # else the correction would be credited with what the recalibration does
@@ -64,14 +71,29 @@ def corrected_finding(view: RunView) -> str:
             f"With its own parameters refitted to the training records and nothing learnt, the {view.physics} errs by "
             f"{_told(refitted, after)[0]} mV there: {worth}."
         )
-    learnt = f"The correction was learnt on the {view.corrected}, which alone errs by"
-    if after < before:
-        first, last = _told(before, after)
-        return (
-            f"{learnt} {first} mV there; the correction takes that to {last} mV, "
-            f"{100.0 * (1.0 - (after / before) ** 2):.1f} % less mean squared error."
-        )
-    return f"{learnt} {_told(before, after)[0]} mV there: it does not help beyond that."
+    if after >= before:
+        return ""  # which the first sentence says
+    first, last = _told(before, after)
+    return (
+        f"The correction was learnt on the {view.corrected}, which alone errs by {first} mV there; the correction "
+        f"takes that to {last} mV, {100.0 * (1.0 - (after / before) ** 2):.1f} % less mean squared error."
+    )
+
+
+def validation_finding(view: RunView) -> str:
+    """Where the physics refitted to the training records does worse on the validation records than as declared."""
+    errors = (
+        _figure(view.model(name), "free_run", "valid_rmse_mv") for name in (view.physics, view.corrected)
+    )
+    declared, refitted = errors
+    if declared is None or refitted is None or refitted <= declared:
+        return ""
+    first, last = _told(declared, refitted)
+    return (
+        f"On the validation records the {view.corrected} errs by {last} mV and the {view.physics} by {first} mV: "
+        "what was fitted to the training records does not hold there. Are they of the same cell, at the same "
+        "temperature and age?"
+    )
 
 
 def constant_finding(view: RunView) -> str:
