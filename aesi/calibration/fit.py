@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from aesi.calibration.ageing import Ageing
 from aesi.calibration.heat import with_heat
-from aesi.calibration.model import Model
+from aesi.calibration.model import FitState, Model
 from aesi.calibration.parameters import free_parameters, with_interfaces
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
@@ -75,12 +75,12 @@ def calibrate(
     began = time.perf_counter()
     model, notes = problem(cell, records, soc0, temperatures_degc or {}, physics, same_cell, dates, as_of)
     x = descended(model, evaluations)
+    states = model.states(cell, x)
     jacobian, errors = model.jacobian(x), model.errors(x)
     weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
     scaled = jacobian * weights[:, None]
     covariance = np.linalg.inv(scaled.T @ scaled)
-    declared = _declared_errors(cell, model)
-    fitted, simulated = ([_rms(e) for e in each] for each in (errors, model.errors(model.as_simulated(x))))
+    rms = {name: [_rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
     found, warmth = with_heat(rewound(model, x), model.records)
     shares = capacities(model, x)
     return Calibration(
@@ -90,11 +90,11 @@ def calibrate(
         undetermined=undetermined(model, scaled),
         at_bounds=at_bounds(model, x),
         errors=tuple(
-            RecordError(r.name, _degc(r), *three)
-            for r, *three in zip(model.records, declared, fitted, simulated, strict=True)
+            RecordError(r.name, _degc(r), rms["declared"][i], rms["fitted"][i], rms["simulated"][i])
+            for i, r in enumerate(model.records)
         ),
         capacities=shares,
-        notes=(*notes, *_told(model, x), *_ran_out(cell, model, x), *warmth),
+        notes=(*notes, *_told(model, x), *_ran_out(model, states), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
@@ -155,24 +155,19 @@ def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:
     return np.asarray(found.x, dtype=float)
 
 
-def _declared_errors(cell: Cell, model: Model) -> list[float]:
-    """RMSE of the start file as it is, of a cell that has lost nothing, on the currents as measured, V."""
-    x = model.as_simulated(np.zeros(model.layout.size))
-    runs = [model.run(i, cell, x)[0] for i in range(len(model.records))]
-    return [_rms(r.rows.voltage_v - v) for r, v in zip(model.records, runs, strict=True)]
+STATE_WORDS: dict[FitState, str] = {
+    "declared": "the declared cell",
+    "fitted": "the fitted cell",
+    "simulated": "the file as simulated",
+}
+"""In words, as a note names them."""
 
 
-def _ran_out(cell: Cell, model: Model, x: Array) -> tuple[str, ...]:
+def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tuple[str, ...]:
     """A sentence for each record that a state of the cell runs out on."""
-    as_simulated, nothing = model.as_simulated(x), model.as_simulated(np.zeros(model.layout.size))
-    states = {
-        "the declared cell": (cell, nothing),
-        "the fitted cell": (model.cell_at(x), x),
-        "the file as simulated": (model.cell_at(as_simulated), as_simulated),
-    }
     out = []
     for i, record in enumerate(model.records):
-        found = {words: model.ran_out_s(i, *state) for words, state in states.items()}
+        found = {words: model.ran_out_s(i, *states[name]) for name, words in STATE_WORDS.items()}
         if at_s := {words: at for words, at in found.items() if at is not None}:
             out.append(ran_out(record.name, at_s))
     return tuple(out)

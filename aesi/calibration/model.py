@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -26,6 +27,8 @@ elsewhere along what the records leave open: up to 7 mV away on the Panasonic an
 files and all figures that rest on them are then to be made again together."""
 ELECTRODE_POINTS = 4
 """Points across a porous electrode: four err by 0.14 mV at most on discharges of the shipped cells to 1C."""
+FitState = Literal["declared", "simulated", "fitted"]
+"""Of a calibration: the start file, the new file by itself, and with what each record has of its own."""
 MOST_STEPS = 16
 """Steps of the model between two rows, each of a second where fewer do. A file is simulated in steps of a second, and a
 fit in longer ones makes use of what they err by: a 1C discharge of an LG 18650HG2, rows 10 s apart, that was fitted in
@@ -187,9 +190,24 @@ class Model:
         out[self.layout.ages] = self.ageing.none
         return out
 
+    def states(self, declared: Cell, x: Array) -> dict[FitState, tuple[Cell, Array]]:
+        """Of a fit that ended at `x`, by name: the cell, and the working vector that its records are simulated with.
+
+        The start file is that of a cell that has lost nothing, on currents as measured, like the file as simulated.
+        """
+        nothing, simulated = self.as_simulated(np.zeros(self.layout.size)), self.as_simulated(x)
+        return {
+            "declared": (declared, nothing),
+            "simulated": (self.cell_at(simulated), simulated),
+            "fitted": (self.cell_at(x), x),
+        }
+
     def errors(self, x: Array) -> list[Array]:
         """(rows,) V of each record, measured less model."""
-        cell = self.cell_at(x)
+        return self.errors_of(self.cell_at(x), x)
+
+    def errors_of(self, cell: Cell, x: Array) -> list[Array]:
+        """(rows,) V of each record, measured less this cell's, with what the working vector says of the record."""
         return [r.rows.voltage_v - self.run(i, cell, x)[0] for i, r in enumerate(self.records)]
 
     def misfits(self, x: Array) -> list[Array]:

@@ -113,15 +113,13 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
     The state of charge is counted from the fitted start, of the capacity that the cell of the record had.
     """
     model, x = found.model, found.x
-    states = (
-        (found.declared, np.zeros(model.layout.size)),
-        (model.cell_at(model.as_simulated(x)), model.as_simulated(x)),
-        (model.cell_at(x), x),
-    )
+    states = model.states(found.declared, x)
     out = []
     for i, record in enumerate(model.records):
         rows = record.rows
-        start, simulated, fitted = (model.run(i, cell, at)[0] for cell, at in states)
+        start, simulated, fitted = (
+            model.run(i, *states[name])[0] for name in ("declared", "simulated", "fitted")
+        )
         capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
         soc0 = record.start.soc + record.soc_sd * float(x[model.layout.soc(i)])
         soc = soc0 - rows.discharged_ah(record.hold) / capacity_ah

@@ -28,11 +28,7 @@ class Uncodable(TypeError):
 
 
 class Damaged(ValueError):
-    """The bytes are not what `dumps` wrote."""
-
-
-class OtherVersion(Damaged):
-    """The bytes are what `dumps` wrote, of records that another version of the package has."""
+    """The bytes are not what `dumps` wrote, or of records that another version of the package has."""
 
 
 def dumps(value: Any) -> bytes:
@@ -60,7 +56,7 @@ def loads(data: bytes) -> Any:
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise Damaged(f"not a stored record: {error}") from None
     except (AttributeError, ImportError, TypeError) as error:
-        raise OtherVersion(f"stored by another version: {error}") from None
+        raise Damaged(f"stored by another version: {error}") from None
 
 
 def _encode(value: Any, arrays: dict[str, np.ndarray]) -> Any:

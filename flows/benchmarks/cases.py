@@ -79,14 +79,14 @@ def judged_once(
     """The row of a case, from the folder `keep` where this program judged it before, as it is asked now.
 
     case : of a repr that says all of it; case.name names its file.  judge : a function, or a partial of one, whose
-    arguments count.  keep : None to judge every time.  files : of a case, what its row depends on beside the program;
-    their content counts. What cannot be run here, for want of its data, is not kept.
+    arguments count.  keep : None to judge every time.  files : of a case, files and folders that its row depends on
+    beside the program; their content counts. What cannot be run here, for want of its data, is not kept.
     """
     if keep is None:
         return judge(case)
     path = Path(keep) / f"{case.name}.json"
     asked = repr(judge.keywords) if isinstance(judge, partial) else ""
-    key = fingerprint.key(repr(case), asked, *(file.read_bytes() for file in files(case) if file.is_file()))
+    key = fingerprint.key(repr(case), asked, *fingerprint.contents(files(case)))
     of_this = {"program": _program(), "key": key}
     known = _read(path)
     if {name: known.get(name) for name in of_this} == of_this:

@@ -138,11 +138,9 @@ def resume_key(config: ExperimentConfig) -> str:
     """
     from aesi.pipeline.experiment.sources import named_files
 
-    parts: list[bytes | str] = [config.digest, source_digest()]
-    for path in named_files(config).values():
-        files = sorted(path.iterdir()) if path.is_dir() else [path]
-        parts += [file.read_bytes() for file in files if file.is_file()]
-    return fingerprint.key(*parts)
+    return fingerprint.key(
+        config.digest, source_digest(), *fingerprint.contents(named_files(config).values())
+    )
 
 
 def _unfinished(config: ExperimentConfig, store: Store, console: Console) -> RunRecord | None:

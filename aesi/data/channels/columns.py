@@ -163,7 +163,7 @@ class _Finder:
                     f"{self._file}: column {self._table.header[place]!r} cannot be both {seen[place]} and {quantity}."
                 )
             seen[place] = quantity
-        for quantity in self._declared.keys() - self.position.keys():
+        for quantity in sorted(self._declared.keys() - self.position.keys()):
             if self.given.get(quantity, quantity) is not None:
                 self.notes.append(
                     f"A unit was declared for {quantity} ({self._declared[quantity]}), and there is no such column."

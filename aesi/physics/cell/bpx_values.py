@@ -66,6 +66,14 @@ def check_values(cell: CellParameters, where: str) -> None:
             raise CellError(
                 f"{where}: {name}_temperature_k = {kelvin:g} K is no temperature of a cell; 25 degC is 298.15 K."
             )
+    _check_capacity(cell, where)
+    _check_full(cell, where)
+    _check_temperature_dependence(cell, where)
+    _check_thermal(cell, where)
+
+
+def _check_capacity(cell: CellParameters, where: str) -> None:
+    """Each electrode holds about the nominal capacity."""
     for label, electrode in (("negative", cell.negative), ("positive", cell.positive)):
         window = (electrode.theta_max - electrode.theta_min) * cell.electrode_capacity_ah(electrode)
         if not 1.0 / OTHER_UNIT <= cell.nominal_capacity_ah / window <= OTHER_UNIT:
@@ -74,9 +82,6 @@ def check_values(cell: CellParameters, where: str) -> None:
                 f"{window:.4g} A.h between its stoichiometry limits; one of them is in another unit, or the number of "
                 "electrode pairs is another."
             )
-    _check_full(cell, where)
-    _check_temperature_dependence(cell, where)
-    _check_thermal(cell, where)
 
 
 def _check_full(cell: CellParameters, where: str) -> None:

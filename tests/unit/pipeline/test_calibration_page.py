@@ -2,6 +2,7 @@
 
 import json
 import re
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -121,17 +122,34 @@ def test_no_knots_are_no_figure():
     assert courses([{"name": "contact.resistance", **parameter()}]) == {}
 
 
-def test_a_calibration_writes_its_page_with_the_errors_that_it_tells(tmp_path, monkeypatch):
-    cell = Cell.from_bpx(START)
+def pulses(cell):
     time_s = np.arange(0.0, 1200.0)
     current_a = np.repeat([0.0, 5.0, -3.0, 8.0, 0.0], 240)
     voltage_v = simulate(cell, time_s, current_a, 0.8).voltage_v - 1e-3 * current_a
-    data = Measurement(time_s, current_a, voltage_v, name="pulses")
+    return Measurement(time_s, current_a, voltage_v, name="pulses")
+
+
+def drawn_rms_v(trace):
+    voltages = (trace.before_v, trace.recalibrated_v, trace.after_v)
+    return tuple(np.sqrt(np.mean((trace.measured_v - voltage) ** 2)) for voltage in voltages)
+
+
+def test_the_start_file_was_drawn_with_a_loss_on_a_record_of_another_day():
+    """The table said what it errs by as a cell that has lost nothing."""
+    cell = Cell.from_bpx(START)
+    data, days = pulses(cell), {"pulses": date(2024, 1, 1)}
+    found = calibrate(cell, [data], evaluations=1, dates=days, as_of=date(2023, 1, 1))
+    (trace,), (error,) = fit_traces(found), found.errors
+    assert drawn_rms_v(trace) == pytest.approx((error.before_v, error.simulated_v, error.after_v), rel=1e-9)
+
+
+def test_a_calibration_writes_its_page_with_the_errors_that_it_tells(tmp_path, monkeypatch):
+    cell = Cell.from_bpx(START)
+    data = pulses(cell)
     found = calibrate(cell, [data], evaluations=2)
     monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", lambda *_, **__: found)
     calibrate_files(START, [data], tmp_path / "new.json")
     assert "pulses" in (tmp_path / "new.report.html").read_text("utf-8")
     (trace,), (error,) = fit_traces(found), found.errors
-    for voltage, rms in ((trace.before_v, error.before_v), (trace.after_v, error.after_v)):
-        assert np.sqrt(np.mean((trace.measured_v - voltage) ** 2)) == pytest.approx(rms, rel=1e-9)
+    assert drawn_rms_v(trace) == pytest.approx((error.before_v, error.simulated_v, error.after_v), rel=1e-9)
     assert trace.soc[-1] == pytest.approx(trace.soc[0] - data.charge_ah / found.cell.capacity_ah, abs=0.01)
