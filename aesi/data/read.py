@@ -113,7 +113,14 @@ def examined(record: Measurement) -> Measurement:
     notes: list[str] = []
     data = _examine(data, context, notes, (), "; turn it")
     told = tuple(f"{record.name}: {note}" for note in notes)
-    return replace(record, **data, notes=(*record.notes, *told))
+    return replace(
+        record,
+        time_s=data["time_s"],
+        current_a=data["current_a"],
+        voltage_v=data["voltage_v"],
+        temperature_degc=data.get("temperature_degc"),
+        notes=(*record.notes, *told),
+    )
 
 
 def _examine(
