@@ -97,8 +97,8 @@ def _fit_figures(traces: Sequence[DiscoveryTrace]) -> dict[str, Figure]:
         meta={
             "title": "Voltage and residual over time",
             "caption": "Voltage measured, of the start file and as fitted; current, positive on discharge; residual "
-            "(measured minus model) in free run, on the rows that were fitted. Its axis spans what the fit leaves: a "
-            "double click shows the rest.",
+            "(measured minus model) in free run, on the rows that were fitted. The axes span what was measured and "
+            "what the fit leaves: a double click shows the rest.",
         }
     )
     current, soc = (np.concatenate([getattr(t, key) for t in traces]) for key in ("current_a", "soc"))

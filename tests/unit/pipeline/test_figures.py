@@ -202,3 +202,14 @@ def test_violin_medians_are_those_of_the_squared_residual():
     residual = np.random.default_rng(0).standard_normal(20_001) * 1e-3
     fig = maps.violin_figure({"m": residual}, {"m": "#0072B2"})
     assert 10 ** np.median(fig.data[0].y) == pytest.approx(np.median((1e3 * residual) ** 2), rel=1e-6)
+
+
+def test_a_model_that_runs_empty_does_not_flatten_the_measured_voltage(views):
+    trace = views.discovery_trace("a", "test", 300, np.random.default_rng(0))
+    empty = trace.before_v.copy()
+    empty[200:] = -5.0
+    fig = records.residual_figure((replace(trace, before_v=empty),), {"before": "as declared"})
+    low, high = fig.layout.yaxis.range
+    span = float(np.ptp(trace.measured_v))
+    assert low == pytest.approx(float(trace.measured_v.min()) - 0.1 * span)
+    assert high == pytest.approx(float(trace.measured_v.max()) + 0.1 * span)
