@@ -36,7 +36,9 @@ def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
             fitted_hypothesis(path.problem, path.blocks, (*chosen.hypothesis, owner), chosen, archive)
             for owner in beyond
         ]
-        fits += [one for one in _with_another(path, chosen) if len(beyond_spread(path.problem, one)) < len(beyond)]
+        fits += [
+            one for one in _with_another(path, chosen) if len(beyond_spread(path.problem, one)) < len(beyond)
+        ]
         said = chosen.score.total - ALIKE_NATS
         better = [f for f in fits if f is not None and f.score.total > said and not f.at_bounds]
         found = most_plausible(better, competing)

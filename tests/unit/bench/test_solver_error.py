@@ -23,4 +23,6 @@ def test_the_prior_is_what_the_sizes_of_all_cases_were_drawn_from():
 def test_sizes_too_small_to_be_told_apart_are_not_taken_for_one_of_them():
     told = [said_of(5e-5) for _ in range(20)]
     flat = [np.where(SIZES_V < 1e-4, 0.0, -50.0) for _ in range(20)]
-    assert most_likely_prior(told + flat)[0] == pytest.approx(5e-5, rel=0.5)  # sizes stand a factor of two apart
+    assert most_likely_prior(told + flat)[0] == pytest.approx(
+        5e-5, rel=0.5
+    )  # sizes stand a factor of two apart
