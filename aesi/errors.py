@@ -30,7 +30,9 @@ class DataError(InputError):
 
 
 class DataAway(DataError):
-    """Data that are not on this machine cannot be fetched now."""
+    """Data that are not on this machine cannot be fetched now: nothing is wrong with what was asked."""
+
+    exit_code = 1
 
 
 class CellError(InputError):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
-from aesi.data.channels.checks import check_alive, check_finite, check_ranges, check_time
-from aesi.data.channels.columns import REQUIRED, Mapped
+from aesi.data.channels.checks import Columns, Context, check_alive, check_finite, check_ranges, check_time
+from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
 from aesi.data.channels.gaps import without_gaps
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed, check_stuck
 from aesi.data.channels.load_columns import load_columns
@@ -89,16 +90,7 @@ def measurement_in(
 ) -> Measurement:
     """The measurement in a table that is open already."""
     data, context, mapped, notes = load_columns(table, reading, REQUIRED)
-    check_finite(data, context)
-    check_time(data["time_s"], context)
-    check_ranges(data, context)
-    data = without_gaps(data, context, notes)
-    check_alive(data, context)
-    notes.extend(temperature_doubts(data, context))
-    check_scale(data, context)
-    check_signed(data, context, table.header)
-    check_sign(data, context, _sign_advice(mapped, reading))
-    check_stuck(data, context)
+    data = _examine(data, context, notes, table.header, _sign_advice(mapped, reading))
     measurement = Measurement(
         time_s=data["time_s"],
         current_a=data["current_a"],
@@ -109,6 +101,43 @@ def measurement_in(
         notes=tuple(f"{context.file}: {note}" for note in notes),
     )
     return measurement if max_rows is None else decimate(measurement, max_rows)
+
+
+def examined(record: Measurement) -> Measurement:
+    """A record that was made in memory, after the checks of one that is read from a file.
+
+    Raises DataError, one sentence, for what a file would be refused for.
+    """
+    data = {name: getattr(record, name) for name in QUANTITIES if getattr(record, name) is not None}
+    context = Context(record.name, {name: name for name in data}, lambda row: f"row {row + 1}")
+    notes: list[str] = []
+    data = _examine(data, context, notes, (), "; turn it")
+    told = tuple(f"{record.name}: {note}" for note in notes)
+    return replace(
+        record,
+        time_s=data["time_s"],
+        current_a=data["current_a"],
+        voltage_v=data["voltage_v"],
+        temperature_degc=data.get("temperature_degc"),
+        notes=(*record.notes, *told),
+    )
+
+
+def _examine(
+    data: Columns, context: Context, notes: list[str], header: Sequence[str], sign_advice: str
+) -> Columns:
+    """The columns without a lone last row, after all checks; `notes` is given what was dropped or is doubted."""
+    check_finite(data, context)
+    check_time(data["time_s"], context)
+    check_ranges(data, context)
+    data = without_gaps(data, context, notes)
+    check_alive(data, context)
+    notes.extend(temperature_doubts(data, context))
+    check_scale(data, context)
+    check_signed(data, context, header)
+    check_sign(data, context, sign_advice)
+    check_stuck(data, context)
+    return data
 
 
 def _sign_advice(mapped: Mapped, reading: Reading) -> str:

@@ -180,8 +180,10 @@ def _cause(ratio: float, record: Measurement) -> str:
             "the current is in mA or the time in ms (declare it: --unit current_a=mA, or --unit time_s=ms), or the "
             "cell file is another's"
         )
+    if ratio < 1.0:
+        return "the cell file is another cell's, or the cell holds much less than when it was new (--soh)"
     one_way = np.min(record.current_a) >= 0.0 or np.max(record.current_a) <= 0.0
-    if ratio > 1.0 and one_way:
+    if one_way:
         return (
             "the cell file is another cell's, the sign of the current is the other one (discharge is positive here), "
             "or the current is written without its sign (--state COLUMN names the column that says which way it flows)"

@@ -14,7 +14,7 @@ import numpy as np
 from aesi.calibration import Calibration
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
-from aesi.data.read import Reading, read
+from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
 from aesi.errors import DataError, InputError
 from aesi.physics import ModelName
@@ -180,7 +180,10 @@ def _read_all(records: Sequence[FileOrRecord], rows: int | None, hold: Hold | No
 
 
 def _checked(found: Measurement, hold: Hold | None) -> Measurement:
-    """The record with how its current was declared to run.  Raises DataError where a voltage is missing."""
+    """The record with how its current was declared to run; one of arrays is examined as one of a file is.
+
+    Raises DataError where a voltage is missing, and for what a file would be refused for.
+    """
     if len(found) < 2:
         raise DataError(f"{found.name} has too few rows ({len(found)}); a record needs at least two.")
     unknown = np.isnan(found.voltage_v)
@@ -190,4 +193,5 @@ def _checked(found: Measurement, hold: Hold | None) -> Measurement:
             f"{found.name}: voltage_v is nan at {found.time_s[row]:g} s ({row_words(row)}); drop the row, or give "
             "the parts before and after it as records of their own."
         )
-    return found if hold is None else found.held(hold)
+    whole = found if found.source else examined(found)
+    return whole if hold is None else whole.held(hold)

@@ -80,6 +80,7 @@ def simulate_file(
             start.sentence,
             hold_sentence(record.name, taken, hold is not None),
             temperature_sentence(declared.cell, record, active),
+            *_with_effects(record, active),
         ]
     )
     run = simulate(
@@ -133,6 +134,7 @@ def predict_file(
             start.sentence,
             hold_sentence(record.name, hybrid.hold, hold is not None),
             temperature_sentence(hybrid.cell, record, hybrid.effects),
+            *_with_effects(record, hybrid.effects),
         ]
     )
     prediction = hybrid.predict(
@@ -148,6 +150,11 @@ def predict_file(
     say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc))
     say(_of_band(record, prediction, hybrid.correction is not None))
     return len(frame)
+
+
+def _with_effects(record: Measurement, effects: Sequence[ActiveEffect]) -> list[str]:
+    """A sentence on the effects that are simulated, with their values, which may be defaults."""
+    return [f"{record.name}: with {', '.join(map(repr, effects))}."] if effects else []
 
 
 def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> list[str]:

@@ -135,7 +135,7 @@ def calibrate(
     model: options.ModelOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements of any temperatures together."""
-    outputs.check_file(out, [cell, *data])
+    outputs.check_json(out, [cell, *data])
     options.say_reading(data)
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow

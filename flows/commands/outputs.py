@@ -29,6 +29,13 @@ def check_table(out: Path, inputs: Iterable[Path] = ()) -> None:
         raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv.")
 
 
+def check_json(out: Path, inputs: Iterable[Path] = ()) -> None:
+    """As `check_file`, of a cell's file.  Raises InputError also where the name promises another format."""
+    check_file(out, inputs)
+    if out.suffix.lower() != ".json":
+        raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
+
+
 def check_folder(out: Path) -> None:
     """Raises InputError where `out` cannot be a folder to write to; one that is there is kept, and its files may be
     replaced."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from aesi.pipeline.batch.job import Settings, of_other_code, run_job
-from aesi.pipeline.batch.plan import Job, read_plan
+from aesi.pipeline.batch.plan import Job, read_plan, without_records
 from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
@@ -49,6 +49,8 @@ def batch(
     out.mkdir(parents=True, exist_ok=True)
     cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
     console.say(f"{cells} from {source}; results in {out}")
+    if empty := without_records(source):
+        console.say(f"no record in {', '.join(empty)}; passed over.")
     if other := of_other_code(jobs, out):
         were = "was" if len(other) == 1 else "were"
         console.say(

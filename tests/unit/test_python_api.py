@@ -123,6 +123,15 @@ def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, 
     assert "tracking store" not in (folder / "report.html").read_text()
 
 
+def test_what_a_file_is_refused_for_was_fitted_from_arrays(cell, record):
+    late = (record.time_s < 600.0) | (record.time_s > 900.0)
+    bare = aesi.Measurement(record.time_s, record.current_a, record.voltage_v, name="arrays")
+    with pytest.raises(DataError, match="arrays, row 601, column time_s: a gap of 302 s after 599 s"):
+        aesi.calibrate(cell, bare.take(late))
+    with pytest.raises(DataError, match="contradicts the one declared; turn it"):
+        aesi.discover(cell, aesi.Measurement(record.time_s, -record.current_a, record.voltage_v))
+
+
 def test_a_discovery_that_kept_nothing_back_showed_errors_that_are_no_number(
     cell, record, monkeypatch, tmp_path
 ):

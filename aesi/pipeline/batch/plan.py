@@ -73,13 +73,27 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
     return tuple(job if job.soh is not None else replace(job, soh=soh) for job in jobs)
 
 
+def without_records(source: Path) -> tuple[str, ...]:
+    """The subfolders of a folder that hold no record and are no job; none of a table."""
+    return (
+        tuple(each.name for each in _subfolders(source) if not _records_in(each)) if source.is_dir() else ()
+    )
+
+
 def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
-    jobs = []
-    for each in sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith(".")):
-        data = tuple(sorted(p for p in each.iterdir() if p.suffix.lower() in RECORDS))
-        if data:
-            jobs.append(Job(each.name, _cell_in(each, cell), data))
-    return tuple(jobs)
+    return tuple(
+        Job(each.name, _cell_in(each, cell), data)
+        for each in _subfolders(folder)
+        if (data := _records_in(each))
+    )
+
+
+def _subfolders(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+
+
+def _records_in(folder: Path) -> tuple[Path, ...]:
+    return tuple(sorted(p for p in folder.iterdir() if p.suffix.lower() in RECORDS))
 
 
 def _cell_in(folder: Path, given: Path | None) -> Path:

@@ -52,6 +52,7 @@ def test_usage_errors_are_exit_code_2(call, arguments):
             "--set changes a key of an experiment file, and none is given",
         ),
         (["predict", "--model", "m", "--current", "d.csv", "--out", "o.xlsx"], "what is written is a CSV"),
+        (["calibrate", "--cell", LG_M50, "--data", "d.csv", "--out", "o.csv"], "what is written is BPX"),
         (["batch", "cells", "--out", "found", "--address", "tcp://here:1"], "give --runner dask beside it"),
         (["ui", "--storage", "sqlite:///s.db"], "give --optuna beside it"),
         (["ui", "--optuna", "--uri", "sqlite:///s.db"], "leave it out beside --optuna"),

@@ -13,7 +13,7 @@ from aesi.numerics.files.source_digest import source_digest
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.folded import folded
 from aesi.pipeline.batch.job import Settings, of_other_code, run_job
-from aesi.pipeline.batch.plan import Job, read_plan
+from aesi.pipeline.batch.plan import Job, read_plan, without_records
 from aesi.pipeline.batch.summary import trends, write_summary
 
 CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
@@ -34,6 +34,7 @@ def test_a_folder_is_one_cell_a_subfolder(tmp_path):
     touched(tmp_path / ".aesi" / "kept.csv")
     jobs = read_plan(tmp_path, CELL)
     assert [(job.name, job.cell, len(job.data)) for job in jobs] == [("a", CELL, 2), ("b", own, 1)]
+    assert without_records(tmp_path) == ("notes",)
     with pytest.raises(InputError, match="--cell"):
         read_plan(tmp_path)
 

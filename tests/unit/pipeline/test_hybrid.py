@@ -204,3 +204,12 @@ def test_a_file_in_the_place_of_a_model_is_not_written_over(model, tmp_path):
 def test_a_record_shorter_than_a_step_of_the_correction_is_refused(model):
     with pytest.raises(DataError, match=r"lasts 0.5 s, and the correction steps by 1 s"):
         model.predict([0.0, 0.25, 0.5], [0.0, 1.0, 1.0], SOC0)
+
+
+def test_effects_and_their_defaults_were_simulated_without_a_word(model, record, tmp_path):
+    said: list[str] = []
+    bare = HybridModel(model.cell).save(tmp_path / "bare")
+    simulate_file(
+        bare, record, tmp_path / "o.csv", effects=[("series_resistance", {})], say_notes=said.extend
+    )
+    assert any(note.endswith(": with series_resistance(resistance_ohm=0.001).") for note in said)
