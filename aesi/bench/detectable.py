@@ -32,11 +32,15 @@ def seen_nats(case: BlindCase) -> float | None:
     without effects, or one that the model cannot simulate."""
     if not case.effects:
         return None
+    return _said_more(label_problem(case), case.effects, Archive(None, ""))
+
+
+def label_problem(case: BlindCase) -> InverseProblem:
+    """What the label is fitted to: the case with the model that made it."""
     model: ModelName = "dfn" if case.spec.model == "DFN" else "espm"
-    problem = with_fine_numerics(
+    return with_fine_numerics(
         inverse_problem(Cell.from_bpx(case.declared), case.measurements, case.soc0, model=model)
     )
-    return _said_more(problem, case.effects, Archive(None, ""))
 
 
 def seen_on_measured(

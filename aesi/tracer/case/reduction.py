@@ -15,9 +15,10 @@ MODELS: tuple[ModelName, ModelName] = ("espm", "dfn")
 NOTABLE_SHARE = 0.1
 """Of the noise: an approximation that moves the voltage by more than this is taken back in every hypothesis. A
 convention: what moves by less lifts an error by half a percent."""
-LEAST_V = 1.5e-4
-"""Least difference of two voltages, as RMS, that counts as evidence: two models of one cell differ by as much. On a
-blind case that lacks nothing (3 of seed 12) a double layer was named to take back 0.13 mV between the two models."""
+LEAST_V = 1e-4
+"""Least difference of two voltages, as RMS, that counts as evidence: 99 of 100 right hypotheses err by less
+(`python -m aesi.bench.solver_error`). With half of it a potential that took 0.06 mV off was named on a blind case
+beside the two effects that are there (heat and a hysteresis, another one than ours, that leave 0.05 mV)."""
 
 
 def with_fine_numerics(problem: InverseProblem) -> InverseProblem:

@@ -155,12 +155,18 @@ class HypothesisFitter:
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linear form, over sizes of the model error."""
-    prior, table, out = PRIORS[problem.trust], point.table(), []
-    for delta_v in prior.sizes_v:
-        white, log_det = whitened(problem, blocks, table, delta_v)
-        sums = block_sums(blocks, white, log_det)
-        out.append(score_at(blocks, sums, point.x, point.bounds, delta_v, prior.log_density(delta_v)))
-    return best_over_sizes(out)
+    prior = PRIORS[problem.trust]
+    return best_over_sizes(
+        [said_at(problem, blocks, point, size, prior.log_density(size)) for size in prior.sizes_v]
+    )
+
+
+def said_at(
+    problem: InverseProblem, blocks: Blocks, point: Linearised, delta_v: float, log_prior: float = 0.0
+) -> PredictiveScore:
+    """The predictive score of a linear form at one size of the model error."""
+    white, log_det = whitened(problem, blocks, point.table(), delta_v)
+    return score_at(blocks, block_sums(blocks, white, log_det), point.x, point.bounds, delta_v, log_prior)
 
 
 @dataclass(frozen=True, eq=False)

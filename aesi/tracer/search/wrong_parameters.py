@@ -13,7 +13,7 @@ from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.forward import without_needless
 from aesi.tracer.search.path import Path, Step
-from aesi.tracer.search.plausible import ALIKE_NATS
+from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
 NINETY = 1.645
 """Standard deviations either side of a 90 % interval."""
@@ -23,22 +23,28 @@ convention."""
 
 
 def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
-    """The path with those declared parameters as effects that the data put beyond what cell files are off by.
+    """The path with those declared parameters as effects that the data put beyond what cell files are off by, or with
+    the effects that such parameters made up for.
 
-    One at a time, that which says most: another one may only have made up for it. `most` names in all. An effect that
-    is not needed beside them is none: a contact and a wrong electrolyte say no more than the electrolyte.
+    No cell is so far off, so that something has to be named, whether it says enough to be admitted or not; of what
+    takes a parameter back, the most plausible, one at a time, `most` names in all. An effect that is not needed beside
+    them is none: a contact and a wrong electrolyte say no more than the electrolyte.
     """
-    chosen = path.chosen
+    chosen, competing = path.chosen, len(path.problem.competing())
     while len(chosen.hypothesis) < most and (beyond := beyond_spread(path.problem, chosen)):
         fits = [
             fitted_hypothesis(path.problem, path.blocks, (*chosen.hypothesis, owner), chosen, archive)
             for owner in beyond
         ]
+        fits += [
+            one for one in _with_another(path, chosen) if len(beyond_spread(path.problem, one)) < len(beyond)
+        ]
         said = chosen.score.total - ALIKE_NATS
         better = [f for f in fits if f is not None and f.score.total > said and not f.at_bounds]
-        if not better:
+        found = most_plausible(better, competing)
+        if found is None:
             break
-        chosen = max(better, key=lambda f: f.score.total)
+        chosen = found
     if chosen is path.chosen:
         return path
     chosen = without_needless(
@@ -51,6 +57,13 @@ def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
     )
     step = Step((path.chosen,), (), (chosen,), chosen)
     return replace(path, steps=(*path.steps, step), chosen=chosen)
+
+
+def _with_another(path: Path, chosen: FittedHypothesis) -> list[FittedHypothesis]:
+    """What the search fitted with one effect more than the chosen hypothesis."""
+    names = set(chosen.hypothesis)
+    fits = [fit for step in path.steps for fit in step.fitted]
+    return [fit for fit in fits if names < set(fit.hypothesis) and len(fit.hypothesis) == len(names) + 1]
 
 
 def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:

@@ -82,8 +82,8 @@ def colder(written_k):
 def test_a_written_model_with_what_was_found_at_another_size_is_told_as_such():
     """The cold drive of a Panasonic: the finding was 11.8 degC, the model beside it ran at 13.3 degC."""
     assert moved_findings(colder(-11.7)) == [
-        "The model that is written was fitted with the declared parameters open, by which it does better on data left "
-        "out, and so has what was found at another size: ambient temperature 13.3 degC instead of 11.8 degC."
+        "The model that is written was fitted with the declared parameters open, by which it carries over better, and "
+        "so has what was found at another size: ambient temperature 13.3 degC instead of 11.8 degC."
     ]
     assert moved_findings(colder(-13.21)) == []  # the same as it is shown
     assert moved_findings(colder(-11.7) | {"written_parameters": {}}) == []  # something else is written

@@ -31,6 +31,7 @@ from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis, values_without
 from aesi.tracer.search.forward import searched
+from aesi.tracer.search.path import Step
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters, wrong_sds
 
 
@@ -103,6 +104,27 @@ def test_a_wrong_parameter_is_named_with_what_is_needed_beside_it(cell, few, mak
     named = with_wrong_parameters(far, 2, archive).chosen.hypothesis
     assert named == ("ocv_hysteresis", "solid_diffusivity")
     assert with_wrong_parameters(replace(path, chosen=two), 3, archive).chosen.hypothesis == named
+
+
+def test_the_effect_that_wrong_parameters_made_up_for_is_named_in_their_place(cell, few, make, archive):
+    hysteresis = CATALOGUE["ocv_hysteresis"].activate(magnitude_v=0.006)
+    coarse = CATALOGUE["particle_radius"].activate(negative_factor=1.9)
+    effects = {**few, "particle_radius": CATALOGUE["particle_radius"]}
+    problem = InverseProblem(cell, prepare_all(cell, [make((hysteresis, coarse))], 0.9, 0.3), effects)
+    path = searched(problem, 0, lambda blocks, fit: True, archive)
+    one, right, other = (
+        fitted_hypothesis(problem, path.blocks, names, path.base, archive)
+        for names in (
+            ("ocv_hysteresis",),
+            ("ocv_hysteresis", "particle_radius"),
+            ("ocv_hysteresis", "voltage_sensor_offset"),
+        )
+    )
+    assert beyond_spread(problem, one)
+    assert not beyond_spread(problem, right)
+    refused = Step((one,), (), (other, right), None, admission_nats=1e9)
+    named = with_wrong_parameters(replace(path, steps=(refused,), chosen=one), 2, archive)
+    assert named.chosen is right
 
 
 @pytest.mark.parametrize("parameters", [1, 6, 12])

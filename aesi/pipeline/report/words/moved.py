@@ -34,8 +34,8 @@ def resized_finding(discovery: Mapping[str, Any]) -> str:
         return ""
     told = "; ".join(f"{name} {there} instead of {found}" for name, there, found in sizes)
     return (
-        "The model that is written was fitted with the declared parameters open, by which it does better on data left "
-        f"out, and so has what was found at another size: {told}."
+        "The model that is written was fitted with the declared parameters open, by which it carries over better, and "
+        f"so has what was found at another size: {told}."
     )
 
 

@@ -1,0 +1,116 @@
+"""How far are our model and an independent solver of the same cell apart? Measures the prior of the model error that a
+right hypothesis has.
+
+The label of each development case of `aesi bench blind` is fitted to what the laboratory made. What it says of unseen
+data at each size of the model error is a likelihood of that size, and the sizes of all cases have a log-normal prior
+whose median and deviation make what was found most likely.
+
+    python -m aesi.bench.solver_error --seed 0 --cases 40
+
+prints a line a case and a last one with that prior.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.special import logsumexp
+
+from aesi.bench.blind import chosen
+from aesi.bench.detectable import label_problem
+from aesi.constants import MV_PER_V
+from aesi.data.blind import BlindCase, cells_in, generate
+from aesi.errors import SimulationError
+from aesi.numerics.typing import Array
+from aesi.tracer.case.blocks import blocks_of
+from aesi.tracer.likelihood.fit import said_at
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import fitted_hypothesis
+
+SIZES_V = 1e-3 * np.geomspace(0.003125, 25.6, 14)
+"""Sizes that are tried, a factor of two apart: two beyond either end of what is found."""
+
+
+def said_by_size(case: BlindCase) -> Array | None:
+    """(n_sizes,) nats that the label says of unseen data at each size, less the most of them; None where it cannot be
+    simulated or is outside the catalogue."""
+    if case.label == "unknown":
+        return None
+    problem = label_problem(case)
+    blocks = blocks_of(problem)
+    fit = fitted_hypothesis(problem, blocks, case.effects, None, Archive(None, ""))
+    if fit is None:
+        return None
+    said = np.array([said_at(problem, blocks, fit.point, size).total for size in SIZES_V])
+    return said - said.max()
+
+
+def most_likely_prior(said: Sequence[Array]) -> tuple[float, float, float]:
+    """Median, V, and deviation of the logarithm under which what was found is most likely, and its log likelihood.
+
+    said : a case, (n_sizes,) nats.
+    """
+    table, logs = np.array(said), np.log(SIZES_V)
+
+    def against(x: Array) -> float:
+        return -log_likelihood(table, float(np.exp(x[0])), float(np.exp(x[1])))
+
+    starts = [np.array([logs[k], 0.0]) for k in range(0, len(logs), 2)]
+    best = min((minimize(against, x, method="Nelder-Mead") for x in starts), key=lambda r: float(r.fun))
+    return float(np.exp(best.x[0])), float(np.exp(best.x[1])), -float(best.fun)
+
+
+def log_likelihood(said: Array, median_v: float, sd: float) -> float:
+    """Of a prior over the sizes: what all cases say, averaged over it, nats.
+
+    said : (n_cases, n_sizes).
+    """
+    prior = -0.5 * (np.log(SIZES_V / median_v) / sd) ** 2
+    return float(np.sum(logsumexp(said + (prior - logsumexp(prior)), axis=1)))
+
+
+def row(case: BlindCase) -> dict[str, Any]:
+    """What is printed of one case."""
+    said = said_by_size(case)
+    told: dict[str, Any] = {"case": case.spec.name, "cell": case.spec.cell, "label": case.label}
+    if said is None:
+        return told | {"said": None}
+    return told | {
+        "most_likely_mv": MV_PER_V * float(SIZES_V[np.argmax(said)]),
+        "said": said.round(2).tolist(),
+    }
+
+
+def main() -> None:
+    """Print a line a case and the prior."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--cases", type=int, default=40)
+    parser.add_argument("--cells", default="experiments/cells")
+    options = parser.parse_args()
+    said = []
+    for spec in chosen(options.cases, seed=options.seed):
+        try:
+            case = generate(spec, cells_in(Path(options.cells)))
+        except SimulationError:  # the laboratory cannot make it as planned
+            continue
+        one = row(case)
+        print(json.dumps(one), flush=True)
+        if one["said"] is not None:
+            said.append(np.array(one["said"]))
+    median_v, sd, best = most_likely_prior(said)
+    print(
+        json.dumps(
+            {"summary": True, "cases": len(said), "median_mv": MV_PER_V * median_v, "sd": sd, "nats": best}
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()
