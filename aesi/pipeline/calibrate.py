@@ -233,8 +233,8 @@ def calibration_content(
 def _worse(found: Calibration) -> tuple[str, ...]:
     """Records on which the fit errs by more than the start file, which one cell's seldom do."""
     return tuple(
-        f"{e.name}: the fit errs by more there than the start file; is it a record of the same cell, at the same age and "
-        "at the temperature that it was taken at?"
+        f"{e.name}: the fit errs by more there than the start file; is it a record of the same cell, at the same age "
+        "and at the temperature that it was taken at?"
         for e in found.errors
         if e.after_v > e.before_v
     )
