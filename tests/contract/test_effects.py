@@ -259,6 +259,17 @@ def test_a_users_own_effect_works_like_the_others(tmp_path):
     assert np.isfinite(run(active, CATALOGUE["self_heating"].activate()).voltage_v).all()
 
 
+def test_a_contact_that_answers_to_temperature_had_that_of_the_file_in_an_impedance(tmp_path):
+    """Beside an ambient temperature that is another: the rest of the cell was at that."""
+    path = tmp_path / "own.py"
+    drop = 'return Contribution(-inductance_h * trace.series["temperature_k"] * trace.current_a)'
+    path.write_text(OWN.replace(OWN[OWN.index("return ") : OWN.index("\n\n\nEFFECT")], drop))
+    effects = [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)]
+    bare = impedance(CELL, [1.0], 0.5, 25.0, effects)
+    there = impedance(CELL, [1.0], 0.5, 25.0, [*effects, load_effect(path).activate(inductance_h=1e-4)])
+    assert (there - bare)[0] == pytest.approx(1e-4 * 278.15)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
