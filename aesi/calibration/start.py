@@ -34,7 +34,9 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
     known = max((q for q in charges if q is not None), default=None)
     if known is None:
         return cell, (
-            f"no full discharge among the data: the capacity of {cell.capacity_ah:.3g} Ah is believed.",
+            f"no full discharge among the data (from {cell.upper_voltage_v - FULL_WINDOW_V:.4g} V or more at its first "
+            f"row to {cell.lower_voltage_v + 2 * FULL_WINDOW_V:.4g} V or less): the capacity of {cell.capacity_ah:.3g} "
+            "Ah is believed.",
         )
     factor = known / cell.capacity_ah
     note = f"capacity {known:.3f} Ah by a full discharge, {cell.capacity_ah:.3f} Ah declared"

@@ -15,6 +15,7 @@ from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.effects import activated
 from aesi.physics.simulation import model_with
+from aesi.pipeline.notes import without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.simulation import SayNotes, write_table
 from aesi.records import Spectrum
@@ -61,7 +62,8 @@ def impedance_file(
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:
-        say_notes([*declared.cell.unread, *_left_out(active)])
+        cold = without_energies(declared.cell, [temperature_degc])
+        say_notes([*declared.cell.unread, *cold, *_left_out(active)])
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])
     return z

@@ -7,10 +7,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
+from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell
 from aesi.records import Measurement
 
 SEPARATOR = ": "
+TELLING_K = 5.0
+"""Further than this from a cell's reference temperature, activation energies tell: with 20 kJ/mol rates differ by a
+sixth. A convention."""
 
 
 def together(notes: Iterable[str]) -> tuple[str, ...]:
@@ -38,3 +42,31 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
     return (
         f"{record.name}: no temperature in it; taken at {degc:.4g} degC, as the cell's file declares{beside}."
     )
+
+
+def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
+    """A sentence where properties of the cell do not answer to the temperatures that it is taken at.
+
+    temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares.
+    """
+    reference_k, missing = cell.reference_temperature_k, _without_energy(cell)
+    kelvin = (cell.initial_temperature_k if t is None else t + ZERO_CELSIUS_K for t in temperatures_degc)
+    farthest = max((float(np.max(np.abs(each - reference_k))) for each in kelvin), default=0.0)
+    if not missing or farthest <= TELLING_K:
+        return ()
+    return (
+        f"the cell's file declares no activation energy for {', '.join(missing)}: taken as at "
+        f"{reference_k - ZERO_CELSIUS_K:.4g} degC, which is up to {farthest:.0f} K off.",
+    )
+
+
+def _without_energy(cell: Cell) -> list[str]:
+    energies = {
+        "negative diffusivity": cell.negative.diffusivity_ea_j_mol,
+        "negative reaction rate": cell.negative.rate_ea_j_mol,
+        "positive diffusivity": cell.positive.diffusivity_ea_j_mol,
+        "positive reaction rate": cell.positive.rate_ea_j_mol,
+        "electrolyte conductivity": cell.electrolyte.conductivity_ea_j_mol,
+        "electrolyte diffusivity": cell.electrolyte.diffusivity_ea_j_mol,
+    }
+    return [name for name, energy in energies.items() if not energy]

@@ -20,7 +20,7 @@ from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_st
 from aesi.physics.belongs import check_belongs
 from aesi.physics.effects import activated
 from aesi.physics.effects.self_heating import of_file
-from aesi.pipeline.notes import temperature_sentence
+from aesi.pipeline.notes import temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -80,6 +80,7 @@ def simulate_file(
             start.sentence,
             hold_sentence(record.name, taken, hold is not None),
             temperature_sentence(declared.cell, record, active),
+            *without_energies(declared.cell, [record.temperature_degc]),
             *_with_effects(record, active),
         ]
     )
@@ -134,6 +135,7 @@ def predict_file(
             start.sentence,
             hold_sentence(record.name, hybrid.hold, hold is not None),
             temperature_sentence(hybrid.cell, record, hybrid.effects),
+            *without_energies(hybrid.cell, [record.temperature_degc]),
             *_with_effects(record, hybrid.effects),
         ]
     )

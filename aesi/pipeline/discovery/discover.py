@@ -18,7 +18,7 @@ from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.notes import temperature_sentence, together
+from aesi.pipeline.notes import temperature_sentence, together, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
@@ -106,6 +106,7 @@ class Case:
         left = () if given.correction is None else (without,)
         return (
             *given.cell.unread,
+            *without_energies(given.cell, (m.temperature_degc for m in self.records)),
             *left,
             *(temperature_sentence(given.cell, m, given.effects) for m in untold),
         )

@@ -22,7 +22,7 @@ from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sources import cell_path, check_roles, sources_of
-from aesi.pipeline.notes import temperature_sentence
+from aesi.pipeline.notes import temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.records import Hold, LeftOutDrives, Split, hold_sentence
 
@@ -122,6 +122,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         even = to_even(measurement, config.data.dt_s)
         notes.extend(even.notes)
         records[name] = no_rows(even, start.soc)
+    notes.extend(without_energies(cell, (m.temperature_degc for m, _ in sources.records.values())))
     drives = training_drives(config.data, records, sources.roles)
     for name, rows in drives:
         records[name].rows[rows] = True

@@ -77,9 +77,11 @@ def finding(content: Mapping[str, Any]) -> str:
         _range([row[f"{key}_rmse_mv"] for row in files]) for key in ("after", "before", "as_simulated")
     )
     on = files[0]["name"] if len(files) == 1 else f"the {len(files)} records that it was fitted to"
+    worse = [row["name"] for row in files if row["after_rmse_mv"] > row["before_rmse_mv"]]
+    against = f" On {', '.join(worse)} the start file errs by less." if worse else ""
     return (
         f"In free run the calibrated model errs by {after} mV RMSE on {on}, where the start file erred by {before} mV. "
-        f"Simulated without what a record has of its own, the file errs by {simulated} mV."
+        f"Simulated without what a record has of its own, the file errs by {simulated} mV.{against}"
     )
 
 
@@ -97,8 +99,8 @@ def _fit_figures(traces: Sequence[DiscoveryTrace]) -> dict[str, Figure]:
         meta={
             "title": "Voltage and residual over time",
             "caption": "Voltage measured, of the start file and as fitted; current, positive on discharge; residual "
-            "(measured minus model) in free run, on the rows that were fitted. Its axis spans what the fit leaves: a "
-            "double click shows the rest.",
+            "(measured minus model) in free run, on the rows that were fitted. The axes span what was measured and "
+            "what the fit leaves: a double click shows the rest.",
         }
     )
     current, soc = (np.concatenate([getattr(t, key) for t in traces]) for key in ("current_a", "soc"))

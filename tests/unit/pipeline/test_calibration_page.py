@@ -118,6 +118,11 @@ def test_one_record_is_named_and_its_error_is_no_range(content):
     )
 
 
+def test_a_record_that_the_fit_made_worse_is_named_first(content):
+    content["files"][0]["before_rmse_mv"] = 1.0
+    assert finding(content).endswith(" On pulses the start file errs by less.")
+
+
 def test_no_knots_are_no_figure():
     assert courses([{"name": "contact.resistance", **parameter()}]) == {}
 

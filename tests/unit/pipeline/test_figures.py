@@ -202,3 +202,21 @@ def test_violin_medians_are_those_of_the_squared_residual():
     residual = np.random.default_rng(0).standard_normal(20_001) * 1e-3
     fig = maps.violin_figure({"m": residual}, {"m": "#0072B2"})
     assert 10 ** np.median(fig.data[0].y) == pytest.approx(np.median((1e3 * residual) ** 2), rel=1e-6)
+
+
+def test_a_model_that_runs_empty_does_not_flatten_the_measured_voltage(views):
+    trace = views.discovery_trace("a", "test", 300, np.random.default_rng(0))
+    empty = trace.before_v.copy()
+    empty[200:] = -5.0
+    fig = records.residual_figure((replace(trace, before_v=empty),), {"before": "as declared"})
+    low, high = fig.layout.yaxis.range
+    span = float(np.ptp(trace.measured_v))
+    assert low == pytest.approx(float(trace.measured_v.min()) - 0.1 * span)
+    assert high == pytest.approx(float(trace.measured_v.max()) + 0.1 * span)
+
+
+def test_a_part_of_a_record_is_placed_in_it(views):
+    trace = views.trace("t", "test", 500, np.random.default_rng(0))
+    for first, title in ((0.0, "time, s"), (1260.0, "time after 1260 s of the record, s")):
+        placed, unit = timeline.end_to_end([replace(trace, time_s=trace.time_s - trace.time_s[0] + first)])
+        assert timeline.time_title(placed, unit) == title

@@ -25,6 +25,8 @@ from aesi.pipeline.report.views import DiscoveryTrace, RecordTrace
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
+BESIDE_MEASURED = 0.1
+"""Of the span of the measured voltage: room on its axis above and below."""
 ROLE_NAMES = {"train": "I training", "valid": "II validation", "test": "III test"}
 
 
@@ -102,6 +104,7 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
             error = (trace.measured_v - getattr(trace, f"{state}_v")) * MV_PER_V
             line(fig, item.x, error, label, style.STATE_COLOURS[state], 3, i == 0)
     mark_records(fig, placed)
+    low, high = _measured_range(traces)
     fig.update_yaxes(title_text="voltage, V", row=1)
     fig.update_yaxes(title_text="current, A", row=2)
     fig.update_yaxes(title_text="residual, mV", zeroline=True, row=3)
@@ -111,9 +114,21 @@ def residual_figure(traces: Sequence[DiscoveryTrace], labels: Mapping[str, str])
         f"Voltage measured, {' and '.join(dict.fromkeys((next(iter(labels.values())), list(labels.values())[-1])))}; "
         f"current, positive on discharge; residual (measured minus model), on {part}."
     )
+    ends = [getattr(t, f"{state}_v") for t in traces for state in (next(iter(labels)), list(labels)[-1])]
+    if any(np.nanmin(v) < low or np.nanmax(v) > high for v in ends):
+        fig.update_yaxes(range=(low, high), row=1)
+        caption += " The axis of the voltage spans what was measured: a double click shows the rest."
     return style.framed(
         fig, f"Voltage and residual over time, {traces[0].part} part", caption, 600, hovermode="x unified"
     )
+
+
+def _measured_range(traces: Sequence[DiscoveryTrace]) -> tuple[float, float]:
+    """V, of an axis on which a simulation that runs empty does not flatten what was measured."""
+    low = min(float(np.nanmin(t.measured_v)) for t in traces)
+    high = max(float(np.nanmax(t.measured_v)) for t in traces)
+    room = BESIDE_MEASURED * (high - low)
+    return low - room, high + room
 
 
 def interval_figure(traces: Sequence[RecordTrace], model: str, zoom_s: float | None = None) -> Figure | None:
