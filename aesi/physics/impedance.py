@@ -96,9 +96,8 @@ def impedance(
     if not acting:
         return z
     on_model = [one for one in active if one.effect.on_model is not None]
-    rest_run = simulate(
-        cell, INSTANT_S, np.zeros(2), soc, on_model, temperature_degc, "backward", model=model
-    )
+    degc = kelvin - ZERO_CELSIUS_K
+    rest_run = simulate(cell, INSTANT_S, np.zeros(2), soc, on_model, degc, "backward", model=model)
     return z + sum(_series_ohm(changed, one, function, rest_run) for one, function in acting)
 
 

@@ -4,6 +4,7 @@ import itertools
 import json
 import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 
 from aesi.errors import CellError, InputError, ParameterError, SimulationError
 from aesi.physics import Cell, impedance, simulate
+from aesi.physics.effect import Contribution, Effect, Record, Trace
 from aesi.physics.effects import CATALOGUE, active_effect, describe, find_effect, load_effect
 
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
@@ -257,6 +259,21 @@ def test_a_users_own_effect_works_like_the_others(tmp_path):
     assert pickle.loads(pickle.dumps(active)) == active
     assert active_effect(json.loads(json.dumps(active.to_dict()))) == active
     assert np.isfinite(run(active, CATALOGUE["self_heating"].activate()).voltage_v).all()
+
+
+def test_a_contact_that_answers_to_temperature_had_the_one_told_in_an_impedance_of_a_colder_cell():
+    """Beside an effect by which the cell is 20 K colder than the record says: the rest of the cell was at that."""
+
+    def colder(record: Record) -> Record:
+        return replace(record, temperature_k=record.temperature_k - 20.0)
+
+    def contact(trace: Trace) -> Contribution:
+        return Contribution(-1e-4 * trace.series["temperature_k"] * trace.current_a)
+
+    cold = Effect("cold", "instrument", "Cold.", on_record=colder).activate()
+    lead = Effect("contact", "physics", "Contact.", on_voltage=contact).activate()
+    ohm = impedance(CELL, [1.0], 0.5, 25.0, [cold, lead]) - impedance(CELL, [1.0], 0.5, 25.0, [cold])
+    assert ohm[0] == pytest.approx(1e-4 * 278.15)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
+from aesi.constants import COLDEST_DEGC, SECONDS_PER_HOUR, WARMEST_DEGC
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
 
@@ -23,6 +23,8 @@ HIGHEST_CURRENT_A = 20_000.0
 """Above what any single cell takes; a smaller current in mA is told by `check_scale`."""
 ENOUGH_ROWS = 10
 """From which a voltage that never changes is one that does not answer."""
+CLOCK_JUMPS_S = (SECONDS_PER_HOUR, 24 * SECONDS_PER_HOUR)
+"""By which a time of day runs back: the end of daylight saving, and midnight."""
 MOST_RELAXED_V = 0.5
 """No cell's voltage moves by more without a current: relaxation after a load is some 0.3 V at most."""
 
@@ -84,6 +86,15 @@ def _disorder(time_s: Array, step: Array) -> str:
     step : (n - 1,) s between the rows of `time_s`, (n,) s.
     """
     first = time_s[1:][step < 0]
+    back = -float(np.min(step))
+    anew = abs(
+        float(first[0]) - float(time_s[0])
+    )  # a second test starts where the first did, whatever it lasted
+    if len(first) == 1 and any(abs(back - jump) < 0.01 * jump < anew for jump in CLOCK_JUMPS_S):
+        return (
+            "; it is a clock that was put back, or that starts anew at midnight: give the time since the start of the "
+            "test, or split the file there."
+        )
     if len(first) == 1:
         return "; one file should hold one continuous test: split it there."
     if np.all(first <= np.min(time_s) + np.median(np.abs(step))):

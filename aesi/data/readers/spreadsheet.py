@@ -1,13 +1,14 @@
 """Excel workbooks (.xlsx), as Arbin and Neware write them, through openpyxl.
 
-The table is taken from the first sheet whose rows hold a heading; clock times and dates become text, so that they
-are read in the same way as from a text file.
+The table is taken from the first sheet whose rows hold a heading, and a note names further sheets with the same
+columns, as Arbin makes them of a long test; clock times and dates become text, so that they are read in the same way as
+from a text file.
 """
 
 from __future__ import annotations
 
 import datetime
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -44,14 +45,12 @@ def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
 
 
 def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:
-    for sheet in book.worksheets:
-        head = [
-            [_word(cell) for cell in row]
-            for row in islice(sheet.iter_rows(values_only=True), LINES_LOOKED_AT)
-        ]
-        heading = find_heading(head, wanted)
-        if heading is not None:
-            return _table(path, sheet, heading)
+    headings = [(sheet, _heading(sheet, wanted)) for sheet in book.worksheets]
+    tables = [(sheet, heading) for sheet, heading in headings if heading is not None]
+    if tables:
+        sheet, heading = tables[0]
+        alike = [repr(other.title) for other, its in tables[1:] if its.header == heading.header]
+        return _table(path, sheet, heading, alike)
     raise DataError(
         f"{path.name}: no sheet ({', '.join(book.sheetnames[:8])}) names time_s, current_a and voltage_v or the "
         "columns of a known cycler; name its columns: --column time_s=NAME --column current_a=NAME "
@@ -59,7 +58,13 @@ def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:
     )
 
 
-def _table(path: Path, sheet: Any, heading: Heading) -> FrameTable:
+def _heading(sheet: Any, wanted: Collection[str]) -> Heading | None:
+    head = islice(sheet.iter_rows(values_only=True), LINES_LOOKED_AT)
+    return find_heading([[_word(cell) for cell in row] for row in head], wanted)
+
+
+def _table(path: Path, sheet: Any, heading: Heading, alike: Sequence[str]) -> FrameTable:
+    """alike : names of further sheets with the same columns."""
     start = heading.line + 1 + int(heading.has_units)
     numbered = [
         (number, row)
@@ -69,8 +74,14 @@ def _table(path: Path, sheet: Any, heading: Heading) -> FrameTable:
     rows = [row for _, row in numbered]
     width = len(heading.header)
     columns = [[_plain(row[place]) if place < len(row) else None for row in rows] for place in range(width)]
-    notes = (f"Read from the sheet {sheet.title!r}.",)
-    return FrameTable(path, heading.header, columns, notes, heading.units, [number for number, _ in numbered])
+    notes = [f"Read from the sheet {sheet.title!r}."]
+    if alike:
+        notes.append(
+            f"Not read: {', '.join(alike)}, with the same columns; if the test goes on there, save it whole as one CSV."
+        )
+    return FrameTable(
+        path, heading.header, columns, tuple(notes), heading.units, [number for number, _ in numbered]
+    )
 
 
 def _word(cell: Any) -> str:

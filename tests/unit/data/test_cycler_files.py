@@ -455,3 +455,17 @@ def test_blank_rows_of_a_sheet_count_where_a_row_is_named(tmp_path):
     book.save(tmp_path / "gaps.xlsx")
     with pytest.raises(DataError, match=r"row 2 \(row 5 of the sheet\): column 'current_a' holds 'one'"):
         read_measurement(tmp_path / "gaps.xlsx")
+
+
+def test_a_test_that_goes_on_in_another_sheet_lost_it_without_a_word(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for name, first in (("Channel_1-1", 0), ("Channel_1-2", 50)):
+        sheet = book.create_sheet(name)
+        sheet.append(["time_s", "current_a", "voltage_v"])
+        for k in range(first, first + 50):
+            sheet.append([float(k), 1.0, 3.7 - 1e-4 * k])
+    book.save(tmp_path / "long.xlsx")
+    notes = read_measurement(tmp_path / "long.xlsx").notes
+    assert notes[0].endswith("Read from the sheet 'Channel_1-1'.")
+    assert "Not read: 'Channel_1-2', with the same columns" in notes[1]

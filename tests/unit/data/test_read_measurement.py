@@ -147,6 +147,13 @@ def test_times_that_run_back_are_told_by_what_they_are(tmp_path, order, words):
     assert words in refusal(tmp_path, text(time=TIME[order]))
 
 
+def test_a_clock_that_passes_midnight_is_told_from_two_tests(tmp_path):
+    clock = (TIME + 86_300.0) % 86_400.0
+    assert "starts anew at midnight" in refusal(tmp_path, text(time=clock))
+    hours = np.where(TIME < 100, 36.0 * TIME, 36.0 * (TIME - 100.0))
+    assert "one continuous test: split it there" in refusal(tmp_path, text(time=hours))
+
+
 def test_a_sign_that_is_declared_is_believed_of_bdf_too(tmp_path):
     content = text(header="Test Time / s,Current / A,Voltage / V")
     assert "--sign discharge-positive" in refusal(tmp_path, content)

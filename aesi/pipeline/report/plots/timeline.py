@@ -139,5 +139,8 @@ def mark_outside(fig: Figure, placed: Sequence[Placed], model: str) -> None:
 
 
 def time_title(placed: Sequence[Placed], unit: str) -> str:
-    """Title of the time axis."""
-    return f"time, records end to end, {unit}" if len(placed) > 1 else f"time, {unit}"
+    """Title of the time axis, which starts at nought: with where that is in a record of which a part is shown."""
+    if len(placed) > 1:
+        return f"time, records end to end, {unit}"
+    first = float(placed[0].trace.time_s[0])
+    return f"time after {first:.6g} s of the record, {unit}" if first else f"time, {unit}"
