@@ -28,6 +28,7 @@ are 5.9 V off and more."""
 LEAST_ENERGY_J_MOL = 600.0
 """Of the largest activation energy: 30 to 89 kJ/mol in the shipped files, 5 to 81 in twelve published sets (of PyBaMM),
 which without the kilo are 5 to 89; this is the middle of 89 and 5,000 on a logarithmic scale."""
+KILO = 1000.0
 LARGEST_ENTROPIC_V_K = 0.01
 """Within the window of an electrode 4e-5 to 6e-4 V/K in the shipped files and in four published sets (of PyBaMM) and
 0.0036 V/K in a fifth, whose formula rises at its end (Mohtat 2020); in mV/K the least of them is 0.04."""
@@ -51,6 +52,7 @@ def check_values(cell: CellParameters, where: str) -> None:
         electrolyte_concentration_mol_m3=cell.electrolyte.c0_mol_m3,
     )
     _check_share(f"{where}: Separator", "porosity", cell.separator.porosity)
+    _check_share(f"{where}: Separator", "transport efficiency", cell.separator.transport_efficiency)
     _check_share(f"{where}: Electrolyte", "transference", cell.electrolyte.transference)
     at_rest = np.array([cell.electrolyte.c0_mol_m3])
     for name in ("conductivity", "diffusivity"):
@@ -118,6 +120,11 @@ def _check_temperature_dependence(cell: CellParameters, where: str) -> None:
             f"{where}: {name} = {energies[name]:g} is the largest activation energy, and as good as none; they are in "
             "J/mol, so that 30 kJ/mol is 30000."
         )
+    if energies[name] > KILO * LEAST_ENERGY_J_MOL:
+        raise CellError(
+            f"{where}: {name} = {energies[name]:g} is {energies[name] / KILO:g} kJ/mol, and no activation energy of a cell "
+            "is; they are in J/mol, so that 30 kJ/mol is 30000."
+        )
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
         inside = np.linspace(electrode.theta_min, electrode.theta_max, POINTS)[1:-1]
         largest = float(np.max(np.abs(electrode.entropic(inside))))
@@ -159,6 +166,7 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
         rate_constant=electrode.rate_constant,
     )
     _check_share(what, "porosity", electrode.porosity)
+    _check_share(what, "transport efficiency", electrode.transport_efficiency)
     if not 0.0 <= electrode.theta_min < electrode.theta_max <= 1.0:
         raise CellError(
             f"{what}: stoichiometry limits [{electrode.theta_min:g}, {electrode.theta_max:g}] "

@@ -182,6 +182,16 @@ def test_a_negative_thickness_is_refused(content):
             "potential is not finite at a stoichiometry",
         ),
         ("Positive electrode", {"Porosity": 33.5}, "porosity = 33.5 has to be a share below 1; 30 % is 0.3"),
+        (
+            "Separator",
+            {"Transport efficiency": 12.8},
+            "Separator: transport efficiency = 12.8 has to be a share below 1",
+        ),
+        (
+            "Negative electrode",
+            {"Diffusivity activation energy [J.mol-1]": 3.5e7},
+            "diffusivity_ea_j_mol = 3.5e.07 is 35000 kJ/mol",
+        ),
         ("Electrolyte", {"Conductivity [S.m-1]": "1.0 - x"}, "conductivity is -999 at 1000 mol/m3"),
         (
             "Cell",
