@@ -122,8 +122,8 @@ def _check_temperature_dependence(cell: CellParameters, where: str) -> None:
         )
     if energies[name] > KILO * LEAST_ENERGY_J_MOL:
         raise CellError(
-            f"{where}: {name} = {energies[name]:g} is {energies[name] / KILO:g} kJ/mol, and no activation energy of a cell "
-            "is; they are in J/mol, so that 30 kJ/mol is 30000."
+            f"{where}: {name} = {energies[name]:g} is {energies[name] / KILO:g} kJ/mol, and no activation energy of a "
+            "cell is; they are in J/mol, so that 30 kJ/mol is 30000."
         )
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
         inside = np.linspace(electrode.theta_min, electrode.theta_max, POINTS)[1:-1]
