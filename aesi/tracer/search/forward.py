@@ -64,7 +64,9 @@ def searched(
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
     first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
-    if max_effects and np.isfinite(allowed_v):
+    if len(first) > FINALISTS and np.isfinite(
+        allowed_v
+    ):  # fewer are fitted in the time that looking would spare
         marks = list(side_by_side(EffectGrowth.marks, first))
         least_v = least_left_v(base, marks, problem.white_v)
         if least_v > REACH * allowed_v:
