@@ -14,7 +14,7 @@ from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
-from aesi.tracer.search.forward import admissible, needed, searched
+from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
 ADDED_OHM = 2e-3
@@ -119,14 +119,18 @@ def test_an_effect_that_says_little_or_moves_less_than_two_solvers_differ_by_is_
 
 
 def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_right_one(cell, few, make):
-    names = {name: few[name] for name in ("series_resistance", "voltage_sensor_offset")}
+    many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "current_sensor_offset")}
+    assert len(many) > FINALISTS > len(few)
     allowed_v = 0.6e-3
     right = make((CATALOGUE["series_resistance"].activate(resistance_ohm=ADDED_OHM),))
     strange = replace(right, voltage_v=right.voltage_v + 5e-3 * np.sin(right.time_s / 30.0))
-    problems = [inverse_problem(cell, [data], 0.9, effects=names) for data in (right, strange)]
+    asked = ((right, many), (strange, many), (strange, few))
+    problems = [inverse_problem(cell, [data], 0.9, effects=effects) for data, effects in asked]
     paths = [searched(one, 1, lambda *_: True, Archive(None, ""), allowed_v=allowed_v) for one in problems]
     assert paths[0].chosen.hypothesis == ("series_resistance",)
     assert paths[0].beyond_reach_v is None
     assert paths[1].chosen is paths[1].base
     assert paths[1].steps == ()
+    assert paths[2].steps  # no more than are fitted at most: looking spares nothing
+    assert paths[2].beyond_reach_v is None
     assert paths[1].beyond_reach_v == pytest.approx(5e-3 / np.sqrt(2.0), rel=0.2)
