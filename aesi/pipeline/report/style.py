@@ -20,11 +20,8 @@ MEASURED, PHYSICS = INK, VERMILLION
 MODEL_COLOURS = (BLUE, GREEN, PURPLE, ORANGE, SKY)
 STATE_COLOURS = {"before": VERMILLION, "recalibrated": ORANGE, "after": BLUE}
 KIND_COLOURS = {"physics": BLUE, "parameter": GREEN, "instrument": ORANGE, "placebo": GREY}
-KIND_PATTERNS = {
-    kind: {"shape": shape, "fillmode": "overlay", "fgcolor": "rgba(255,255,255,0.7)", "solidity": 0.25}
-    for kind, shape in (("physics", ""), ("parameter", "/"), ("instrument", "x"), ("placebo", "."))
-}
-"""Kinds differ in hatching too, for prints in grey."""
+KIND_SYMBOLS = {"physics": "circle", "parameter": "diamond", "instrument": "square", "placebo": "x"}
+"""Kinds differ in shape too, for prints in grey."""
 
 DIVERGING = "PuOr_r"
 SEQUENTIAL = "Cividis"

@@ -167,8 +167,10 @@ def test_the_caption_of_the_terms_says_what_their_names_are_made_of():
 def test_hypotheses_are_ranked_and_the_chosen_marked(views):
     discovery = views.discovery_view(200).discovery
     fig = hypotheses.ranking_figure(discovery["candidates"], {}, ["self_heating"])
-    assert fig.layout.yaxis.categoryarray[-1] == "★ self heating"
-    assert fig.layout.yaxis.categoryarray[0] == "placebo"
+    order = list(fig.layout.yaxis.categoryarray)
+    assert order[-1] == "★ self heating"
+    assert order.index("placebo") < order.index("★ self heating")
+    assert "nothing: as declared" in order
 
 
 def test_a_hypothesis_that_shares_its_score_names_the_others():
@@ -188,14 +190,37 @@ def test_a_hypothesis_that_shares_its_score_names_the_others():
     ]
     fig = hypotheses.ranking_figure(rows, {}, ["series_resistance"])
     assert list(fig.layout.yaxis.categoryarray) == [
+        "nothing: as declared",
         "★ series resistance",
         "porosity, beside series resistance",
     ]
 
 
+def test_hypotheses_stand_as_far_as_they_are_behind_the_best():
+    rows = [
+        {"effect": "a", "kind": "physics", "score": 3000.0},
+        {"effect": "b", "kind": "instrument", "score": 2999.0},
+        {"effect": "c", "kind": "physics", "score": -2.0},
+    ]
+    fig = hypotheses.ranking_figure(rows, {}, ["a"])
+    behind = {
+        y: (x, told[0])
+        for dots in fig.data
+        for y, x, told in zip(dots.y, dots.x, dots.customdata, strict=True)
+    }
+    assert behind == {
+        "★ a": (0.1, 0.0),
+        "b": (1.0, 1.0),
+        "c": (3002.0, 3002.0),
+        "nothing: as declared": (3000.0, 3000.0),
+    }
+    worse = hypotheses.ranking_figure([rows[2]], {}, [])
+    assert worse.layout.yaxis.categoryarray[-1] == "nothing: as declared"
+
+
 def test_a_kind_nobody_foresaw_is_still_shown():
     fig = hypotheses.ranking_figure([{"effect": "x", "kind": "numerical", "score": 1.0}], {}, [])
-    assert [bar.name for bar in fig.data] == ["numerical"]
+    assert [dots.name for dots in fig.data] == ["numerical", "declared"]
 
 
 def test_violin_medians_are_those_of_the_squared_residual():

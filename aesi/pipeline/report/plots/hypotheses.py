@@ -5,47 +5,74 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from aesi.pipeline.report import style
 from aesi.pipeline.report.views import KIND_ORDER, Row
+from aesi.tracer.search.plausible import ALIKE_NATS
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 MOST_HYPOTHESES = 30
-"""Bars beyond are too thin to read."""
+"""Rows beyond are too narrow to read."""
+LEAST_NATS = 0.1
+"""Behind the best: what is less is drawn here, on an axis that has no nought."""
 
 
 def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen: Sequence[str]) -> Figure:
-    """Score of every hypothesis, best on top, coloured and hatched by kind; a star marks what was added."""
-    rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES][::-1]
+    """By how much less than the best one each hypothesis, and the declared model, says; a star marks what was added."""
+    rows = sorted(candidates, key=lambda row: -row["score"])[:MOST_HYPOTHESES]
+    best = max(rows[0]["score"], 0.0)
     caption = (
-        "Score of each hypothesis: evidence over the declared model, in nats. A difference of 2.3 nats is odds of ten "
-        "to one; higher is better, and below zero the declared model explains the data better. What stands beside "
-        "another effect shares the score of both."
+        "How much less each hypothesis says of data that it has not seen than the one that says most, in nats: 2.3 "
+        f"are odds of ten to one. In the shaded part, up to {ALIKE_NATS:g}, two say the same, and what needs less to "
+        "say it is believed. What stands beside another effect shares the score of both."
     )
     if any(row["kind"] == "placebo" for row in rows):
         caption += " The placebo has parameters but no physics."
-    fig = style.figure("Hypotheses by score", caption, max(240, 110 + 20 * len(rows)), barmode="overlay")
-    others = sorted({row["kind"] for row in rows} - set(KIND_ORDER))
-    for kind in (*KIND_ORDER, *others):
+    fig = style.figure("Hypotheses, behind the best", caption, max(240, 130 + 20 * (len(rows) + 1)))
+    behind = {_label(row, titles, chosen): best - row["score"] for row in rows} | {DECLARED: best}
+    kinds = {row["kind"] for row in rows}
+    for kind in (*KIND_ORDER, *sorted(kinds - set(KIND_ORDER))):
         shown = [row for row in rows if row["kind"] == kind]
         if shown:
-            fig.add_bar(
-                x=[row["score"] for row in shown],
-                y=[_label(row, titles, chosen) for row in shown],
-                orientation="h",
-                name=kind,
-                marker={
-                    "color": style.KIND_COLOURS.get(kind, style.GREY),
-                    "pattern": style.KIND_PATTERNS.get(kind, {}),
-                },
-                customdata=[row.get("test_rmse_mv", float("nan")) for row in shown],
-                hovertemplate="%{y}<br>score %{x:.3g}, test RMSE %{customdata:.2f} mV<extra></extra>",
-            )
-    order = [_label(row, titles, chosen) for row in rows]
+            labels = [_label(row, titles, chosen) for row in shown]
+            tests = [row.get("test_rmse_mv", float("nan")) for row in shown]
+            _add_dots(fig, kind, labels, behind, [f", test RMSE {test:.2f} mV" for test in tests])
+    _add_dots(fig, "declared", [DECLARED], behind, [""])
+    order = sorted(behind, key=lambda label: -behind[label])
     fig.update_yaxes(categoryorder="array", categoryarray=order)
-    fig.update_xaxes(title_text="score, nats", zeroline=True)
+    fig.add_vrect(x0=LEAST_NATS / 2.0, x1=ALIKE_NATS, fillcolor=style.GREY, opacity=0.12, line_width=0)
+    most = max(*behind.values(), 10.0 * LEAST_NATS)
+    fig.update_xaxes(
+        title_text="nats behind the best",
+        type="log",
+        range=[float(np.log10(LEAST_NATS / 2.0)), float(np.log10(2.0 * most))],
+        dtick=1,
+    )
     return fig
+
+
+DECLARED = "nothing: as declared"
+
+
+def _add_dots(
+    fig: Figure, kind: str, labels: Sequence[str], behind: Mapping[str, float], tests: Sequence[str]
+) -> None:
+    fig.add_scatter(
+        x=[max(behind[label], LEAST_NATS) for label in labels],
+        y=list(labels),
+        mode="markers",
+        name=kind,
+        marker={
+            "color": style.KIND_COLOURS.get(kind, style.GREY),
+            "symbol": style.KIND_SYMBOLS.get(kind, "circle-open"),
+            "size": 11,
+        },
+        customdata=[[behind[label], test] for label, test in zip(labels, tests, strict=True)],
+        hovertemplate="%{y}<br>%{customdata[0]:.3g} nats behind%{customdata[1]}<extra></extra>",
+    )
 
 
 def files_figure(files: Sequence[Row], labels: Mapping[str, str]) -> Figure:
