@@ -239,6 +239,8 @@ def test_a_rest_that_follows_nothing_is_not_called_little(views):
     assert "is not known" in discoveries.rest_finding({**unknown, "explainable_mv": None})
     assert "much structure" in discoveries.rest_finding({**unknown, "explainable_mv": 0.9})
     assert "little structure" in discoveries.rest_finding(views.discovery_view(200).discovery)
+    easier = {**unknown, "explainable_mv": 7.2, "after": {"fit": {"rmse_mv": 9.4}, "test": {"rmse_mv": 4.8}}}
+    assert "7.2 mV of the 9.4 mV on the data that were fitted" in discoveries.rest_finding(easier)
 
 
 def test_no_verdict_is_called_certain():

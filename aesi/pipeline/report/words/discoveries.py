@@ -226,14 +226,14 @@ def closest_finding(view: DiscoveryView) -> str:
 
 
 def rest_finding(discovery: Mapping[str, Any]) -> str:
-    """What a data-driven correction could still explain."""
-    rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("test", {}).get("rmse_mv")
+    """What a data-driven correction could still explain of the data that were fitted, from which it is learnt."""
+    rest, after = discovery["explainable_mv"], discovery.get("after", {}).get("fit", {}).get("rmse_mv")
     if rest is None:
         return "What a flexible correction could still explain is not known: these data are too few for one."
     text = f"A flexible correction learnt on what is left could still explain {rest:.1f} mV"
     if not after:
         return text + "."
-    text += f" of {after:.1f} mV: "
+    text += f" of the {after:.1f} mV on the data that were fitted: "
     if rest > LARGE_SHARE * after:
         return text + "much structure is left for physics to name."
     if discovery["structured_mv"] > discovery["tolerance_mv"]:
