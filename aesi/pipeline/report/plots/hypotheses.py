@@ -46,7 +46,7 @@ def ranking_figure(candidates: Sequence[Row], titles: Mapping[str, str], chosen:
     fig.add_vrect(x0=LEAST_NATS / 2.0, x1=ALIKE_NATS, fillcolor=style.GREY, opacity=0.12, line_width=0)
     most = max(*behind.values(), 10.0 * LEAST_NATS)
     fig.update_xaxes(
-        title_text="nats behind the best",
+        title_text="Behind the best, nats",
         type="log",
         range=[float(np.log10(LEAST_NATS / 2.0)), float(np.log10(2.0 * most))],
         dtick=1,
