@@ -196,6 +196,18 @@ class Tracker:
         self._outbox.close()
         return left
 
+    @property
+    def empty(self) -> bool:
+        """Whether nothing has been tracked below the parent run."""
+        return not self._tracked
+
+    def withdraw(self, wait_s: float = FLUSH_S) -> None:
+        """Take the run back, as if it had never begun: MLflow keeps it among its deleted runs."""
+        self._stop.set()
+        self.flush(wait_s)
+        self._outbox.close()
+        self.store.client.delete_run(self.run_id)
+
     def _batch(
         self,
         params: dict[str, str] | None = None,
