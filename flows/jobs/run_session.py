@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -145,6 +146,7 @@ def _withdraw(record: RunRecord, tracker: Tracker) -> None:
     """Leave nothing of a run on disk and in the store, as far as they take it; the reason is on its way already."""
     from mlflow.exceptions import MlflowException
 
+    shutil.rmtree(environment.run_folder(record.experiment, record.run_id), ignore_errors=True)
     with suppress(OSError):
         record.forget()
     with suppress(OSError, MlflowException):

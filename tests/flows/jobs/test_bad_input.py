@@ -38,6 +38,19 @@ def test_an_invalid_data_file_leaves_no_failed_run(tracked):
     assert records("refused") == []
 
 
+def test_data_too_few_for_the_library_leave_no_folder(tracked):
+    from flows.jobs.start import start
+
+    for name, end_v in (("bad", 3.88), ("good", 3.87)):
+        (tracked / f"{name}.csv").write_text(f"time_s,current_a,voltage_v\n0,1,3.9\n1,1,3.89\n2,1,{end_v}\n")
+    path = tracked / "refused.yaml"
+    path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
+    with pytest.raises(InputError, match="needs more than the 3 training"):
+        start(path, use_prefect=False)
+    assert statuses("refused") == []
+    assert [p for p in (tracked / "runs").rglob("*") if p.is_file()] == []
+
+
 @pytest.mark.parametrize(
     ("error", "left"),
     [(InputError("no."), []), (DataAway("no network."), ["FAILED"]), (FitError("it fails."), ["FAILED"])],
@@ -49,7 +62,11 @@ def test_only_what_was_refused_is_taken_back(tracked, error, left):
 
 
 def test_a_job_that_is_refused_after_it_tracked_something_keeps_it(tracked):
-    with pytest.raises(InputError), tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
-        tracker.nested("candidate:1", "one", "candidate", {}, {})
-        raise InputError("too late.")
+    def work():
+        with tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
+            tracker.nested("candidate:1", "one", "candidate", {}, {})
+            raise InputError("too late.")
+
+    with pytest.raises(InputError):
+        work()
     assert sorted(statuses("job")) == ["FAILED", "FINISHED"]
