@@ -20,8 +20,7 @@ CERTAIN = 0.99
 
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
-    a test part that contradicts it, or on which a written model that claims to explain the data does worse than another.
-    """
+    a test part that contradicts it, or on which a written model that is to explain the data does worse than another."""
     claims = view.discovery["verdict"] != "unknown"  # of one that does not, the warning below says it
     return "; ".join([_verdict(view)[:-1], *(_against(view.discovery) if claims else ())]) + "."
 
