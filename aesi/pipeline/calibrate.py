@@ -13,7 +13,7 @@ import numpy as np
 
 from aesi.calibration import Calibration, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
-from aesi.calibration.posterior import PosteriorSamples, sampled
+from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
@@ -69,6 +69,7 @@ def calibrate_files(
     """
     asked = request or Request()
     check_records(measurements, asked.temperatures_degc)
+    check_posterior(asked.posterior)
     given = declared_model(cell)
     declared, model = given.cell, asked.model or given.model
     check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size

@@ -157,7 +157,9 @@ def calibrate(
 
 def impedance(
     cell: options.CellOption,
-    soc: Annotated[float, typer.Option(min=0.0, max=1.0, help="State of charge at rest.")],
+    soc: Annotated[
+        float, typer.Option(callback=options.share("--soc"), help="State of charge at rest, from 0 to 1.")
+    ],
     frequencies: Annotated[
         str, typer.Option(help="CSV with a column frequency_hz, or LOW:HIGH:N for N of them, log-spaced.")
     ],

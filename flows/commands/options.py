@@ -23,18 +23,23 @@ CellOption = Annotated[
 ]
 
 
-def _share(value: float | None) -> float | None:
-    """Raises InputError for a state of charge that is no share."""
-    if value is not None and not 0.0 <= value <= 1.0:
-        raise InputError(
-            f"--soc0 {value:g}: a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % is 0.9."
-        )
-    return value
+def share(option: str) -> Callable[[float | None], float | None]:
+    """What lets a state of charge through, and raises InputError, naming the option, for one that is no share."""
+
+    def checked(value: float | None) -> float | None:
+        if value is not None and not 0.0 <= value <= 1.0:
+            raise InputError(
+                f"{option} {value:g}: a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % "
+                "is 0.9."
+            )
+        return value
+
+    return checked
 
 
 Soc0 = Annotated[
     float | None,
-    typer.Option("--soc0", callback=_share, help="State of charge at the first row, from 0 to 1."),
+    typer.Option("--soc0", callback=share("--soc0"), help="State of charge at the first row, from 0 to 1."),
 ]
 Soh = Annotated[
     float | None,

@@ -190,7 +190,7 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ({"current_a": ["rest"] * len(TIME)}, "current_a holds 'rest', which is not a number"),
         ({"current_a": 1j * TIME}, "current_a holds complex numbers"),
         (
-            {"current_a": np.ma.masked_array(TIME, mask=TIME == TIME[3])},
+            {"current_a": np.ma.masked_array(TIME, mask=np.arange(len(TIME)) == 3)},
             "current_a is masked in row 4, counted from 1; drop or fill what is masked first",
         ),
         ({"current_a": np.full(len(TIME), np.nan)}, "current_a is nan in row 1, counted from 1"),

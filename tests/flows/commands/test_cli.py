@@ -65,6 +65,10 @@ def test_usage_errors_are_exit_code_2(call, arguments):
             ["impedance", "--cell", LG_M50, "--soc", "0.5", "--frequencies", "1:10", "--out", "z.csv"],
             "--frequencies 1:10: has to read LOW:HIGH:N",
         ),
+        (
+            ["impedance", "--cell", LG_M50, "--soc", "50", "--frequencies", "1:10:3", "--out", "z.csv"],
+            "--soc 50: a state of charge is a share of the capacity",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, words):

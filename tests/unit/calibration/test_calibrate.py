@@ -1,5 +1,6 @@
 """Calibration over temperatures: recovery, the temperature as an input, intervals, what stays open."""
 
+import warnings
 from dataclasses import replace
 from datetime import date
 
@@ -123,10 +124,18 @@ def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
     assert posterior.accepted > 0.05
 
 
-def test_a_posterior_of_too_few_steps_is_refused(found):
+def test_a_posterior_of_too_few_samples_is_refused(found):
     pytest.importorskip("emcee")
-    with pytest.raises(InputError, match="four steps"):
+    with pytest.raises(InputError, match="--posterior 2: at least 4 samples"):
         sampled(found, 2)
+
+
+@pytest.mark.slow
+def test_a_chain_whose_walkers_stand_still_warned_of_a_division(found):
+    pytest.importorskip("emcee")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "too short" in sampled(found, 4, seed=1).sentence
 
 
 def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of_half_a_volt(start):

@@ -223,7 +223,7 @@ def test_the_sign_of_a_plain_discharge_is_checked_along_the_test(tmp_path):
 
 def test_a_unit_in_the_name_is_believed(tmp_path):
     message = refusal(tmp_path, text(header="time_s,I[mA],voltage_v"), columns={"current_a": "I[mA]"})
-    assert "ma by its name" in message
+    assert "in mA by its name" in message
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,14 @@ def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_pa
         calibrate_files(BPX, [record], tmp_path / "new.json", kelvin)
 
 
+def test_a_posterior_of_too_few_samples_was_refused_after_the_fit(tmp_path, monkeypatch):
+    pytest.importorskip("emcee")
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", lambda *_, **__: pytest.fail("it was fitted"))
+    record = read_measurement(write_record(tmp_path))
+    with pytest.raises(InputError, match="--posterior 2: at least 4"):
+        calibrate_files(BPX, [record], tmp_path / "new.json", Request(posterior=2))
+
+
 def test_an_experiment_has_a_cell_at_its_state_of_health(tmp_path):
     cell = {"bpx": str(BPX), "soc0": SOC0, "start": "declared"}
     record = write_record(tmp_path)
