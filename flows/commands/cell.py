@@ -31,22 +31,11 @@ def simulate(
 ) -> None:
     """The physics model alone, under a current profile."""
     outputs.check_table(out, [cell, current])
-    from aesi.pipeline.simulation import simulate_file
+    from aesi.pipeline.simulation import Asked, simulate_file
 
-    run = simulate_file(
-        cell,
-        current,
-        out,
-        soc0=soc0,
-        soh=soh,
-        effects=[options.effect_values(text) for text in effect or []],
-        effect_files=effect_file or [],
-        hold=hold,
-        reading=reading,
-        say_notes=options.say_notes,
-        model=model,
-        self_heating=self_heating,
-    )
+    asked = Asked(soc0, hold, reading, self_heating, soh)
+    added = options.added_effects(effect, effect_file)
+    run = simulate_file(cell, current, out, asked, added, model, options.say_notes)
     from aesi.over_time import extent
 
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
@@ -70,20 +59,10 @@ def predict(
 ) -> None:
     """A saved hybrid model with its intervals."""
     outputs.check_table(out, [current])
-    from aesi.pipeline.simulation import predict_file
+    from aesi.pipeline.simulation import Asked, predict_file
 
-    rows = predict_file(
-        model,
-        current,
-        out,
-        measured=measured,
-        soc0=soc0,
-        soh=soh,
-        hold=hold,
-        reading=reading,
-        say_notes=options.say_notes,
-        self_heating=self_heating,
-    )
+    asked = Asked(soc0, hold, reading, self_heating, soh)
+    rows = predict_file(model, current, out, asked, measured, options.say_notes)
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
 
@@ -180,8 +159,7 @@ def impedance(
         frequencies,
         out,
         temperature_degc,
-        [options.effect_values(text) for text in effect or []],
-        effect_file or [],
+        options.added_effects(effect, effect_file),
         model,
         soh,
         options.say_notes,

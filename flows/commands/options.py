@@ -14,6 +14,7 @@ from aesi.errors import InputError
 
 if TYPE_CHECKING:
     from aesi.data.reading import Reading
+    from aesi.physics import ActiveEffect
     from aesi.records import Hold, Measurement, Spectrum
 
 Value = TypeVar("Value")
@@ -289,7 +290,14 @@ def say_notes(notes: Iterable[str]) -> None:
         typer.echo(note, err=True)
 
 
-def effect_values(text: str) -> tuple[str, dict[str, float]]:
+def added_effects(texts: list[str] | None, files: list[Path] | None) -> tuple[ActiveEffect, ...]:
+    """The effects of `--effect id:parameter=value,...`, of the catalogue and of the user's files."""
+    from aesi.physics.effects import activated
+
+    return activated([_effect_values(text) for text in texts or []], files or [])
+
+
+def _effect_values(text: str) -> tuple[str, dict[str, float]]:
     """`id:parameter=value,...` as the id and its values."""
     name, _, rest = text.partition(":")
     values: dict[str, float] = {}

@@ -8,7 +8,7 @@ from small_experiment import SOC0, experiment, fitted, write_record
 
 import aesi
 from aesi.errors import DataError, InputError
-from aesi.physics.effects import CATALOGUE
+from aesi.physics.effects import CATALOGUE, activated
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.hybrid import HybridModel
@@ -210,6 +210,10 @@ def test_effects_and_their_defaults_were_simulated_without_a_word(model, record,
     said: list[str] = []
     bare = HybridModel(model.cell).save(tmp_path / "bare")
     simulate_file(
-        bare, record, tmp_path / "o.csv", effects=[("series_resistance", {})], say_notes=said.extend
+        bare,
+        record,
+        tmp_path / "o.csv",
+        effects=activated([("series_resistance", {})]),
+        say_notes=said.extend,
     )
     assert any(note.endswith(": with series_resistance(resistance_ohm=0.001).") for note in said)
