@@ -45,7 +45,7 @@ def test_data_too_few_for_the_library_leave_no_folder(tracked):
         (tracked / f"{name}.csv").write_text(f"time_s,current_a,voltage_v\n0,1,3.9\n1,1,3.89\n2,1,{end_v}\n")
     path = tracked / "refused.yaml"
     path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
-    with pytest.raises(InputError, match="needs more than the 3 training"):
+    with pytest.raises(InputError, match="needs more than the 2 training"):
         start(path, use_prefect=False)
     assert statuses("refused") == []
     assert [p for p in (tracked / "runs").rglob("*") if p.is_file()] == []
