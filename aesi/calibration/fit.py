@@ -123,7 +123,7 @@ def problem(
     if not same_cell:
         start, notes = sized(cell, [zero.taken_out(r, start.nominal_capacity_ah) for r in records])
     kept = [one_branch(start, data) for data in records]
-    placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
+    placed, told = with_temperatures(start, [data for data, _ in kept], temperatures_degc)
     start, typical = with_activation(start)
     ready = prepared(start, placed, soc0, physics, same_cell)
     for one in ready:
