@@ -326,6 +326,25 @@ def test_a_room_in_fahrenheit_is_doubted(tmp_path):
     assert not any("starts at" in note for note in converted.notes)
 
 
+def test_a_time_in_hours_is_doubted(tmp_path):
+    path = written(tmp_path, text(time=TIME / 3600.0))
+    (note,) = read_measurement(path).notes
+    assert note.endswith(
+        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h."
+    )
+    profile = written(
+        tmp_path, "time_s,current_a\n" + "".join(f"{t / 3600},1\n" for t in TIME), "profile.csv"
+    )
+    assert any("quicker than cyclers" in one for one in read_current(profile).notes)
+    assert not any("quicker" in one for one in read_measurement(path, units={"time_s": "h"}).notes)
+
+
+def test_a_file_of_json_was_told_of_columns_that_are_none(tmp_path):
+    path = written(tmp_path, '\ufeff{"Header": {"BPX": "1.1.0"}}', "cell.bpx.json")
+    with pytest.raises(DataError, match=r"cell.bpx.json is JSON, .* a cell's file is given as --cell"):
+        read_measurement(path)
+
+
 def test_a_thermocouple_that_drops_out_is_doubted(tmp_path):
     temperature = np.where((TIME == 50) | (TIME == 120), 0.0, 25.0)
     columns = zip(TIME, CURRENT, VOLTAGE, temperature, strict=True)
