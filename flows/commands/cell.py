@@ -58,7 +58,7 @@ def predict(
     self_heating: options.SelfHeating = False,
 ) -> None:
     """A saved hybrid model with its intervals."""
-    outputs.check_table(out, [current])
+    outputs.check_table(out, [model, current])
     from aesi.pipeline.simulation import Asked, predict_file
 
     asked = Asked(soc0, hold, reading, self_heating, soh)
@@ -232,7 +232,7 @@ def discover(
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
     if out is not None:
-        outputs.check_folder(out)
+        outputs.check_folder(out, [cell] if cell else [])
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
         options.say_reading([experiment])

@@ -117,6 +117,24 @@ def test_a_file_that_is_read_is_never_written_over(call, cell, current, tmp_path
 
 
 @pytest.mark.parametrize(
+    ("command", "out"),
+    [
+        (("export", "--to", "bpx", "--cell"), "found/model/cell.bpx.json"),
+        (("discover", "--data", "drive.csv", "--cell"), "found"),
+    ],
+)
+def test_a_model_that_is_read_was_written_over(call, cell, tmp_path, command, out):
+    from aesi.pipeline.product.declared import declared_model
+
+    model = declared_model(Path(cell)).save(tmp_path / "found" / "model")
+    before = {file.name: file.read_bytes() for file in model.iterdir()}
+    code, _, err = call(*command, model, "--out", tmp_path / out)
+    assert code == 2
+    assert "would be lost" in err
+    assert {file.name: file.read_bytes() for file in model.iterdir()} == before
+
+
+@pytest.mark.parametrize(
     ("command", "made", "words"),
     [
         ("simulate", "folder", "is a folder; name the file to write"),
