@@ -30,47 +30,10 @@ def open_line(content: Mapping[str, Any]) -> str:
 
 def to_text(content: Mapping[str, Any]) -> str:
     """The report as Markdown."""
-    lines = [
-        f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", "",
-        "| file | mean temperature, degC | before, mV | after, mV | as simulated, mV | capacity |",
-        "|---|---|---|---|---|---|",
-    ]  # fmt: skip
-    lines += [
-        f"| {f['name']} | {_at(f['temperature_degc'], content['declared_degc'])} "
-        f"| {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} | {f['as_simulated_rmse_mv']:.2f} "
-        f"| {f['capacity_share']:.3f} |"
-        for f in content["files"]
-    ]
-    lines += [
-        "",
-        "Errors are RMSE on the data that were fitted: after, each record with what it has of its own (its capacity "
-        "over the file's, its start, its cycler's zero); as simulated, the file as it is on the current as measured.",
-        "",
-    ]
-    lines += ["| state of health | value | 95 % interval |", "|---|---|---|"]
-    lines += [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
-    lines += [
-        "",
-        "Of prior: the share of the prior's width that the records leave; of 100 % they say nothing.",
-        "",
-        "| parameter | value | 95 % interval | unit | of prior, % | prior from |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {name} | {_with_interval(p)} | {p['unit']} | {_percent(p['of_prior'])} | {p['prior_from']} |"
-        for name, p in content["parameters"].items()
-    ]
+    lines = [f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", ""]
+    lines += [*_files(content), "", *_health(content), "", *_parameters(content)]
     if content["impedance"]:
-        low, high = content["impedance"][0]["band_hz"]
-        lines += ["", f"## Impedance, {low:g} to {high:g} Hz, nothing fitted to it", ""]
-        lines += [
-            "| spectrum | state of charge | degC | root mean square of the error of abs(Z), % |",
-            "|---|---|---|---|",
-        ]
-        lines += [
-            f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {_number(s['rms_pct'])} |"
-            for s in content["impedance"]
-        ]
+        lines += ["", *_impedance(content)]
     sections = (
         ("Left open by these data", [o["sentence"] for o in content["undetermined"]]),
         ("On a bound", content["at_bounds"]),
@@ -80,6 +43,57 @@ def to_text(content: Mapping[str, Any]) -> str:
         if texts:
             lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
     return "\n".join(lines) + "\n"
+
+
+def _files(content: Mapping[str, Any]) -> list[str]:
+    rows = [
+        f"| {f['name']} | {_at(f['temperature_degc'], content['declared_degc'])} "
+        f"| {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} | {f['as_simulated_rmse_mv']:.2f} "
+        f"| {f['capacity_share']:.3f} |"
+        for f in content["files"]
+    ]
+    return [
+        "| file | mean temperature, degC | before, mV | after, mV | as simulated, mV | capacity |",
+        "|---|---|---|---|---|---|",
+        *rows,
+        "",
+        "Errors are RMSE on the data that were fitted: after, each record with what it has of its own (its capacity "
+        "over the file's, its start, its cycler's zero); as simulated, the file as it is on the current as measured.",
+    ]
+
+
+def _health(content: Mapping[str, Any]) -> list[str]:
+    rows = [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
+    return ["| state of health | value | 95 % interval |", "|---|---|---|", *rows]
+
+
+def _parameters(content: Mapping[str, Any]) -> list[str]:
+    rows = [
+        f"| {name} | {_with_interval(p)} | {p['unit']} | {_percent(p['of_prior'])} | {p['prior_from']} |"
+        for name, p in content["parameters"].items()
+    ]
+    return [
+        "Of prior: the share of the prior's width that the records leave; of 100 % they say nothing.",
+        "",
+        "| parameter | value | 95 % interval | unit | of prior, % | prior from |",
+        "|---|---|---|---|---|---|",
+        *rows,
+    ]
+
+
+def _impedance(content: Mapping[str, Any]) -> list[str]:
+    low, high = content["impedance"][0]["band_hz"]
+    rows = [
+        f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {_number(s['rms_pct'])} |"
+        for s in content["impedance"]
+    ]
+    return [
+        f"## Impedance, {low:g} to {high:g} Hz, nothing fitted to it",
+        "",
+        "| spectrum | state of charge | degC | root mean square of the error of abs(Z), % |",
+        "|---|---|---|---|",
+        *rows,
+    ]
 
 
 def _at(measured_degc: float | None, declared_degc: float) -> str:
