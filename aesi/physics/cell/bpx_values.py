@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from aesi.constants import COLDEST_DEGC, FARADAY_C_MOL, WARMEST_DEGC, ZERO_CELSIUS_K
+from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
+from aesi.physics.cell.bpx_transport import POINTS, check_kinetics, check_transport, inside_window
 from aesi.physics.cell.parts import CellParameters, Electrode, require_positive
 from aesi.physics.cell.relations import Relation
 
-POINTS = 101
-"""Stoichiometries between empty and full at which relations are looked at."""
-HALF_FULL = 0.5
-"""sqrt(x (1 - x)) where it is largest, at x = 1/2."""
 ELECTRODE_ENERGIES = ("diffusivity_ea_j_mol", "rate_ea_j_mol", "film_ea_j_mol")
 ELECTROLYTE_ENERGIES = ("conductivity_ea_j_mol", "diffusivity_ea_j_mol")
 OTHER_UNIT = 10.0
@@ -37,21 +34,6 @@ LARGEST_ENTROPIC_V_K = 0.01
 HEAT_J_K_AH = (0.5, 1000.0)
 """Heat capacity over nominal capacity: 9 to 52 J/(K Ah) in the shipped files, 7 to 27 by the layers of eight published
 sets (of PyBaMM), and a thousand times more or less where one of its factors is in another unit."""
-SEPARATOR_M = (1e-6, 1e-3)
-"""Thickness: 12 to 25 um in the shipped files and in twelve published sets (of PyBaMM), 0.7 mm at most in laboratory
-cells (glass fibre); 0.012 in mm, 12 in um."""
-ELECTROLYTE_S_M = (0.05, 8.5)
-"""Conductivity: 0.88 to 2.05 S/m in the shipped files and the same sets, which is 0.009 to 0.02 S/cm and 9 to 20 mS/cm;
-a calibration may move it by a factor of four."""
-LARGEST_SALT_M2_S = 1e-8
-"""Diffusivity of the salt: 2.5e-11 to 7.5e-10 m2/s there, which is 2.5e-7 to 7.5e-6 cm2/s; half way on a logarithmic
-scale."""
-SHORTEST_DIFFUSION_S = 1.0
-"""Radius squared over the median diffusivity in an electrode's window: 2.9 s in one (0.5 um, Kim 2011) and 100 to
-25,000 s in the others of the shipped files and the same sets; with a diffusivity in cm2/s a ten-thousandth of it."""
-LEAST_EXCHANGE_1_H = 2e-3
-"""Exchange current of a half-full electrode over nominal capacity: 0.05 to 470 1/h there, and 0.2 and more without the
-one of sodium; 0.0009 at most in the slower electrode with a rate constant in mol/(cm2 s), and less with one in m/s."""
 LEAST_CUT_OFF_V = 0.1
 """Lower cut-offs are 1 V and more (LFP|LTO), which is 0.001 kV; 0.06 V is half way to the 0.004 kV of the highest."""
 
@@ -89,8 +71,8 @@ def check_values(cell: CellParameters, where: str) -> None:
             )
     _check_capacity(cell, where)
     _check_full(cell, where)
-    _check_transport(cell, where)
-    _check_kinetics(cell, where)
+    check_transport(cell, where)
+    check_kinetics(cell, where)
     _check_temperature_dependence(cell, where)
     _check_thermal(cell, where)
 
@@ -121,54 +103,6 @@ def _check_full(cell: CellParameters, where: str) -> None:
         )
 
 
-def _check_transport(cell: CellParameters, where: str) -> None:
-    """Lengths in m, diffusivities in m2/s, the electrolyte's conductivity in S/m."""
-    least, most = SEPARATOR_M
-    if not least <= cell.separator.thickness_m <= most:
-        raise CellError(
-            f"{where}: Separator: thickness = {cell.separator.thickness_m:g} m is outside {least:g} to {most:g} m, "
-            "where all separators are; it is in m, so that 12 um is 1.2e-05."
-        )
-    electrolyte = cell.electrolyte
-    at_rest = np.array([electrolyte.c0_mol_m3])
-    conductivity = float(electrolyte.conductivity(at_rest)[0])
-    least, most = ELECTROLYTE_S_M
-    if not least <= conductivity <= most:
-        raise CellError(
-            f"{where}: Electrolyte: conductivity = {conductivity:g} S/m at {electrolyte.c0_mol_m3:g} mol/m3 is outside "
-            f"{least:g} to {most:g} S/m, where all electrolytes are; it is in S/m, so that 10 mS/cm or 0.01 S/cm is 1."
-        )
-    diffusivity = float(electrolyte.diffusivity(at_rest)[0])
-    if diffusivity > LARGEST_SALT_M2_S:
-        raise CellError(
-            f"{where}: Electrolyte: diffusivity = {diffusivity:g} m2/s at {electrolyte.c0_mol_m3:g} mol/m3 is above "
-            f"{LARGEST_SALT_M2_S:g} m2/s, faster than any salt; it is in m2/s, so that 2e-06 cm2/s is 2e-10."
-        )
-    for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
-        median = float(np.median(electrode.diffusivity(_inside(electrode))))
-        seconds = electrode.particle_radius_m**2 / median
-        if seconds < SHORTEST_DIFFUSION_S:
-            raise CellError(
-                f"{where}: {side} electrode: diffusivity = {median:g} m2/s takes lithium across particles of "
-                f"{electrode.particle_radius_m:g} m in {seconds:.2g} s, faster than in any electrode; it is in m2/s, "
-                "so that 1e-10 cm2/s is 1e-14."
-            )
-
-
-def _check_kinetics(cell: CellParameters, where: str) -> None:
-    """Rate constants in mol/(m2 s)."""
-    area_m2 = cell.electrode_area_m2 * cell.electrode_pairs
-    for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
-        surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * area_m2
-        exchange_a = FARADAY_C_MOL * electrode.rate_constant * HALF_FULL * surface_m2
-        if exchange_a < LEAST_EXCHANGE_1_H * cell.nominal_capacity_ah:
-            raise CellError(
-                f"{where}: {side} electrode: reaction rate constant = {electrode.rate_constant:g} makes an exchange "
-                f"current of {exchange_a:.2g} A, less than in any electrode of {cell.nominal_capacity_ah:g} A.h; it is "
-                "in mol/(m2 s), those of cells are 1e-06 to 1e-03."
-            )
-
-
 def _check_temperature_dependence(cell: CellParameters, where: str) -> None:
     """Activation energies in J/mol, entropic coefficients in V/K."""
     energies = {
@@ -195,7 +129,7 @@ def _check_temperature_dependence(cell: CellParameters, where: str) -> None:
             "cell is; they are in J/mol, so that 30 kJ/mol is 30000."
         )
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
-        largest = float(np.max(np.abs(electrode.entropic(_inside(electrode)))))
+        largest = float(np.max(np.abs(electrode.entropic(inside_window(electrode)))))
         if not largest <= LARGEST_ENTROPIC_V_K:
             raise CellError(
                 f"{where}: {side} electrode: the entropic change coefficient is {largest:g} V/K, more than any "
@@ -240,17 +174,12 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
             f"{what}: stoichiometry limits [{electrode.theta_min:g}, {electrode.theta_max:g}] "
             "have to satisfy 0 <= minimum < maximum <= 1."
         )
-    inside = _inside(electrode)
+    inside = inside_window(electrode)
     _check_positive(electrode.diffusivity, inside, f"{what}: diffusivity", "")
     potential = electrode.ocp(inside)
     if not np.isfinite(potential).all():
         x = inside[int(np.argmin(np.isfinite(potential)))]
         raise CellError(f"{what}: the open-circuit potential is not finite at a stoichiometry of {x:.3g}.")
-
-
-def _inside(electrode: Electrode) -> Array:
-    """(n,) stoichiometries within the window, without its ends: potentials may be infinite at 0 or 1."""
-    return np.linspace(electrode.theta_min, electrode.theta_max, POINTS)[1:-1]
 
 
 def _check_share(what: str, name: str, value: float) -> None:
