@@ -34,7 +34,7 @@ SayNotes = Callable[[Iterable[str]], None]
 
 
 @dataclass(frozen=True)
-class Asked:
+class ProfileRequest:
     """What is said of a profile beside its file.
 
     soc0 : state of charge at the first row; None takes it from the file's voltage, where it has one (see
@@ -57,7 +57,7 @@ def simulate_file(
     cell: Path,
     current: Path,
     out: Path,
-    asked: Asked | None = None,
+    asked: ProfileRequest | None = None,
     effects: Sequence[ActiveEffect] = (),
     model: ModelName | None = None,
     say_notes: SayNotes | None = None,
@@ -70,7 +70,7 @@ def simulate_file(
     say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
     Raises DataError where a measurement cannot be of this cell.
     """
-    asked, say = asked or Asked(), say_notes or _silent
+    asked, say = asked or ProfileRequest(), say_notes or _silent
     profile = read_current(current, asked.reading)
     say(profile.notes)
     declared = declared_model(cell).with_soh(asked.soh)
@@ -105,7 +105,7 @@ def predict_file(
     model: Path,
     current: Path,
     out: Path,
-    asked: Asked | None = None,
+    asked: ProfileRequest | None = None,
     measured: bool = False,
     say_notes: SayNotes | None = None,
 ) -> int:
@@ -114,7 +114,7 @@ def predict_file(
     measured : one step ahead from the file's voltage; otherwise a free run.  say_notes : as in `simulate_file`.
     Raises DataError where a measurement cannot be of this cell.
     """
-    asked, say = asked or Asked(), say_notes or _silent
+    asked, say = asked or ProfileRequest(), say_notes or _silent
     profile = read_current(current, asked.reading)
     say(profile.notes)
     if measured and profile.voltage_v is None:
@@ -146,7 +146,9 @@ class _Placed:
     start: InitialState
 
 
-def _placed(model: HybridModel, profile: CurrentProfile, file: Path, asked: Asked, say: SayNotes) -> _Placed:
+def _placed(
+    model: HybridModel, profile: CurrentProfile, file: Path, asked: ProfileRequest, say: SayNotes
+) -> _Placed:
     """The model as it is asked for on a profile that can be of its cell, and what is assumed, said."""
     if asked.self_heating:
         model = replace(model, effects=warmed(model.cell, model.effects))

@@ -31,9 +31,9 @@ def simulate(
 ) -> None:
     """The physics model alone, under a current profile."""
     outputs.check_table(out, [cell, current])
-    from aesi.pipeline.simulation import Asked, simulate_file
+    from aesi.pipeline.simulation import ProfileRequest, simulate_file
 
-    asked = Asked(soc0, hold, reading, self_heating, soh)
+    asked = ProfileRequest(soc0, hold, reading, self_heating, soh)
     added = options.added_effects(effect, effect_file)
     run = simulate_file(cell, current, out, asked, added, model, options.say_notes)
     from aesi.over_time import extent
@@ -59,9 +59,9 @@ def predict(
 ) -> None:
     """A saved hybrid model with its intervals."""
     outputs.check_table(out, [model, current])
-    from aesi.pipeline.simulation import Asked, predict_file
+    from aesi.pipeline.simulation import ProfileRequest, predict_file
 
-    asked = Asked(soc0, hold, reading, self_heating, soh)
+    asked = ProfileRequest(soc0, hold, reading, self_heating, soh)
     rows = predict_file(model, current, out, asked, measured, options.say_notes)
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
