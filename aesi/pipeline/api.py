@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.calibration import Calibration
+from aesi.calibration import Calibration, Conditions
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, examined, read
@@ -108,19 +108,12 @@ def calibrate(
     check_soc(soc0)
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
-    declared, physics = given.cell, model or given.model
+    declared = given.cell
     measurements = _read_all(_listed(data), None, hold)
     check_records(measurements, temperatures_degc)
     check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    found = fit_cell(
-        declared,
-        measurements,
-        soc0=soc0,
-        temperatures_degc=temperatures_degc,
-        physics=physics,
-        dates=dates,
-        as_of=as_of,
-    )
+    conditions = Conditions(soc0, temperatures_degc or {}, dates or {}, as_of, model or given.model)
+    found = fit_cell(declared, measurements, conditions)
     return replace(found, notes=(*effects_left(given), *found.notes))
 
 

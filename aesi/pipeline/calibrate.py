@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from datetime import date
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aesi.calibration import Calibration, calibrate
+from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.start import sized
@@ -20,7 +19,7 @@ from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
-from aesi.physics.simulation import MODEL_WORDS, ModelName
+from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
@@ -38,24 +37,19 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True)
 class Request:
-    """What a calibration is asked for beside its records: see `aesi.calibration.calibrate`.
+    """What a calibration is asked for beside its records.
 
-    temperatures_degc, dates : by record name.  as_of : day of the file's state.  impedance : spectra to hold the result
-    against.  posterior : steps of each walker, 0 for none.  title : name of the cell that is written.  model : that is
-    fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else "espm".
-    same_cell : the file is of this very cell, see there.
+    conditions : of the records; where they name no model, that of a saved model is fitted, or that the file was fitted
+    with, else "espm".
+    impedance : spectra to hold the result against.  posterior : steps of each walker, 0 for none; seed : of these.
+    title : name of the cell that is written.
     """
 
-    soc0: float | None = None
-    temperatures_degc: Mapping[str, float] | None = None
-    dates: Mapping[str, date] | None = None
-    as_of: date | None = None
+    conditions: Conditions = field(default_factory=Conditions)
     impedance: tuple[Spectrum, ...] = ()
     posterior: int = 0
     seed: int = 0
     title: str | None = None
-    model: ModelName | None = None
-    same_cell: bool = False
 
 
 def calibrate_files(
@@ -66,21 +60,13 @@ def calibrate_files(
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
     asked = request or Request()
-    check_records(measurements, asked.temperatures_degc)
+    conditions = asked.conditions
+    check_records(measurements, conditions.temperatures_degc)
     check_posterior(asked.posterior)
     given = declared_model(cell)
-    declared, model = given.cell, asked.model or given.model
+    declared, model = given.cell, conditions.physics or given.model
     check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    found = calibrate(
-        declared,
-        measurements,
-        soc0=asked.soc0,
-        temperatures_degc=asked.temperatures_degc,
-        physics=model,
-        same_cell=asked.same_cell,
-        dates=asked.dates,
-        as_of=asked.as_of,
-    )
+    found = calibrate(declared, measurements, replace(conditions, physics=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None

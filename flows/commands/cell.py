@@ -116,20 +116,18 @@ def calibrate(
     """Fit the physics model's own parameters to measurements of any temperatures together."""
     outputs.check_json(out, [cell, *data])
     options.say_reading(data)
+    from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
 
-    request = Request(
-        soc0=soc0,
-        temperatures_degc=options.by_file("--temperature", temperature, data),
-        dates=options.dates(dates, data),
-        as_of=options.day("--as-of", as_of),
-        impedance=options.spectra(impedance),
-        posterior=posterior,
-        seed=seed,
-        title=title,
-        model=model,
+    conditions = Conditions(
+        soc0,
+        options.by_file("--temperature", temperature, data),
+        options.dates(dates, data),
+        options.day("--as-of", as_of),
+        model,
     )
+    request = Request(conditions, options.spectra(impedance), posterior, seed, title)
     records = options.measurements(data, reading, hold, options.by_file("--until", until, data))
     flow(cell, records, out, request)
 
