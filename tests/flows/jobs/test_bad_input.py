@@ -67,6 +67,6 @@ def test_a_job_that_is_refused_after_it_tracked_something_keeps_it(tracked):
             tracker.nested("candidate:1", "one", "candidate", {}, {})
             raise InputError("too late.")
 
-    with pytest.raises(InputError):
+    with pytest.raises(InputError, match="too late"):
         work()
     assert sorted(statuses("job")) == ["FAILED", "FINISHED"]
