@@ -293,6 +293,8 @@ def test_lists_of_files_may_follow_one_option():
     ]
     good = ["discover", "--good", "a", "b"]
     assert cli.repeated(good) == ["discover", "--good", "a", "--good", "b"]
+    spectra = ["calibrate", "--impedance", "a", "b"]
+    assert cli.repeated(spectra) == ["calibrate", "--impedance", "a", "--impedance", "b"]
     assert cli.repeated(["run", "--data", "a", "b"]) == ["run", "--data", "a", "b"]
 
 
