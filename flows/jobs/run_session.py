@@ -143,14 +143,17 @@ def _close(record: RunRecord, tracker: Tracker, status: str, wait_s: float) -> N
 
 
 def _withdraw(record: RunRecord, tracker: Tracker) -> None:
-    """Leave nothing of a run on disk and in the store, as far as they take it; the reason is on its way already."""
+    """Leave nothing of a run on disk and in the store; where the store does not take that, it has failed."""
     from mlflow.exceptions import MlflowException
 
+    try:
+        tracker.withdraw(wait_s=10)
+    except (OSError, MlflowException):
+        _close(record, tracker, "failed", wait_s=10)
+        return
     shutil.rmtree(environment.run_folder(record.experiment, record.run_id), ignore_errors=True)
     with suppress(OSError):
         record.forget()
-    with suppress(OSError, MlflowException):
-        tracker.withdraw(wait_s=10)
 
 
 def resume_key(config: ExperimentConfig) -> str:

@@ -202,11 +202,14 @@ class Tracker:
         return not self._tracked
 
     def withdraw(self, wait_s: float = FLUSH_S) -> None:
-        """Take the run back, as if it had never begun: MLflow keeps it among its deleted runs."""
-        self._stop.set()
+        """Take the run back, as if it had never begun: MLflow keeps it among its deleted runs.
+
+        Raises OSError or MlflowException where the store does not; the run can be ended then.
+        """
         self.flush(wait_s)
-        self._outbox.close()
         self.store.client.delete_run(self.run_id)
+        self._stop.set()
+        self._outbox.close()
 
     def _batch(
         self,

@@ -70,3 +70,17 @@ def test_a_job_that_is_refused_after_it_tracked_something_keeps_it(tracked):
     with pytest.raises(InputError, match="too late"):
         work()
     assert sorted(statuses("job")) == ["FAILED", "FINISHED"]
+
+
+def test_a_run_that_the_store_does_not_take_back_is_closed_as_failed(tracked, monkeypatch):
+    from flows.tracking.tracker import Tracker
+
+    def away(*_, **__):
+        raise ConnectionError("no answer")
+
+    monkeypatch.setattr(Tracker, "withdraw", away)
+    with pytest.raises(InputError, match="no"), tracked_job(Subject("job", 0, "key"), "title", Console()):
+        raise InputError("no.")
+    assert statuses("job") == ["FAILED"]
+    (record,) = records("job")
+    assert record.status == "failed"
