@@ -10,7 +10,7 @@ import numpy as np
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
-from aesi.physics.cell.bpx_transport import POINTS, check_kinetics, check_transport, inside_window
+from aesi.physics.cell.bpx_transport import POINTS, inside_window
 from aesi.physics.cell.parts import CellParameters, Electrode, require_positive
 from aesi.physics.cell.relations import Relation
 
@@ -71,8 +71,6 @@ def check_values(cell: CellParameters, where: str) -> None:
             )
     _check_capacity(cell, where)
     _check_full(cell, where)
-    check_transport(cell, where)
-    check_kinetics(cell, where)
     _check_temperature_dependence(cell, where)
     _check_thermal(cell, where)
 

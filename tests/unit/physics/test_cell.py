@@ -258,6 +258,14 @@ def test_a_value_in_another_unit_is_refused(content, section, field, factor, sen
         Cell.from_bpx(content)
 
 
+def test_a_fit_may_move_transport_further_than_a_file_declares_it(content):
+    fields = content["Parameterisation"]["Negative electrode"]
+    fields["Diffusivity [m2.s-1]"] *= 1e4
+    assert Cell.from_bpx(content, fitted=True).negative.diffusivity(np.array([0.5]))[0] == pytest.approx(
+        3.3e-10
+    )
+
+
 def test_electrodes_that_are_swapped_and_energies_in_kilojoule_are_refused(content):
     parts = content["Parameterisation"]
     negative, positive = parts["Negative electrode"], parts["Positive electrode"]
