@@ -10,10 +10,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from aesi.calibration.ageing import Ageing
-from aesi.calibration.conditions import Conditions
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import FitState, Model
 from aesi.calibration.parameters import free_parameters, with_interfaces
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
 from aesi.calibration.records.zero import zero_of

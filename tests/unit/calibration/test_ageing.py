@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from aesi.calibration.ageing import LOADED_SD, LOSS_SD, SLOW_SD, Ageing
-from aesi.calibration.conditions import Conditions
 from aesi.calibration.fit import problem
+from aesi.calibration.records.conditions import Conditions
 from aesi.errors import DataError
 
 DAYS = {"march": date(2017, 3, 11), "april": date(2017, 4, 11), "june": date(2017, 6, 7)}

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from aesi.calibration import calibrate
-from aesi.calibration.conditions import Conditions
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import sampled
+from aesi.calibration.records.conditions import Conditions
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
 from aesi.records import Measurement

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.calibration.conditions import Conditions
 from aesi.calibration.fit import problem
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.rewind import capacities
 from aesi.errors import DataError

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD
-from aesi.calibration.conditions import Conditions
 from aesi.calibration.fit import problem
 from aesi.calibration.parameters import with_interfaces
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.rewind import capacities, rewound
 from aesi.physics import simulate
 from aesi.records import Measurement

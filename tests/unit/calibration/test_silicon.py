@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from aesi.calibration.conditions import Conditions
 from aesi.calibration.fit import calibrate, problem
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.silicon import SILICON_V, silicon_edge, with_silicon
 from aesi.physics import simulate
 from aesi.records import Measurement
