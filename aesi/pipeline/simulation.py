@@ -19,6 +19,7 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
 from aesi.physics.effects.self_heating import of_file
+from aesi.physics.start.open_circuit import GIVEN_SD
 from aesi.pipeline.notes import temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -185,7 +186,7 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
             f"{record.name}: against the measured voltage {np.sqrt(np.mean(error**2)):.2f} mV RMSE, "
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
         )
-    beyond = (soc < 0.0) | (soc > 1.0)
+    beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
     window = (voltage_v < cell.lower_voltage_v) | (voltage_v > cell.upper_voltage_v)
     for rows, words in (
         (beyond, "a state of charge outside 0 to 1"),

@@ -13,7 +13,7 @@ from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
-from aesi.pipeline.simulation import predict_file, simulate_file
+from aesi.pipeline.simulation import predict_file, reached, simulate_file
 from aesi.sparse import SparseModel
 
 
@@ -217,3 +217,10 @@ def test_effects_and_their_defaults_were_simulated_without_a_word(model, record,
         say_notes=said.extend,
     )
     assert any(note.endswith(": with series_resistance(resistance_ohm=0.001).") for note in said)
+
+
+def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
+    voltage = np.full(len(data), 3.9)
+    for above, said in ((1e-12, False), (0.01, True)):
+        told = reached(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
+        assert any("a state of charge outside 0 to 1" in note for note in told) == said
