@@ -79,7 +79,7 @@ def main() -> NoReturn:
     raise SystemExit(0)
 
 
-LISTS = ("--data", "--test", "--good")
+LISTS = ("--data", "--test", "--good", "--impedance", "--effect-file")
 """Options that take several files."""
 
 

@@ -156,10 +156,6 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
     unknown = [r for r in answered if r["verdict"] == "unknown" and r["label"] not in ("none", "unknown")]
     claimed = [r for r in answered if r["verdict"] in ("found", "none")]
     covered = [{"covered": one} for r in named for one in r["parameters_covered"]]
-    confusion: dict[str, Counter[str]] = {}
-    for row in rows:
-        answer = "+".join([row["verdict"] if row["verdict"] != "found" else "", *row["effects"]]).strip("+")
-        confusion.setdefault(row["label"], Counter())[answer or "found nothing"] += 1
     return {
         "summary": True,
         "cases": len(rows),
@@ -192,8 +188,17 @@ def summary(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         "calibration": calibration(answered),
         "processor_s_median": _median([r["processor_s"] for r in rows]),
         "processor_s_most": max((r["processor_s"] for r in rows), default=None),
-        "confusion": {label: dict(counts) for label, counts in confusion.items()},
+        "confusion": _confusion(rows),
     }
+
+
+def _confusion(rows: Sequence[dict[str, Any]]) -> dict[str, dict[str, int]]:
+    """What was wrong -> what was answered -> how often."""
+    counts: dict[str, Counter[str]] = {}
+    for row in rows:
+        answer = "+".join([row["verdict"] if row["verdict"] != "found" else "", *row["effects"]]).strip("+")
+        counts.setdefault(row["label"], Counter())[answer or "found nothing"] += 1
+    return {label: dict(answers) for label, answers in counts.items()}
 
 
 def table(rows: Sequence[dict[str, Any]]) -> list[str]:

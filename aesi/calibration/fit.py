@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import date
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -14,6 +13,7 @@ from aesi.calibration.ageing import Ageing
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import FitState, Model
 from aesi.calibration.parameters import free_parameters, with_interfaces
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
 from aesi.calibration.records.zero import zero_of
@@ -34,7 +34,6 @@ from aesi.numerics.typing import Array
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.depletion import ran_out
-from aesi.physics.simulation import ModelName
 from aesi.records import Measurement
 
 EVALUATIONS = 100
@@ -52,28 +51,19 @@ NOTED_SILICON = 0.05
 def calibrate(
     cell: Cell,
     records: Sequence[Measurement],
+    conditions: Conditions | None = None,
     *,
-    soc0: float | None = None,
-    temperatures_degc: Mapping[str, float] | None = None,
     evaluations: int = EVALUATIONS,
-    physics: ModelName = "espm",
-    same_cell: bool = False,
-    dates: Mapping[str, date] | None = None,
-    as_of: date | None = None,
 ) -> Calibration:
     """Capacities, stoichiometry windows, potential, diffusion, kinetics, electrolyte and contacts, with temperature.
 
-    records : at least one, of any temperatures: their column, or `temperatures_degc` by name, or the cell file's.
-    soc0 : of every record that its voltage does not contradict.  physics : the model that is fitted.
-    same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
-    charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
-    of a full discharge.
-    dates : days of the records, by name: what is of another day may be of another age.  as_of : of the file's state,
-    the last with a load without it.  Records that share a name are numbered in what comes back.
+    records : at least one, of any temperatures: their column, or by `conditions`, or the cell file's; those that share
+    a name are numbered in what comes back.
+    evaluations : of the descent, at most.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
-    model, notes = problem(cell, records, soc0, temperatures_degc or {}, physics, same_cell, dates, as_of)
+    model, notes = problem(cell, records, conditions or Conditions())
     x = descended(model, evaluations)
     states = model.states(cell, x)
     jacobian, errors = model.jacobian(x), model.errors(x)
@@ -84,7 +74,7 @@ def calibrate(
     found, warmth = with_heat(rewound(model, x), model.records)
     shares = capacities(model, x)
     return Calibration(
-        cell=replace(found, fitted_with=physics, capacity_shares=tuple(shares.items())),
+        cell=replace(found, fitted_with=model.physics, capacity_shares=tuple(shares.items())),
         declared=cell,
         parameters=intervals(model, x, covariance),
         undetermined=undetermined(model, scaled),
@@ -103,38 +93,40 @@ def calibrate(
 
 
 def problem(
-    cell: Cell,
-    records: Sequence[Measurement],
-    soc0: float | None,
-    temperatures_degc: Mapping[str, float],
-    physics: ModelName = "espm",
-    same_cell: bool = False,
-    dates: Mapping[str, date] | None = None,
-    as_of: date | None = None,
+    cell: Cell, records: Sequence[Measurement], conditions: Conditions
 ) -> tuple[Model, tuple[str, ...]]:
     """What is fitted, and sentences on how it was set up."""
     if not records:
         raise DataError("give at least one record to calibrate with.")
-    records = named_apart(records, {"--temperature": temperatures_degc, "--date": dates or {}})
+    records = named_apart(
+        records, {"--temperature": conditions.temperatures_degc, "--date": conditions.dates}
+    )
     for record in records:
         check_voltage(cell, record)
-    start, notes = (cell, ()) if same_cell else sized(cell, records)
+    start, notes = (cell, ()) if conditions.same_cell else sized(cell, records)
     zero = zero_of(start, records)
-    if not same_cell:
+    if not conditions.same_cell:
         start, notes = sized(cell, [zero.taken_out(r, start.nominal_capacity_ah) for r in records])
     kept = [one_branch(start, data) for data in records]
-    placed, told = with_temperatures([data for data, _ in kept], temperatures_degc)
+    placed, told = with_temperatures(start, [data for data, _ in kept], conditions.temperatures_degc)
     start, typical = with_activation(start)
-    ready = prepared(start, placed, soc0, physics, same_cell)
+    physics = conditions.physics or "espm"
+    ready = prepared(start, placed, conditions.soc0, physics, conditions.same_cell)
     for one in ready:
         check_charge(start, one)
     span = _span_k(start, ready)
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
     start = with_interfaces(start)
-    ageing = Ageing.of(ready, dates or {}, as_of)
+    ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
     model = Model(
-        start, ready, free_parameters(start, span, same_cell), Shapes.over(start, span), zero, ageing, physics
+        start,
+        ready,
+        free_parameters(start, span, conditions.same_cell),
+        Shapes.over(start, span),
+        zero,
+        ageing,
+        physics,
     )
     taken = (*(s for r in ready for s in (r.start.sentence, hold_told(r))), *ageing.sentences)
     return model, (*notes, *zero.sentences, *(n for _, more in kept for n in more), *told, *typical, *taken)

@@ -12,6 +12,7 @@ Foreman-Mackey et al., PASP 125 (2013) 306, doi:10.1086/670067.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from aesi.numerics.typing import Array
 
 BURNT = 0.5
 """Share of the steps, at the start, that is thrown away."""
+FEWEST_STEPS = 4
+"""Of which half are burnt."""
 SPREAD = 0.5
 """Walkers start this many deviations of the linearised fit about it."""
 
@@ -52,17 +55,26 @@ class PosteriorSamples:
         )
 
 
+def check_posterior(steps: int) -> None:
+    """Raises InputError where emcee is not installed or the steps are too few; 0 draws nothing."""
+    if not steps:
+        return
+    if find_spec("emcee") is None:
+        raise InputError("--posterior needs emcee: pip install 'aesi[posterior]'.")
+    if steps < FEWEST_STEPS:
+        raise InputError(
+            f"--posterior {steps}: at least {FEWEST_STEPS} samples of each walker, some hundreds to be of use."
+        )
+
+
 def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
     """Draw from the posterior of the global parameters, `steps` of each walker.
 
-    Raises InputError where emcee is not installed or the steps are too few.
+    Raises what `check_posterior` raises.
     """
-    try:
-        import emcee
-    except ImportError:
-        raise InputError("--posterior needs emcee: pip install 'aesi[posterior]'.") from None
-    if steps < 4:
-        raise InputError(f"--posterior {steps}: at least four steps, some hundreds to be of use.")
+    check_posterior(steps)
+    import emcee
+
     model, n = found.model, len(found.model.free)
     jacobian, errors = model.jacobian(found.x), model.errors(found.x)
     weights = np.concatenate([*information_weights(model, errors), np.ones(model.layout.size)])
@@ -89,7 +101,8 @@ def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
     sampler.random_state = np.random.RandomState(seed).get_state()
     sampler.run_mcmc(start, steps)
     kept = sampler.get_chain(discard=int(BURNT * steps), flat=True)
-    autocorrelation = float(np.mean(emcee.autocorr.integrated_time(sampler.get_chain(), quiet=True)))
+    with np.errstate(invalid="ignore"):  # of walkers that never moved, whose time is NaN
+        autocorrelation = float(np.mean(emcee.autocorr.integrated_time(sampler.get_chain(), quiet=True)))
     if steps < 50.0 * autocorrelation:
         autocorrelation = np.nan
     return _summary(found, kept, float(np.mean(sampler.acceptance_fraction)), autocorrelation)

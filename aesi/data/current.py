@@ -9,6 +9,7 @@ from aesi.data.channels.checks import Columns, check_finite, check_time
 from aesi.data.channels.columns import map_columns
 from aesi.data.channels.gaps import find_gaps
 from aesi.data.channels.load_columns import load_columns
+from aesi.data.channels.stamps import time_doubts
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.read import measurement_in
 from aesi.data.readers import open_table
@@ -47,7 +48,7 @@ def read_current(path: str | Path, reading: Reading | None = None) -> CurrentPro
     data, context, _, notes = load_columns(table, told, needed)
     check_finite(data, context)
     check_time(data["time_s"], context)
-    notes += [*_over_gaps(data), *temperature_doubts(data, context)]
+    notes += [*_over_gaps(data), *time_doubts(data), *temperature_doubts(data, context)]
     return CurrentProfile(
         data["time_s"],
         data["current_a"],

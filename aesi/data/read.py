@@ -12,6 +12,7 @@ from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
 from aesi.data.channels.gaps import without_gaps
 from aesi.data.channels.implausible import check_scale, check_sign, check_signed, check_stuck
 from aesi.data.channels.load_columns import load_columns
+from aesi.data.channels.stamps import time_doubts
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
@@ -132,6 +133,7 @@ def _examine(
     check_ranges(data, context)
     data = without_gaps(data, context, notes)
     check_alive(data, context)
+    notes.extend(time_doubts(data))
     notes.extend(temperature_doubts(data, context))
     check_scale(data, context)
     check_signed(data, context, header)

@@ -151,7 +151,7 @@ class _Start:
         begun = first + drops[0]
         said = f"starts under {self.current_a:.3g} A at {self.record.voltage_v[0]:.3f} V"
         if self.open_circuit.charged(begun, drops[0]):
-            return self._full(begun, f"{said}, at rest {begun:.3f} V", None)
+            return self._full(begun, f"{said}, at rest {begun:.3f} V", None, drops[0])
         soc, sd, began_there = self.load.state_of_charge(first, drops)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
         words = (
@@ -160,7 +160,8 @@ class _Start:
         )
         return InitialState(self._declared(soc), sd, "load", words)
 
-    def _full(self, true_v: float, how: str, rest_v: float | None) -> InitialState:
+    def _full(self, true_v: float, how: str, rest_v: float | None, drop_v: float = 0.0) -> InitialState:
+        """drop_v : of `true_v`, what the model adds to the voltage as it was read."""
         inside, sd = self.open_circuit.soc_at(true_v), self.open_circuit.full_sd(true_v)
         above_v = true_v - self.cell.upper_voltage_v
         near = f"within {1e3 * CHARGED_V:.0f} mV of"
@@ -168,6 +169,11 @@ class _Start:
         if above_v > CHARGED_V:
             near = f"{1e3 * above_v:.0f} mV above"
             doubt = "; check the voltage's sensor, and the cell file, which may be another cell's"
+            if above_v - drop_v <= CHARGED_V:  # as it was read, the voltage is a full cell's
+                doubt = (
+                    f"; {1e3 * drop_v:.0f} mV of that are the drop that the model has at once, of which the cell may "
+                    "have had less by the first row"
+                )
         words = (
             f"{self.record.name} {how}, {near} the upper cut-off "
             f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge 1 +/- {sd:.4f} "

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.calibration import Calibration
+from aesi.calibration import Calibration, Conditions
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, examined, read
@@ -47,6 +47,8 @@ def discover(
     seed: int = 0,
     hold: Hold | None = None,
     effect_files: str | PathLike[str] | Sequence[str | PathLike[str]] = (),
+    only: str | Sequence[str] = (),
+    without: str | Sequence[str] = (),
     model: ModelName | None = None,
     soh: float | None = None,
     good: Data = (),
@@ -62,6 +64,7 @@ def discover(
     soc0 : state of charge at the first sample; None takes it from the voltage.
     hold : how the current runs between rows; None takes what the records say.
     effect_files : Python files with effects of your own; they are run, so name only files that you trust.
+    only, without : ids of effects that alone are tried, or that are not; what else they stand for is held.
     model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably.
     soh : share of the cell file's capacity that the cell had then; None takes all of it.
     good : measurements of the same cell that are known to be good: what is sought is what `data` have beside them.
@@ -78,7 +81,21 @@ def discover(
     check_measured(given.cell, [*measurements, *judged, *known])
     named = [effect_files] if isinstance(effect_files, str | PathLike) else effect_files
     files = tuple(Path(file) for file in named)
-    case = Case(given, measurements, judged, soc0, holdout, max_effects, seed, files, model=model, good=known)
+    case = Case(
+        given,
+        measurements,
+        judged,
+        soc0,
+        holdout,
+        max_effects,
+        seed,
+        files,
+        _names(only),
+        _names(without),
+        model,
+        good=known,
+    )
+    case.tried()  # refused before anything is searched
     finding = Finding(case, run_case(case, folder, progress))
     if folder is not None:
         finding.save(folder)
@@ -108,20 +125,17 @@ def calibrate(
     check_soc(soc0)
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
-    declared, physics = given.cell, model or given.model
+    declared = given.cell
     measurements = _read_all(_listed(data), None, hold)
     check_records(measurements, temperatures_degc)
     check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    found = fit_cell(
-        declared,
-        measurements,
-        soc0=soc0,
-        temperatures_degc=temperatures_degc,
-        physics=physics,
-        dates=dates,
-        as_of=as_of,
-    )
+    conditions = Conditions(soc0, temperatures_degc or {}, dates or {}, as_of, model or given.model)
+    found = fit_cell(declared, measurements, conditions)
     return replace(found, notes=(*effects_left(given), *found.notes))
+
+
+def _names(ids: str | Sequence[str]) -> tuple[str, ...]:
+    return (ids,) if isinstance(ids, str) else tuple(ids)
 
 
 def _check_asked(soc0: float | None, holdout: float | None, max_effects: int, seed: int) -> None:

@@ -4,60 +4,52 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
-from datetime import date
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from aesi.calibration import Calibration, calibrate
+from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
-from aesi.calibration.posterior import PosteriorSamples, sampled
+from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
-from aesi.physics.simulation import MODEL_WORDS, ModelName
-from aesi.pipeline.digits import resolving
+from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace
+from aesi.pipeline.report.words.calibrations import open_line, to_text
 from aesi.records import Measurement, Spectrum
 from aesi.tracer.case.checks import SHORTEST_S
 
 SCHEMA = "aesi.calibration/2"
-NAMED_OPEN = 3
-"""Parameters that the sentence on what is left open names: it is a line on a console, and the report has all."""
 ROUND_OFF = 1e-9
 """Share of a quantity: an interval narrower than this is none, since no parameter of the fit moves the quantity."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What a calibration is asked for beside its records: see `aesi.calibration.calibrate`.
+    """What a calibration is asked for beside its records.
 
-    temperatures_degc, dates : by record name.  as_of : day of the file's state.  impedance : spectra to hold the result
-    against.  posterior : steps of each walker, 0 for none.  title : name of the cell that is written.  model : that is
-    fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else "espm".
-    same_cell : the file is of this very cell, see there.
+    conditions : of the records; where they name no model, that of a saved model is fitted, or that the file was fitted
+    with, else "espm".
+    impedance : spectra to hold the result against.  posterior : steps of each walker, 0 for none; seed : of these.
+    title : name of the cell that is written.
     """
 
-    soc0: float | None = None
-    temperatures_degc: Mapping[str, float] | None = None
-    dates: Mapping[str, date] | None = None
-    as_of: date | None = None
+    conditions: Conditions = field(default_factory=Conditions)
     impedance: tuple[Spectrum, ...] = ()
     posterior: int = 0
     seed: int = 0
     title: str | None = None
-    model: ModelName | None = None
-    same_cell: bool = False
 
 
 def calibrate_files(
@@ -68,20 +60,13 @@ def calibrate_files(
     Raises CellError or DataError, one sentence, for what cannot be used.
     """
     asked = request or Request()
-    check_records(measurements, asked.temperatures_degc)
+    conditions = asked.conditions
+    check_records(measurements, conditions.temperatures_degc)
+    check_posterior(asked.posterior)
     given = declared_model(cell)
-    declared, model = given.cell, asked.model or given.model
+    declared, model = given.cell, conditions.physics or given.model
     check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    found = calibrate(
-        declared,
-        measurements,
-        soc0=asked.soc0,
-        temperatures_degc=asked.temperatures_degc,
-        physics=model,
-        same_cell=asked.same_cell,
-        dates=asked.dates,
-        as_of=asked.as_of,
-    )
+    found = calibrate(declared, measurements, replace(conditions, physics=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
@@ -256,92 +241,3 @@ def _of_posterior(posterior: PosteriorSamples | None, name: str) -> dict[str, fl
         return {}
     interval = posterior.intervals[name]
     return {"posterior_low": interval.low, "posterior_high": interval.high}
-
-
-def open_line(content: Mapping[str, Any]) -> str:
-    """What the records leave open, in one sentence; empty where they tell every parameter."""
-    left = content["undetermined"]
-    if not left:
-        return ""
-    heaviest = list(dict.fromkeys(max(o["weights"], key=lambda name: abs(o["weights"][name])) for o in left))
-    named = ", ".join(heaviest[:NAMED_OPEN]) + (" and others" if len(heaviest) > NAMED_OPEN else "")
-    return (
-        f"these records tell {len(content['parameters']) - len(left)} of {len(content['parameters'])} combinations of "
-        f"parameters better than their priors do; the others ({named}) stay near the priors"
-    )
-
-
-def to_text(content: dict[str, Any]) -> str:
-    """The report as Markdown."""
-    lines = [
-        f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", "",
-        "| file | mean temperature, degC | before, mV | after, mV | as simulated, mV | capacity |",
-        "|---|---|---|---|---|---|",
-    ]  # fmt: skip
-    lines += [
-        f"| {f['name']} | {_at(f['temperature_degc'], content['declared_degc'])} "
-        f"| {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} | {f['as_simulated_rmse_mv']:.2f} "
-        f"| {f['capacity_share']:.3f} |"
-        for f in content["files"]
-    ]
-    lines += [
-        "",
-        "Errors are RMSE on the data that were fitted: after, each record with what it has of its own (its capacity "
-        "over the file's, its start, its cycler's zero); as simulated, the file as it is on the current as measured.",
-        "",
-    ]
-    lines += ["| state of health | value | 95 % interval |", "|---|---|---|"]
-    lines += [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
-    lines += [
-        "",
-        "Of prior: the share of the prior's width that the records leave; of 100 % they say nothing.",
-        "",
-        "| parameter | value | 95 % interval | unit | of prior, % | prior from |",
-        "|---|---|---|---|---|---|",
-    ]
-    lines += [
-        f"| {name} | {_with_interval(p)} | {p['unit']} | {_percent(p['of_prior'])} | {p['prior_from']} |"
-        for name, p in content["parameters"].items()
-    ]
-    if content["impedance"]:
-        low, high = BAND_HZ
-        lines += ["", f"## Impedance, {low:g} to {high:g} Hz, nothing fitted to it", ""]
-        lines += [
-            "| spectrum | state of charge | degC | root mean square of the error of abs(Z), % |",
-            "|---|---|---|---|",
-        ]
-        lines += [
-            f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {_number(s['rms_pct'])} |"
-            for s in content["impedance"]
-        ]
-    sections = (
-        ("Left open by these data", [o["sentence"] for o in content["undetermined"]]),
-        ("On a bound", content["at_bounds"]),
-        ("Notes", content["notes"]),
-    )
-    for title, texts in sections:
-        if texts:
-            lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
-    return "\n".join(lines) + "\n"
-
-
-def _at(measured_degc: float | None, declared_degc: float) -> str:
-    """The temperature of a record, or that of the cell file, at which it was taken."""
-    return f"{declared_degc:.1f}, as declared" if measured_degc is None else _number(measured_degc)
-
-
-def _percent(share: float | None) -> str:
-    return "" if share is None else f"{100.0 * min(share, 1.0):.0f}"
-
-
-def _with_interval(row: Mapping[str, Any]) -> str:
-    """'14.298 | 14.293 to 14.303'."""
-    value, low, high = (row[key] for key in ("value", "low", "high"))
-    if low is None or high is None:
-        return f"{value:.4g} | not fitted; the notes say what it rests on"
-    n = resolving(value, low, high, least=4)
-    return f"{value:.{n}g} | {low:.{n}g} to {high:.{n}g}"
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None or not np.isfinite(value) else f"{value:.1f}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +13,6 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.effect import ActiveEffect
-from aesi.physics.effects import activated
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import without_energies
 from aesi.pipeline.product.declared import declared_model
@@ -42,23 +41,22 @@ def impedance_file(
     frequencies: str,
     out: Path,
     temperature_degc: float = 25.0,
-    effects: Sequence[tuple[str, Mapping[str, float]]] = (),
-    effect_files: Sequence[Path] = (),
+    effects: Sequence[ActiveEffect] = (),
     model: ModelName | None = None,
     soh: float | None = None,
     say_notes: SayNotes | None = None,
 ) -> ComplexArray:
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
 
-    cell : a BPX file, or a folder of a saved model, whose effects are taken.  frequencies : LOW:HIGH:N in Hz,
-    log-spaced, or a CSV with a column frequency_hz.  model : "espm" or "dfn"; None takes that of a saved model, or that
-    the cell's file was fitted with, else "espm".
+    cell : a BPX file, or a folder of a saved model, whose effects are taken.  effects : added to those.
+    frequencies : LOW:HIGH:N in Hz, log-spaced, or a CSV with a column frequency_hz.
+    model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
     soh : share of the file's capacity that the cell had then; None takes all of it.  say_notes : is given a sentence
     where the model has no double layer, and frequencies at which that shows.
     """
     declared = declared_model(cell).with_soh(soh)
     hz = read_frequencies(frequencies)
-    active = (*declared.effects, *activated(effects, effect_files))
+    active = (*declared.effects, *effects)
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:

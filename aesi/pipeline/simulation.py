@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,8 +18,8 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
-from aesi.physics.effects import activated
 from aesi.physics.effects.self_heating import of_file
+from aesi.physics.start.open_circuit import GIVEN_SD
 from aesi.pipeline.notes import temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -34,69 +34,71 @@ DIGITS = 9
 SayNotes = Callable[[Iterable[str]], None]
 
 
+@dataclass(frozen=True)
+class ProfileRequest:
+    """What is said of a profile beside its file.
+
+    soc0 : state of charge at the first row; None takes it from the file's voltage, where it has one (see
+    `initial_state`), else from the saved model.
+    hold : how the current runs between rows; None takes, for a simulation, straight lines for a profile alone and what
+    `assumed_hold` says for a measurement, and for a prediction the saved model's.
+    reading : how the file is read.
+    self_heating : the cell warms itself, by the thermal data of its file.
+    soh : share of the file's capacity that the cell had then; None takes all of it.
+    """
+
+    soc0: float | None = None
+    hold: Hold | None = None
+    reading: Reading | None = None
+    self_heating: bool = False
+    soh: float | None = None
+
+
 def simulate_file(
     cell: Path,
     current: Path,
     out: Path,
-    soc0: float | None = None,
-    effects: Sequence[tuple[str, Mapping[str, float]]] = (),
-    effect_files: Sequence[Path] = (),
-    hold: Hold | None = None,
-    reading: Reading | None = None,
-    say_notes: SayNotes | None = None,
+    asked: ProfileRequest | None = None,
+    effects: Sequence[ActiveEffect] = (),
     model: ModelName | None = None,
-    self_heating: bool = False,
-    soh: float | None = None,
+    say_notes: SayNotes | None = None,
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
-    soc0 : None takes it from the file's voltage, where it has one (see `initial_state`), else from the saved model.
-    hold : None takes straight lines for a profile alone, and what `assumed_hold` says for a measurement.
+    effects : added to those.
+    model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
     say_notes : is given what the reader dropped or mapped, what was assumed and what was reached, a sentence each.
-    model : "espm" or "dfn"; None takes that of a saved model, or that
-    the cell's file was fitted with, else "espm".
-    self_heating : the cell warms itself, by the thermal data of its file.
-    soh : share of the file's capacity that the cell had then; None takes all of it.
     Raises DataError where a measurement cannot be of this cell.
     """
-    say = say_notes or _silent
-    profile = read_current(current, reading)
+    asked, say = asked or ProfileRequest(), say_notes or _silent
+    profile = read_current(current, asked.reading)
     say(profile.notes)
-    declared = declared_model(cell).with_soh(soh)
+    declared = declared_model(cell).with_soh(asked.soh)
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
-    active = (*declared.effects, *activated(effects, effect_files))
-    if self_heating:
-        active = warmed(declared.cell, active)
-    record = _record(profile, current, hold)
-    taken = hold or ("linear" if profile.voltage_v is None else assumed_hold(profile.time_s))
-    check_belongs(declared.cell, [record])
-    used = replace(declared, effects=active, hold=taken, model=model or declared.model)
-    start = _start(used, record, soc0)
-    say(
-        [
-            *declared.cell.unread,
-            start.sentence,
-            hold_sentence(record.name, taken, hold is not None),
-            temperature_sentence(declared.cell, record, active),
-            *without_energies(declared.cell, [record.temperature_degc]),
-            *_with_effects(record, active),
-        ]
+    lone = profile.voltage_v is None
+    used = replace(
+        declared,
+        effects=(*declared.effects, *effects),
+        hold=asked.hold or ("linear" if lone else assumed_hold(profile.time_s)),
+        model=model or declared.model,
     )
+    placed = _placed(used, profile, current, asked, say)
+    used = placed.model
     run = simulate(
-        declared.cell,
+        used.cell,
         profile.time_s,
         profile.current_a,
-        start.soc,
-        active,
+        placed.start.soc,
+        used.effects,
         profile.temperature_degc,
-        taken,
+        used.hold,
         model=used.model,
     )
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out)
-    say(reached(declared.cell, record, run.voltage_v, run.series["soc"]))
+    say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     return run
 
 
@@ -104,45 +106,27 @@ def predict_file(
     model: Path,
     current: Path,
     out: Path,
+    asked: ProfileRequest | None = None,
     measured: bool = False,
-    soc0: float | None = None,
-    hold: Hold | None = None,
-    reading: Reading | None = None,
     say_notes: SayNotes | None = None,
-    self_heating: bool = False,
-    soh: float | None = None,
 ) -> int:
     """Predict the voltage of the profile in `current`, write it with its band to `out`; the number of rows.
 
-    measured : one step ahead from the file's voltage; otherwise a free run.  hold : None takes the saved model's.
-    say_notes, soh : as in `simulate_file`.  Raises DataError where a measurement cannot be of this cell.
+    measured : one step ahead from the file's voltage; otherwise a free run.  say_notes : as in `simulate_file`.
+    Raises DataError where a measurement cannot be of this cell.
     """
-    say = say_notes or _silent
-    profile = read_current(current, reading)
+    asked, say = asked or ProfileRequest(), say_notes or _silent
+    profile = read_current(current, asked.reading)
     say(profile.notes)
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
-    saved = HybridModel.load(model).with_soh(soh)
-    hybrid = replace(saved, hold=hold or saved.hold)
-    if self_heating:
-        hybrid = replace(hybrid, effects=warmed(hybrid.cell, hybrid.effects))
-    record = _record(profile, current, hold)
-    check_belongs(hybrid.cell, [record])
-    start = _start(hybrid, record, soc0)
-    say(
-        [
-            *hybrid.cell.unread,
-            start.sentence,
-            hold_sentence(record.name, hybrid.hold, hold is not None),
-            temperature_sentence(hybrid.cell, record, hybrid.effects),
-            *without_energies(hybrid.cell, [record.temperature_degc]),
-            *_with_effects(record, hybrid.effects),
-        ]
-    )
+    saved = HybridModel.load(model).with_soh(asked.soh)
+    placed = _placed(replace(saved, hold=asked.hold or saved.hold), profile, current, asked, say)
+    hybrid, record = placed.model, placed.record
     prediction = hybrid.predict(
         profile.time_s,
         profile.current_a,
-        soc0=start.soc,
+        soc0=placed.start.soc,
         voltage_v=profile.voltage_v if measured else None,
         temperature_degc=profile.temperature_degc,
     )
@@ -152,6 +136,37 @@ def predict_file(
     say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc))
     say(_of_band(record, prediction, hybrid.correction is not None))
     return len(frame)
+
+
+@dataclass(frozen=True, eq=False)
+class _Placed:
+    """A model on a profile.  record : the profile, NaN for a voltage that is not there.  start : at its first row."""
+
+    model: HybridModel
+    record: Measurement
+    start: InitialState
+
+
+def _placed(
+    model: HybridModel, profile: CurrentProfile, file: Path, asked: ProfileRequest, say: SayNotes
+) -> _Placed:
+    """The model as it is asked for on a profile that can be of its cell, and what is assumed, said."""
+    if asked.self_heating:
+        model = replace(model, effects=warmed(model.cell, model.effects))
+    record = _record(profile, file, asked.hold)
+    check_belongs(model.cell, [record])
+    start = _start(model, record, asked.soc0)
+    say(
+        [
+            *model.cell.unread,
+            start.sentence,
+            hold_sentence(record.name, model.hold, asked.hold is not None),
+            temperature_sentence(model.cell, record, model.effects),
+            *without_energies(model.cell, [record.temperature_degc]),
+            *_with_effects(record, model.effects),
+        ]
+    )
+    return _Placed(model, record, start)
 
 
 def _with_effects(record: Measurement, effects: Sequence[ActiveEffect]) -> list[str]:
@@ -171,7 +186,7 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
             f"{record.name}: against the measured voltage {np.sqrt(np.mean(error**2)):.2f} mV RMSE, "
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
         )
-    beyond = (soc < 0.0) | (soc > 1.0)
+    beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
     window = (voltage_v < cell.lower_voltage_v) | (voltage_v > cell.upper_voltage_v)
     for rows, words in (
         (beyond, "a state of charge outside 0 to 1"),

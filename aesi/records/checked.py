@@ -13,8 +13,14 @@ def numbers(values: object, name: str) -> Array:
 
     name : how the sentence calls it.
     Raises DataError for what conversion would refuse without saying which (text), or take for other numbers (dates,
-    whose unit is the library's own; complex ones).
+    whose unit is the library's own; complex ones; what is masked).
     """
+    if np.ma.isMaskedArray(values):
+        masked = np.argwhere(np.atleast_1d(np.ma.getmaskarray(values)))
+        if len(masked):
+            raise DataError(
+                f"{name} is masked in {row_words(int(masked[0, 0]))}; drop or fill what is masked first."
+            )
     kind = np.asarray(values).dtype.kind
     if kind in "mM":
         raise DataError(

@@ -50,6 +50,11 @@ def state() -> Path:
     return workspace() / ".aesi"
 
 
+def run_folder(experiment: str, run_id: str) -> Path:
+    """Where a run of an experiment keeps its results."""
+    return workspace() / "runs" / experiment / run_id
+
+
 def prepare_process() -> None:
     """Set what is not set: one thread a process (processes are the unit of parallel work), no telemetry."""
     for name in THREAD_VARIABLES:

@@ -20,7 +20,7 @@ import optuna
 
 from aesi.sparse import Candidate, Genome, Problem
 from aesi.sparse.search.genome_space import GenomeSpace
-from flows.search.nsga2 import search
+from flows.search.nsga2 import SearchSettings, search
 
 SHARED_CANDIDATES = 10
 """On SQLite, where the peer takes seconds for one."""
@@ -61,15 +61,8 @@ def _ours(terms: int, candidates: int, population: int, seed: int, url: str | No
 
     problem = cast(Problem, SimpleNamespace(library=range(terms)))
     started = time.process_time()
-    search(
-        problem,
-        candidates,
-        seed,
-        url,
-        evaluate_many=evaluate_many,
-        space=GenomeSpace(terms),
-        population=population,
-    )
+    settings = SearchSettings(population, space=GenomeSpace(terms))
+    search(problem, candidates, seed, settings, storage=url, evaluate_many=evaluate_many)
     return 1e3 * (time.process_time() - started) / candidates
 
 

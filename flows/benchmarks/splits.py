@@ -142,14 +142,15 @@ def _row(run: SplitRun) -> CaseRow:
 
 def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float], Sequence[Fitted]]:
     """The stages of `aesi run`, untracked: what was loaded, validation MSER (per cent), the models of Table 1."""
-    from aesi.pipeline.experiment.candidate import genome_space, top_share, weights
+    from aesi.pipeline.experiment.candidate import top_share
     from aesi.pipeline.experiment.fit import build_problem, final_models
     from aesi.pipeline.experiment.intervals.conformalise import conformalise
     from aesi.pipeline.experiment.judging.validation import validation_mser
     from aesi.pipeline.experiment.load import load
     from aesi.sparse import Candidate
     from aesi.sparse.search.pick.average import averaged
-    from flows.search.nsga2 import Constraints, search
+    from flows.search.nsga2 import search
+    from flows.search.study import settings_of
 
     loaded = load(config)
     problem = build_problem(loaded, config)
@@ -157,13 +158,9 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
     found = search(
         problem,
         config.search.candidates,
-        seed=config.seed,
+        config.seed,
+        settings_of(problem, config),
         on_candidate=lambda number, _, outcome: known.__setitem__(number, outcome),
-        space=genome_space(problem, config),
-        population=config.search.population,
-        constraints=Constraints(config.search.pearson_train, config.search.pearson_valid),
-        weights=weights(config),
-        warm_start=None if config.search.warm_start else (),
     )
     chosen = averaged([known[number] for number in found.fittest(top_share(config))])
     fitted = conformalise(final_models(problem, chosen, config), problem, chosen, config, loaded.left_out)

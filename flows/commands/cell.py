@@ -31,22 +31,11 @@ def simulate(
 ) -> None:
     """The physics model alone, under a current profile."""
     outputs.check_table(out, [cell, current])
-    from aesi.pipeline.simulation import simulate_file
+    from aesi.pipeline.simulation import ProfileRequest, simulate_file
 
-    run = simulate_file(
-        cell,
-        current,
-        out,
-        soc0=soc0,
-        soh=soh,
-        effects=[options.effect_values(text) for text in effect or []],
-        effect_files=effect_file or [],
-        hold=hold,
-        reading=reading,
-        say_notes=options.say_notes,
-        model=model,
-        self_heating=self_heating,
-    )
+    asked = ProfileRequest(soc0, hold, reading, self_heating, soh)
+    added = options.added_effects(effect, effect_file)
+    run = simulate_file(cell, current, out, asked, added, model, options.say_notes)
     from aesi.over_time import extent
 
     low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
@@ -69,21 +58,11 @@ def predict(
     self_heating: options.SelfHeating = False,
 ) -> None:
     """A saved hybrid model with its intervals."""
-    outputs.check_table(out, [current])
-    from aesi.pipeline.simulation import predict_file
+    outputs.check_table(out, [model, current])
+    from aesi.pipeline.simulation import ProfileRequest, predict_file
 
-    rows = predict_file(
-        model,
-        current,
-        out,
-        measured=measured,
-        soc0=soc0,
-        soh=soh,
-        hold=hold,
-        reading=reading,
-        say_notes=options.say_notes,
-        self_heating=self_heating,
-    )
+    asked = ProfileRequest(soc0, hold, reading, self_heating, soh)
+    rows = predict_file(model, current, out, asked, measured, options.say_notes)
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
 
@@ -137,27 +116,27 @@ def calibrate(
     """Fit the physics model's own parameters to measurements of any temperatures together."""
     outputs.check_json(out, [cell, *data])
     options.say_reading(data)
+    from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
 
-    request = Request(
-        soc0=soc0,
-        temperatures_degc=options.by_file("--temperature", temperature, data),
-        dates=options.dates(dates, data),
-        as_of=options.day("--as-of", as_of),
-        impedance=options.spectra(impedance),
-        posterior=posterior,
-        seed=seed,
-        title=title,
-        model=model,
+    conditions = Conditions(
+        soc0,
+        options.by_file("--temperature", temperature, data),
+        options.dates(dates, data),
+        options.day("--as-of", as_of),
+        model,
     )
+    request = Request(conditions, options.spectra(impedance), posterior, seed, title)
     records = options.measurements(data, reading, hold, options.by_file("--until", until, data))
     flow(cell, records, out, request)
 
 
 def impedance(
     cell: options.CellOption,
-    soc: Annotated[float, typer.Option(min=0.0, max=1.0, help="State of charge at rest.")],
+    soc: Annotated[
+        float, typer.Option(callback=options.share("--soc"), help="State of charge at rest, from 0 to 1.")
+    ],
     frequencies: Annotated[
         str, typer.Option(help="CSV with a column frequency_hz, or LOW:HIGH:N for N of them, log-spaced.")
     ],
@@ -178,8 +157,7 @@ def impedance(
         frequencies,
         out,
         temperature_degc,
-        [options.effect_values(text) for text in effect or []],
-        effect_file or [],
+        options.added_effects(effect, effect_file),
         model,
         soh,
         options.say_notes,
@@ -252,7 +230,7 @@ def discover(
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
     if out is not None:
-        outputs.check_folder(out)
+        outputs.check_folder(out, [cell] if cell else [])
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
         options.say_reading([experiment])

@@ -104,10 +104,12 @@ def candidate(
     """A candidate of a search made again from the tracking store alone, with its model."""
     outputs.check_folder(out)
     from flows.base.console import Console
+    from flows.base.folder_lock import alone_in
     from flows.results.candidate import Differs, rebuild, said, save
 
     rebuilt = rebuild(run_id, uri)
-    save(rebuilt, out)
+    with alone_in(out):
+        save(rebuilt, out)
     Console().say(said(rebuilt, out))
     if rebuilt.differing:
         raise Differs(rebuilt)

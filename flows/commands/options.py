@@ -14,6 +14,7 @@ from aesi.errors import InputError
 
 if TYPE_CHECKING:
     from aesi.data.reading import Reading
+    from aesi.physics import ActiveEffect
     from aesi.records import Hold, Measurement, Spectrum
 
 Value = TypeVar("Value")
@@ -23,18 +24,23 @@ CellOption = Annotated[
 ]
 
 
-def _share(value: float | None) -> float | None:
-    """Raises InputError for a state of charge that is no share."""
-    if value is not None and not 0.0 <= value <= 1.0:
-        raise InputError(
-            f"--soc0 {value:g}: a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % is 0.9."
-        )
-    return value
+def share(option: str) -> Callable[[float | None], float | None]:
+    """What lets a state of charge through, and raises InputError, naming the option, for one that is no share."""
+
+    def checked(value: float | None) -> float | None:
+        if value is not None and not 0.0 <= value <= 1.0:
+            raise InputError(
+                f"{option} {value:g}: a state of charge is a share of the capacity, from 0 (empty) to 1 (full); 90 % "
+                "is 0.9."
+            )
+        return value
+
+    return checked
 
 
 Soc0 = Annotated[
     float | None,
-    typer.Option("--soc0", callback=_share, help="State of charge at the first row, from 0 to 1."),
+    typer.Option("--soc0", callback=share("--soc0"), help="State of charge at the first row, from 0 to 1."),
 ]
 Soh = Annotated[
     float | None,
@@ -284,7 +290,14 @@ def say_notes(notes: Iterable[str]) -> None:
         typer.echo(note, err=True)
 
 
-def effect_values(text: str) -> tuple[str, dict[str, float]]:
+def added_effects(texts: list[str] | None, files: list[Path] | None) -> tuple[ActiveEffect, ...]:
+    """The effects of `--effect id:parameter=value,...`, of the catalogue and of the user's files."""
+    from aesi.physics.effects import activated
+
+    return activated([_effect_values(text) for text in texts or []], files or [])
+
+
+def _effect_values(text: str) -> tuple[str, dict[str, float]]:
     """`id:parameter=value,...` as the id and its values."""
     name, _, rest = text.partition(":")
     values: dict[str, float] = {}

@@ -8,14 +8,19 @@ from pathlib import Path
 
 from aesi.errors import InputError
 
+MODEL = "model"
+"""The folder of the model within a folder of results."""
 OTHER_FORMATS = (".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5")
 
 
 def check_file(out: Path, inputs: Iterable[Path] = ()) -> None:
-    """Raises InputError where `out` cannot be a file to write, or is one of the files that are read."""
+    """Raises InputError where `out` cannot be a file to write, or is one of the files that are read.
+
+    inputs : files, and folders of saved models, whose files are read.
+    """
     if out.is_dir():
         raise InputError(f"--out {out} is a folder; name the file to write.")
-    if any(out.exists() and given.exists() and out.samefile(given) for given in inputs):
+    if out.exists() and any(_lies_in(out, given) for given in inputs):
         raise InputError(f"--out {out} is a file that is read, and would be lost; give another name.")
     if out.exists() and not os.access(out, os.W_OK):
         raise InputError(f"--out {out} is there and may not be written over; give another name.")
@@ -36,12 +41,21 @@ def check_json(out: Path, inputs: Iterable[Path] = ()) -> None:
         raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
 
 
-def check_folder(out: Path) -> None:
-    """Raises InputError where `out` cannot be a folder to write to; one that is there is kept, and its files may be
-    replaced."""
+def check_folder(out: Path, inputs: Iterable[Path] = ()) -> None:
+    """Raises InputError where `out` cannot be a folder to write to, or the model in it is one that is read; one that is
+    there is kept, and its files may be replaced."""
     if out.exists() and not out.is_dir():
         raise InputError(f"--out {out} is a file; name a folder.")
+    if any(_lies_in(given, out / MODEL) for given in inputs):
+        raise InputError(
+            f"--out {out}: the model in it is the one that is read, and would be lost; name another folder."
+        )
     _check_place(out)
+
+
+def _lies_in(file: Path, place: Path) -> bool:
+    """Is a file or folder that is there the place, or in it?"""
+    return place.exists() and file.resolve().is_relative_to(place.resolve())
 
 
 def _check_place(folder: Path) -> None:

@@ -16,6 +16,7 @@ from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
 from flows.base.console import Console, duration
+from flows.base.folder_lock import alone_in
 from flows.base.interrupt import kept_on_interrupt
 from flows.evaluation.spread import in_processes, on_dask
 from flows.jobs.run_session import tracked_job
@@ -39,14 +40,14 @@ def batch(
     """Run the jobs of a folder or table; the rows of the summary, which is written anew after each.
 
     soh : state of health of every cell that the plan gives none.
-    Raises InputError for a plan that cannot be read; a job that fails is a row with its reason.
+    Raises InputError for a plan that cannot be read, and where another process writes to `out` now; a job that fails is
+    a row with its reason.
     """
     environment.prepare_process()
     console = Console()
     started = time.monotonic()
     settings = settings or Settings()
     jobs = read_plan(source, cell, soh)
-    out.mkdir(parents=True, exist_ok=True)
     cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
     console.say(f"{cells} from {source}; results in {out}")
     if empty := without_records(source):
@@ -59,7 +60,7 @@ def batch(
         )
     rows: dict[str, dict[str, Any]] = {}
     kept = f"What is done is kept in {out}; the same command goes on from there."
-    with kept_on_interrupt(kept), _tracked(jobs, settings, source, console) as tracker:
+    with alone_in(out), kept_on_interrupt(kept), _tracked(jobs, settings, source, console) as tracker:
         for row in _rows(jobs, out, settings, workers, runner, address):
             rows[row["name"]] = row
             told = row["finding"] if row["status"] == "done" else f"failed: {row['reason']}"

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from aesi.pipeline.calibrate import Request, calibrate_files, open_line
+from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.notes import together
+from aesi.pipeline.report.words.calibrations import open_line
 from aesi.records import Measurement
 from flows.base import environment
 from flows.base.console import Console

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from aesi.constants import MV_PER_V
 from flows.base import environment
 from flows.base.console import Console, duration
+from flows.base.folder_lock import alone_in
 from flows.base.interrupt import kept_on_interrupt
 from flows.jobs.run_session import tracked_job
 
@@ -43,7 +44,12 @@ def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tu
 
 
 def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str) -> dict[str, Any]:
-    """The flow itself; `run` runs a stage."""
+    """The flow itself; `run` runs a stage.  Raises InputError where another process writes to `out` now."""
+    with alone_in(out):
+        return _trace(case, out, run, console, experiment)
+
+
+def _trace(case: Case, out: Path, run: Stages, console: Console, experiment: str) -> dict[str, Any]:
     from aesi.pipeline.discovery.discover import ARCHIVE, run_case, write_discovery
 
     started = time.monotonic()

@@ -64,7 +64,7 @@ def _stages(
     config = loaded.config  # that of the fallback where it fell back to one
     for note in together(loaded.notes):
         console.say(f"  {note}")
-    folder = environment.workspace() / "runs" / config.name / tracker.run_id
+    folder = environment.run_folder(config.name, tracker.run_id)
     track_start(tracker, config, loaded, folder)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
     follow = CandidateTracker(tracker, config, loaded, problem)

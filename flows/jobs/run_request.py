@@ -20,6 +20,7 @@ class RunRequest:
     address: str | None = None
     resume: bool = False
     use_cache: bool = True
+    use_prefect: bool = True
 
     def config(self) -> ExperimentConfig:
         """The experiment with all overrides.  Raises InputError for an address that nobody would go to."""
@@ -43,4 +44,5 @@ class RunRequest:
         words += [word for text in self.overrides for word in ("--set", text)]
         words += ["--runner", self.runner] if self.runner else []
         words += ["--address", self.address] if self.address else []
+        words += [] if self.use_prefect else ["--no-prefect"]
         return shlex.join([*words, "--resume"])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import errno
+import shutil
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from aesi.errors import AesiError
+from aesi.errors import AesiError, InputError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment, fingerprint
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
     from flows.tracking.tracker import Subject, Tracker
 
 UNFINISHED = ("running", "killed", "failed")
+BAD_INPUT = InputError.exit_code
+"""Some of its kind are not: data that are away are nobody's fault."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
@@ -69,12 +72,21 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
 
 @contextmanager
 def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> Iterator[None]:
-    """Within, this process works on the run; it is closed as finished, failed or killed."""
+    """Within, this process works on the run; it is closed as finished, failed or killed.
+
+    One that ends at bad input before anything came of it is taken back: nothing has run.
+    """
     with RunLock(tracker.run_id):
         try:
             yield
         except KeyboardInterrupt:
             _close(record, tracker, "killed", wait_s=5)
+            raise
+        except InputError as error:
+            if tracker.empty and error.exit_code == BAD_INPUT:
+                _withdraw(record, tracker)
+            else:
+                _close(record, tracker, "failed", wait_s=10)
             raise
         except BaseException:
             _close(record, tracker, "failed", wait_s=10)
@@ -128,6 +140,20 @@ def _close(record: RunRecord, tracker: Tracker, status: str, wait_s: float) -> N
         replace(record, status=status).write()
     with suppress(OSError):
         tracker.end(status.upper(), wait_s)
+
+
+def _withdraw(record: RunRecord, tracker: Tracker) -> None:
+    """Leave nothing of a run on disk and in the store; where the store does not take that, it has failed."""
+    from mlflow.exceptions import MlflowException
+
+    try:
+        tracker.withdraw(wait_s=10)
+    except (OSError, MlflowException):
+        _close(record, tracker, "failed", wait_s=10)
+        return
+    shutil.rmtree(environment.run_folder(record.experiment, record.run_id), ignore_errors=True)
+    with suppress(OSError):
+        record.forget()
 
 
 def resume_key(config: ExperimentConfig) -> str:

@@ -40,7 +40,7 @@ def start(
     environment.prepare_process()
     from aesi.pipeline.experiment.sources import check_roles, check_there
 
-    request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache)
+    request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache, use_prefect)
     config = request.config()  # bad input is refused before anything is started
     check_roles(config)
     check_there(config)

@@ -13,7 +13,7 @@ them and however many at a time.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import optuna
@@ -50,40 +50,53 @@ class Constraints:
         }
 
 
+@dataclass(frozen=True)
+class SearchSettings:
+    """How a search goes about it.
+
+    population : candidates in a generation.  weights : of the scalar fitness.
+    space : of the genomes; None takes the default one of the problem's library.
+    warm_start : genomes to begin with; None takes `GenomeSpace.plain_starts`, () none.
+    """
+
+    population: int = 20
+    constraints: Constraints = Constraints()
+    weights: FitnessWeights = field(default_factory=FitnessWeights)
+    space: GenomeSpace | None = None
+    warm_start: Sequence[Genome] | None = None
+
+
 def search(
     problem: Problem,
     n_trials: int,
     seed: int = 0,
+    settings: SearchSettings | None = None,
+    *,
     storage: str | Path | BaseStorage | None = None,
     name: str = "aesi",
+    shared: bool = False,
     on_candidate: OnCandidate | None = None,
     evaluate_one: Callable[[Problem, Genome], Outcome] = evaluate,
     evaluate_many: EvaluateMany | None = None,
-    space: GenomeSpace | None = None,
-    population: int = 20,
-    constraints: Constraints | None = None,
-    weights: FitnessWeights | None = None,
-    warm_start: Sequence[Genome] | None = None,
-    shared: bool = False,
 ) -> SearchResult:
     """Search until the study holds `n_trials` finished trials; continue what `storage` already holds.
 
     storage : None keeps the study in memory; a path is a journal file; a URL (with ://) a database. Workers
     that share a storage and `name` share the study.
-    on_candidate : called with index, genome and outcome as each is evaluated.
-    evaluate_one : what evaluates a candidate; evaluate_many, if given, evaluates a generation instead.
-    population : candidates in a generation.
-    warm_start : genomes to begin with; None takes `GenomeSpace.plain_starts`, () none.
     shared : other processes work on the study now; then indices under evaluation are marked in the storage
     (a candidate that two take in the same instant is evaluated twice).
+    on_candidate : called with index, genome and outcome as each is evaluated.
+    evaluate_one : what evaluates a candidate; evaluate_many, if given, evaluates a generation instead.
     The same seed gives the same candidates, interrupted or not, as long as one process searches.
-    Exceptions of the evaluation are bugs: what the generation has finished is stored, and they propagate.
+    Raises ConfigError for a space of another library. Exceptions of the evaluation are bugs: what the generation has
+    finished is stored, and they propagate.
     """
-    space = space or GenomeSpace.of(problem.library)
+    settings = settings or SearchSettings()
+    space = settings.space or GenomeSpace.of(problem.library)
     if space.size != len(problem.library):
         raise ConfigError(f"the genome space has {space.size} terms, the library {len(problem.library)}.")
-    constraints = constraints or Constraints()
-    sampler = TermSampler(space, seed, population, space.plain_starts() if warm_start is None else warm_start)
+    starts = space.plain_starts() if settings.warm_start is None else settings.warm_start
+    sampler = TermSampler(space, seed, settings.population, starts)
     study = _open(storage, name, sampler)
 
     def one_by_one(genomes: Sequence[Genome]) -> Iterable[tuple[int, Outcome]]:
@@ -93,13 +106,13 @@ def search(
         _generation(
             study,
             sampler,
-            min(missing, population),
+            min(missing, settings.population),
             evaluate_many or one_by_one,
-            constraints,
+            settings.constraints,
             on_candidate,
             shared,
         )
-    return SearchResult.of(study, space.size, weights or FitnessWeights())
+    return SearchResult.of(study, space.size, settings.weights)
 
 
 def _generation(

@@ -20,7 +20,7 @@ from flows.base.console import Console
 from flows.evaluation.generation import Evaluation, Tally
 from flows.evaluation.open_pool import open_pool
 from flows.evaluation.outcome_store import Outcomes, open_outcomes
-from flows.search.nsga2 import Constraints, search
+from flows.search.nsga2 import Constraints, SearchSettings, search
 from flows.search.published_study import PublishedStudy
 from flows.search.result import SearchResult
 
@@ -94,10 +94,11 @@ def run_study(
     scored: dict[int, ScoredCandidate | Failed] = {}
     waiting: dict[Genome, list[ScoredCandidate | Failed]] = {}
     started = time.monotonic()
-    space = genome_space(problem, config)
-    constraints = Constraints(config.search.pearson_train, config.search.pearson_valid)
+    settings = settings_of(problem, config)
+    constraints = settings.constraints
     published = None
     if publish_as:
+        space = genome_space(problem, config)
         published = PublishedStudy(publish_as, config.runner.storage, constraints, space, console.say)
 
     def evaluate_many(genomes: Sequence[Genome]) -> Iterator[tuple[int, Candidate | Failed]]:
@@ -121,14 +122,10 @@ def run_study(
         result = search(
             problem,
             config.search.candidates,
-            seed=config.seed,
+            config.seed,
+            settings,
             on_candidate=on_candidate,
             evaluate_many=evaluate_many,
-            space=space,
-            population=config.search.population,
-            constraints=constraints,
-            weights=weights(config),
-            warm_start=None if config.search.warm_start else (),
         )
     finally:
         pool.close()
@@ -139,6 +136,18 @@ def run_study(
     chosen = averaged([_alive(number, scored[number]) for number in numbers])
     key = fingerprint.key(*(evaluation.key(genome) for genome in chosen.genomes))
     return Found(result, numbers, chosen, key, scored)
+
+
+def settings_of(problem: Problem, config: ExperimentConfig) -> SearchSettings:
+    """How an experiment searches."""
+    asked = config.search
+    return SearchSettings(
+        asked.population,
+        Constraints(asked.pearson_train, asked.pearson_valid),
+        weights(config),
+        genome_space(problem, config),
+        None if asked.warm_start else (),
+    )
 
 
 def _alive(number: int, outcome: ScoredCandidate | Failed) -> Candidate:

@@ -36,6 +36,10 @@ class RunRecord:
         # The address of a store may hold a password.
         write_whole(_folder() / f"{self.run_id}.json", json.dumps(asdict(self)), READ_BY_OWNER)
 
+    def forget(self) -> None:
+        """Take it off the disk."""
+        (_folder() / f"{self.run_id}.json").unlink(missing_ok=True)
+
 
 def records(experiment: str | None = None) -> list[RunRecord]:
     """All records, newest first; unreadable ones are left out."""

@@ -196,6 +196,21 @@ class Tracker:
         self._outbox.close()
         return left
 
+    @property
+    def empty(self) -> bool:
+        """Whether nothing has been tracked below the parent run."""
+        return not self._tracked
+
+    def withdraw(self, wait_s: float = FLUSH_S) -> None:
+        """Take the run back, as if it had never begun: MLflow keeps it among its deleted runs.
+
+        Raises OSError or MlflowException where the store does not; the run can be ended then.
+        """
+        self.flush(wait_s)
+        self.store.client.delete_run(self.run_id)
+        self._stop.set()
+        self._outbox.close()
+
     def _batch(
         self,
         params: dict[str, str] | None = None,

@@ -16,7 +16,7 @@ from aesi.physics.effects import CATALOGUE, activated, known_effects, load_effec
 from aesi.pipeline.discovery.discover import Case, write_discovery
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
-from aesi.pipeline.simulation import predict_file, simulate_file
+from aesi.pipeline.simulation import ProfileRequest, predict_file, simulate_file
 from aesi.records import Measurement
 from aesi.tracer import discover
 
@@ -88,9 +88,8 @@ def test_it_is_simulated_from_a_file_on_the_command_line(file, measured, bare, c
         CELL,
         measured[0],
         tmp_path / "out.csv",
-        soc0=SOC0,
-        effects=[("lead", {"lead_ohm": LEAD_OHM})],
-        effect_files=[file],
+        ProfileRequest(soc0=SOC0),
+        effects=activated([("lead", {"lead_ohm": LEAD_OHM})], [file]),
     )
     assert run.voltage_v == pytest.approx(bare - LEAD_OHM * current, abs=1e-9)
     assert "lead_v" in (tmp_path / "out.csv").read_text().splitlines()[0]
@@ -108,8 +107,8 @@ def test_it_is_found_reported_saved_simulated_and_predicted(file, cell, measured
         assert values == {name: pytest.approx(p["value"]) for name, p in named.items()}
     assert content["effects"] == ["lead"]
     assert "V_cell - I R" in (tmp_path / "report.html").read_text()
-    simulate_file(tmp_path / "model", measured[0], tmp_path / "simulated.csv", soc0=SOC0)
-    predict_file(tmp_path / "model", measured[0], tmp_path / "predicted.csv", soc0=SOC0)
+    simulate_file(tmp_path / "model", measured[0], tmp_path / "simulated.csv", ProfileRequest(soc0=SOC0))
+    predict_file(tmp_path / "model", measured[0], tmp_path / "predicted.csv", ProfileRequest(soc0=SOC0))
     for name in ("simulated.csv", "predicted.csv"):
         table = np.genfromtxt(tmp_path / name, delimiter=",", names=True)
         assert table["voltage_v"] == pytest.approx(bare - LEAD_OHM * current, abs=2e-3)

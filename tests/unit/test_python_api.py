@@ -103,6 +103,12 @@ def test_a_long_test_is_drawn_in_hours(record):
     assert slow.plot().data[0].x[-1] == pytest.approx(1799 / 60)
 
 
+def test_a_discovery_in_python_could_not_be_asked_for_some_effects_alone(cell, record):
+    found = aesi.discover(cell, record, soc0=SOC0, only="series_resistance")
+    assert found.content["tried"] == ["series_resistance"]
+    assert any(note.startswith("tried alone: series_resistance;") for note in found.notes)
+
+
 def test_a_discovery_takes_records_and_gives_table_plot_and_model(cell, record, tmp_path, monkeypatch):
     few = {name: CATALOGUE[name] for name in ("series_resistance", "voltage_sensor_offset")}
     monkeypatch.setattr("aesi.pipeline.discovery.discover.known_effects", lambda files: few)
@@ -189,6 +195,10 @@ def test_a_discovery_takes_files(cell, record, tmp_path, monkeypatch):
         ),
         ({"current_a": ["rest"] * len(TIME)}, "current_a holds 'rest', which is not a number"),
         ({"current_a": 1j * TIME}, "current_a holds complex numbers"),
+        (
+            {"current_a": np.ma.masked_array(TIME, mask=np.arange(len(TIME)) == 3)},
+            "current_a is masked in row 4, counted from 1; drop or fill what is masked first",
+        ),
         ({"current_a": np.full(len(TIME), np.nan)}, "current_a is nan in row 1, counted from 1"),
         ({"time_s": TIME[::-1]}, r"time_s does not increase at 1798 s \(row 2, counted from 1\)"),
         ({"time_s": 3.0}, r"time_s and current_a have shapes \(\) and \(1800,\)"),
@@ -246,6 +256,11 @@ def test_columns_that_are_no_measurement_are_refused(columns, sentence):
             r"voltage_v is nan at 1 s \(row 2, counted from 1\)",
         ),
         ({"effect_files": "mine.py"}, "there is no effect file .*mine.py"),
+        ({"only": "serie_resistance"}, "there is no effect 'serie_resistance'"),
+        (
+            {"only": ["film_growth"], "without": "film_growth"},
+            "named both to be tried alone and to be left out",
+        ),
         ({"out": __file__}, "cannot be a folder"),
     ],
 )

@@ -118,10 +118,11 @@ def hold_told(record: Prepared) -> str:
 
 
 def with_temperatures(
-    records: Sequence[Measurement], degc: Mapping[str, float]
+    cell: Cell, records: Sequence[Measurement], degc: Mapping[str, float]
 ) -> tuple[tuple[Measurement, ...], tuple[str, ...]]:
     """The records with given temperatures (by name) where they have no column, and sentences on what is used.
 
+    cell : at whose temperature the others are taken.
     Raises DataError for a temperature of a record that is not among them, or that has a column of its own.
     """
     known = {r.name for r in records}
@@ -145,7 +146,10 @@ def with_temperatures(
             low, high = float(record.temperature_degc.min()), float(record.temperature_degc.max())
             notes.append(f"{record.name}: at its measured temperature, {low:.1f} to {high:.1f} degC.")
         else:
-            notes.append(f"{record.name}: no temperature; taken at that of the cell file.")
+            declared = cell.initial_temperature_k - ZERO_CELSIUS_K
+            notes.append(
+                f"{record.name}: no temperature in it; taken at {declared:.4g} degC, as the cell's file declares."
+            )
         out.append(record)
     return tuple(out), tuple(notes)
 

@@ -278,7 +278,7 @@ class _Finder:
         said = headers.unit_of(quantity, name)
         if said is not None and said != units.SI[quantity]:
             raise DataError(
-                f"{self._file}: column {name!r} is in {said.lower()} by its name, and {quantity} is needed in "
+                f"{self._file}: column {name!r} is in {said} by its name, and {quantity} is needed in "
                 f"{units.SI[quantity]}; declare it: --unit {quantity}={said}."
             )
         if headers.unit_in(name).lower() in STRANGE_UNITS[quantity]:

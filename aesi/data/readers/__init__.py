@@ -5,6 +5,7 @@ A cycler's text export needs no reader of its own: its names, units and sign are
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Collection
 from pathlib import Path
 
@@ -15,6 +16,7 @@ GZIP_MAGIC = b"\x1f\x8b"
 PARQUET_MAGIC = b"PAR1"
 XLSX_MAGIC = b"PK\x03\x04"
 XLS_MAGIC = b"\xd0\xcf\x11\xe0"
+JSON_MAGIC = b"{"
 MATLAB_MAGIC = (b"MATLAB", b"\x89HDF")
 
 
@@ -47,6 +49,11 @@ def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
         raise DataError(f"{file.name} is an old Excel workbook (.xls); save it as .xlsx or CSV.")
     if magic.startswith(MATLAB_MAGIC):
         raise DataError(f"{file.name} is a MATLAB or HDF5 file; export time, current and voltage as CSV.")
+    if magic.removeprefix(codecs.BOM_UTF8).lstrip().startswith(JSON_MAGIC):
+        raise DataError(
+            f"{file.name} is JSON, which holds no record: a table is read as CSV, Excel or Parquet, and a cell's file "
+            "is given as --cell."
+        )
     from aesi.data.readers.text import TextTable
 
     return TextTable(file, compressed=magic.startswith(GZIP_MAGIC), wanted=wanted)

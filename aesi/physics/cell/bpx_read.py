@@ -8,6 +8,7 @@ from typing import Any
 
 from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
+from aesi.physics.cell.bpx_transport import check_kinetics, check_transport
 from aesi.physics.cell.bpx_unread import unread
 from aesi.physics.cell.bpx_values import check_values
 from aesi.physics.cell.parts import (
@@ -34,13 +35,18 @@ DEFAULT_TEMPERATURE_K = 298.15
 Fields = Mapping[str, Any]
 
 
-def read_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> CellParameters:
+def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = False) -> CellParameters:
     """See `Cell.from_bpx`."""
     v1, where = load_bpx(source)
     try:
-        return _cell(v1, where)
+        cell = _cell(v1, where)
     except KeyError as error:
         raise CellError(f"{where}: the field {error.args[0]!r} is missing, which this model needs.") from None
+    check_values(cell, where)
+    if not fitted:
+        check_transport(cell, where)
+        check_kinetics(cell, where)
+    return cell
 
 
 def _cell(v1: dict[str, Any], where: str) -> CellParameters:
@@ -51,7 +57,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
     thermal = state.get("Thermal environment") or {}
     reference = float(fields.get("Reference temperature [K]") or DEFAULT_TEMPERATURE_K)
     user = parts.get("User-defined") or {}
-    cell = CellParameters(
+    return CellParameters(
         negative=_electrode(parts["Negative electrode"], user, "Negative", where),
         separator=_separator(parts["Separator"]),
         positive=_electrode(parts["Positive electrode"], user, "Positive", where),
@@ -77,8 +83,6 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         references=str(header.get("References") or ""),
         unread=unread(v1),
     )
-    check_values(cell, where)
-    return cell
 
 
 def _optional(fields: Fields, name: str) -> float | None:

@@ -27,12 +27,13 @@ class Cell(CellParameters):
         return f"Cell({self.name!r}, {self.nominal_capacity_ah:g} Ah, {window})"
 
     @classmethod
-    def from_bpx(cls, source: str | PathLike[str] | Mapping[str, Any]) -> Self:
+    def from_bpx(cls, source: str | PathLike[str] | Mapping[str, Any], fitted: bool = False) -> Self:
         """Read a BPX file (a path) or what it holds (a dict), versions 0.x and 1.x.
 
+        fitted : it is of a saved model, and a fit may have moved transport and kinetics beyond what tells another unit.
         Raises CellError, one sentence, for a file that fails the schema or lacks a field this model needs.
         """
-        return cls(**vars(read_bpx(source)))
+        return cls(**vars(read_bpx(source, fitted)))
 
     def to_bpx(self) -> dict[str, Any]:
         """The cell as a BPX 1.x dict; `Cell.from_bpx` gives the cell back."""

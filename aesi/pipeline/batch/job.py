@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from aesi.calibration import Conditions
 from aesi.data.reading import Reading
 from aesi.errors import AesiError
 from aesi.numerics.files.source_digest import source_digest
@@ -114,7 +115,7 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
     if job.specimen:
         calibrated = folder / "calibrated.bpx.json"
         report = calibrate_files(
-            job.cell, case.measurements, calibrated, Request(soc0=job.soc0, same_cell=True)
+            job.cell, case.measurements, calibrated, Request(Conditions(soc0=job.soc0, same_cell=True))
         )
         for name, estimate in report["health"].items():
             row |= {name: estimate["value"], f"{name}_low": estimate["low"], f"{name}_high": estimate["high"]}

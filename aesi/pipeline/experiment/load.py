@@ -21,9 +21,10 @@ from aesi.pipeline.experiment.drives import by_role, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
-from aesi.pipeline.experiment.sources import cell_path, check_roles, sources_of
+from aesi.pipeline.experiment.sources import Sources, cell_path, check_roles, sources_of
 from aesi.pipeline.notes import temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, LeftOutDrives, Split, hold_sentence
 
 DFN_NOTE = "The physics is the porous electrode: DFN in tables and figures, where others have ESPM."
@@ -100,39 +101,21 @@ def _called(config: ExperimentConfig) -> str:
 
 def _load(config: ExperimentConfig) -> Loaded:
     path = cell_path(config)
-    given = declared_model(path).with_soh(config.cell.soh)
-    cell, effects = given.cell, (*given.effects, *_effects(config))
-    model = config.cell.model or given.model
+    file = declared_model(path).with_soh(config.cell.soh)
+    given = replace(file, effects=(*file.effects, *_effects(config)), model=config.cell.model or file.model)
+    cell, hold = given.cell, config.data.hold
     sources = sources_of(config, path)
-    soc0: dict[str, float] = {}
-    notes = [*cell.unread]
-    records: dict[str, FitRecord] = {}
-    for name, (measurement, known_soc0) in sources.records.items():
-        check_measured(cell, [measurement])
-        declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        start = initial_state(cell, measurement, declared, config.data.hold, effects, model=model)
-        soc0[name] = start.soc
-        notes += [
-            start.sentence,
-            hold_sentence(
-                measurement.name, config.data.hold, "hold" in config.data.model_fields_set, "data.hold: "
-            ),
-            temperature_sentence(cell, measurement, effects),
-        ]
-        even = to_even(measurement, config.data.dt_s)
-        notes.extend(even.notes)
-        records[name] = no_rows(even, start.soc)
-    notes.extend(without_energies(cell, (m.temperature_degc for m, _ in sources.records.values())))
+    records, told = _on_grid(config, given, sources)
+    notes = [*cell.unread, *told]
     drives = training_drives(config.data, records, sources.roles)
     for name, rows in drives:
         records[name].rows[rows] = True
-    hold = config.data.hold
-    physics = physics_models(cell, effects, records, hold, config.cell.start, model=model)
+    physics = physics_models(cell, given.effects, records, hold, config.cell.start, model=given.model)
     training = TrainingDrives(config, records, drives, sources.roles)
     left_out = None
     if config.cell.start == "recalibrated" and len(drives) > 1:
         physics, left_out = training.left_out(physics)
-    if model == "dfn":
+    if given.model == "dfn":
         notes.append(DFN_NOTE)
     series, empty = series_under(physics, records, config)
     for name, record in records.items():
@@ -148,15 +131,38 @@ def _load(config: ExperimentConfig) -> Loaded:
     return Loaded(
         cell=chosen.cell,
         cell_name=cell.name or path.stem,
-        effects=effects,
+        effects=given.effects,
         split=split,
         left_out=left_out or training.as_they_are(split.train),
-        soc0={name: chosen.soc0(each) for name, each in soc0.items()},
+        soc0={name: chosen.soc0(record.soc0) for name, record in records.items()},
         digests={name: measurement.digest for name, (measurement, _) in sources.records.items()},
         notes=tuple(notes),
         config=config,
-        model=model,
+        model=given.model,
     )
+
+
+def _on_grid(
+    config: ExperimentConfig, given: HybridModel, sources: Sources
+) -> tuple[dict[str, FitRecord], list[str]]:
+    """The records in even rows, each with its state of charge at the first of them and no row seen by a fit yet; and
+    what was assumed and done to them, in sentences.
+
+    Raises DataError where one cannot be of the cell.
+    """
+    cell, data = given.cell, config.data
+    records: dict[str, FitRecord] = {}
+    notes: list[str] = []
+    for name, (measurement, known_soc0) in sources.records.items():
+        check_measured(cell, [measurement])
+        declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
+        start = initial_state(cell, measurement, declared, data.hold, given.effects, model=given.model)
+        held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: ")
+        even = to_even(measurement, data.dt_s)
+        notes += [start.sentence, held, temperature_sentence(cell, measurement, given.effects), *even.notes]
+        records[name] = no_rows(even, start.soc)
+    notes += without_energies(cell, (m.temperature_degc for m, _ in sources.records.values()))
+    return records, notes
 
 
 def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:

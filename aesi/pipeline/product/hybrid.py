@@ -117,7 +117,7 @@ class HybridModel:
         correction, intervals, bands = (parts.get(name) for name in ("correction", "intervals", "bands"))
         try:
             return HybridModel(
-                cell=Cell.from_bpx(part_file(folder, "cell.bpx")),
+                cell=Cell.from_bpx(part_file(folder, "cell.bpx"), fitted=True),
                 effects=tuple(active_effect(content) for content in parts.get("effects", ())),
                 correction=SparseModel.from_dict(correction) if correction else None,
                 intervals=calibrated_from_dict(intervals) if intervals else None,

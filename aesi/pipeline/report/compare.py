@@ -27,7 +27,7 @@ COLUMNS = {
     "recalibrated/test_rmse_mv": "recalibrated, test, mV",
     "after/test_rmse_mv": "with the finding, test, mV",
     "confidence": "confidence",
-    "seconds": "seconds",
+    "seconds": "fit and evaluation, s",
 }
 """MLflow's name of a metric -> heading; a column is shown where a run has it, in mV where it is tracked in V."""
 MOST_COLUMNS = 40

@@ -65,6 +65,10 @@ def test_usage_errors_are_exit_code_2(call, arguments):
             ["impedance", "--cell", LG_M50, "--soc", "0.5", "--frequencies", "1:10", "--out", "z.csv"],
             "--frequencies 1:10: has to read LOW:HIGH:N",
         ),
+        (
+            ["impedance", "--cell", LG_M50, "--soc", "50", "--frequencies", "1:10:3", "--out", "z.csv"],
+            "--soc 50: a state of charge is a share of the capacity",
+        ),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, words):
@@ -110,6 +114,24 @@ def test_a_file_that_is_read_is_never_written_over(call, cell, current, tmp_path
     assert code == 2
     assert "is a file that is read, and would be lost; give another name" in err
     assert mine[out].read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("command", "out"),
+    [
+        (("export", "--to", "bpx", "--cell"), "found/model/cell.bpx.json"),
+        (("discover", "--data", "drive.csv", "--cell"), "found"),
+    ],
+)
+def test_a_model_that_is_read_was_written_over(call, cell, tmp_path, command, out):
+    from aesi.pipeline.product.declared import declared_model
+
+    model = declared_model(Path(cell)).save(tmp_path / "found" / "model")
+    before = {file.name: file.read_bytes() for file in model.iterdir()}
+    code, _, err = call(*command, model, "--out", tmp_path / out)
+    assert code == 2
+    assert "would be lost" in err
+    assert {file.name: file.read_bytes() for file in model.iterdir()} == before
 
 
 @pytest.mark.parametrize(
@@ -271,6 +293,8 @@ def test_lists_of_files_may_follow_one_option():
     ]
     good = ["discover", "--good", "a", "b"]
     assert cli.repeated(good) == ["discover", "--good", "a", "--good", "b"]
+    spectra = ["calibrate", "--impedance", "a", "b"]
+    assert cli.repeated(spectra) == ["calibrate", "--impedance", "a", "--impedance", "b"]
     assert cli.repeated(["run", "--data", "a", "b"]) == ["run", "--data", "a", "b"]
 
 

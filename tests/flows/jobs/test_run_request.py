@@ -56,3 +56,8 @@ def test_a_run_was_gone_on_with_on_other_data_or_by_another_version(tmp_path, mo
     assert changed != before
     monkeypatch.setattr("flows.jobs.run_session.source_digest", lambda: "another")
     assert resume_key(config) != changed
+
+
+def test_a_run_without_prefect_was_told_to_go_on_with_it(path):
+    assert RunRequest(path, use_prefect=False).resuming == f"aesi run {path} --no-prefect --resume"
+    assert RunRequest(path).resuming == f"aesi run {path} --resume"

@@ -7,7 +7,7 @@ import pytest
 from aesi.errors import FitError
 from aesi.records import Failed
 from aesi.sparse import FitnessWeights, Genome, evaluate
-from flows.search.nsga2 import Constraints, search
+from flows.search.nsga2 import Constraints, SearchSettings, search
 
 
 def genomes(result):
@@ -15,14 +15,14 @@ def genomes(result):
 
 
 def test_the_same_seed_gives_the_same_search(problem):
-    one, two = (search(problem, 12, seed=3, population=4) for _ in range(2))
+    one, two = (search(problem, 12, seed=3, settings=SearchSettings(4)) for _ in range(2))
     assert genomes(one) == genomes(two)
     assert [t.losses for t in one.trials] == [t.losses for t in two.trials]
-    assert genomes(search(problem, 12, seed=4, population=4)) != genomes(one)
+    assert genomes(search(problem, 12, seed=4, settings=SearchSettings(4))) != genomes(one)
 
 
 def test_an_interrupted_search_goes_on_as_if_it_had_not_been(problem, tmp_path):
-    whole = search(problem, 12, seed=3, population=4)
+    whole = search(problem, 12, seed=3, settings=SearchSettings(4))
     journal = tmp_path / "study" / "journal.log"
     calls = 0
 
@@ -34,14 +34,14 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(problem, tmp_path):
         return evaluate(p, genome)
 
     with pytest.raises(KeyboardInterrupt):
-        search(problem, 12, seed=3, storage=journal, population=4, evaluate_one=stops)
-    resumed = search(problem, 12, seed=3, storage=journal, population=4)
+        search(problem, 12, seed=3, storage=journal, settings=SearchSettings(4), evaluate_one=stops)
+    resumed = search(problem, 12, seed=3, storage=journal, settings=SearchSettings(4))
     assert genomes(resumed) == genomes(whole)
     assert [t.losses for t in resumed.trials] == [t.losses for t in whole.trials]
 
 
 def test_importances_of_genes_come_without_warnings_of_optuna(problem, recwarn):
-    shares = search(problem, 24, seed=3, population=8).importances()
+    shares = search(problem, 24, seed=3, settings=SearchSettings(8)).importances()
     assert sum(shares.values()) == pytest.approx(1.0)
     assert not [str(one.message) for one in recwarn]
 
@@ -52,16 +52,21 @@ def test_the_order_of_evaluation_does_not_matter(problem):
 
     seen = []
     result = search(
-        problem, 8, seed=3, population=4, evaluate_many=backwards, on_candidate=lambda n, g, o: seen.append(n)
+        problem,
+        8,
+        seed=3,
+        settings=SearchSettings(4),
+        evaluate_many=backwards,
+        on_candidate=lambda n, g, o: seen.append(n),
     )
-    assert genomes(result) == genomes(search(problem, 8, seed=3, population=4))
+    assert genomes(result) == genomes(search(problem, 8, seed=3, settings=SearchSettings(4)))
     assert seen == [3, 2, 1, 0, 7, 6, 5, 4]
 
 
 def test_warm_start_and_failures_are_in_the_study(problem):
     good = Genome.whole(problem.library, 1e-2, 1e-3, 0.5, 2, 2, feedback=False)
     empty = Genome.of(np.zeros(len(problem.library), dtype=bool), 1.0, 0.1, 0.5, 1, 1)
-    result = search(problem, 4, seed=0, population=4, warm_start=(good, empty))
+    result = search(problem, 4, seed=0, settings=SearchSettings(4, warm_start=(good, empty)))
     assert genomes(result)[:2] == [good, empty]
     assert "no term is left" in result.trials[1].reason
     assert result.study.trials[1].state == optuna.trial.TrialState.PRUNED
@@ -77,7 +82,7 @@ def test_a_bug_in_the_evaluation_is_not_swallowed(problem):
 
 
 def test_all_infeasible_is_one_clear_error(problem):
-    result = search(problem, 4, seed=0, population=4, constraints=Constraints(2.0, 2.0))
+    result = search(problem, 4, seed=0, settings=SearchSettings(4, Constraints(2.0, 2.0)))
     with pytest.raises(FitError, match=r"none of 4 candidates is feasible .*correlation"):
         result.best()
 
@@ -89,7 +94,7 @@ def test_all_failed_is_one_clear_error(problem):
 
 
 def test_the_front_is_not_dominated_and_the_pick_lies_on_it(problem):
-    result = search(problem, 30, seed=1, population=10)
+    result = search(problem, 30, seed=1, settings=SearchSettings(10))
     front = result.front()
     assert front
     for trial in front:
@@ -108,7 +113,7 @@ def test_the_front_is_not_dominated_and_the_pick_lies_on_it(problem):
 
 
 def test_parents_are_the_elite_of_all_earlier_generations(problem):
-    result = search(problem, 24, seed=3, population=4)
+    result = search(problem, 24, seed=3, settings=SearchSettings(4))
     chosen = {
         int(key.rsplit(":", 1)[1]): {result.study.trials[number].user_attrs["index"] for number in numbers}
         for key, numbers in result.study._storage.get_study_system_attrs(result.study._study_id).items()
@@ -122,15 +127,15 @@ def test_parents_are_the_elite_of_all_earlier_generations(problem):
 
 
 def test_evolution_beats_the_random_start(problem):
-    result = search(problem, 80, seed=2, population=10)
+    result = search(problem, 80, seed=2, settings=SearchSettings(10))
     score = [t.numbers.get("fitness", -np.inf) for t in result.trials]
     assert max(score[10:]) > max(score[:10])
 
 
 def test_two_workers_share_a_study_without_drawing_the_same_point(problem, tmp_path):
     url = f"sqlite:///{tmp_path / 'study.db'}"
-    first = search(problem, 4, seed=0, storage=url, population=4, shared=True)
-    both = search(problem, 8, seed=0, storage=url, population=4, shared=True)
+    first = search(problem, 4, seed=0, storage=url, settings=SearchSettings(4), shared=True)
+    both = search(problem, 8, seed=0, storage=url, settings=SearchSettings(4), shared=True)
     assert [trial.number for trial in both.trials] == list(range(8))
     assert genomes(both)[:4] == genomes(first)
     assert len(set(genomes(both))) == 8
@@ -143,16 +148,18 @@ def test_what_another_worker_evaluates_now_is_left_alone(problem, tmp_path):
     def meanwhile(p, genome):
         if not started:
             started.append(True)
-            other = search(problem, 2, seed=0, storage=journal, population=4, shared=True)
+            other = search(problem, 2, seed=0, storage=journal, settings=SearchSettings(4), shared=True)
             assert [trial.number for trial in other.trials] == [4, 5]
         return evaluate(p, genome)
 
-    both = search(problem, 6, seed=0, storage=journal, population=4, shared=True, evaluate_one=meanwhile)
+    both = search(
+        problem, 6, seed=0, storage=journal, settings=SearchSettings(4), shared=True, evaluate_one=meanwhile
+    )
     assert [trial.number for trial in both.trials] == [0, 1, 2, 3, 4, 5]
 
 
 def test_the_fittest_are_a_share_of_all_and_begin_with_the_pick(problem):
-    result = search(problem, 30, seed=1, population=10)
+    result = search(problem, 30, seed=1, settings=SearchSettings(10))
     numbers = result.fittest(0.1)
     assert len(set(numbers)) == len(numbers) == 3
     assert numbers[0] == result.best().trial.number

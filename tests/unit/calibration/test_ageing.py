@@ -8,6 +8,7 @@ import pytest
 
 from aesi.calibration.ageing import LOADED_SD, LOSS_SD, SLOW_SD, Ageing
 from aesi.calibration.fit import problem
+from aesi.calibration.records.conditions import Conditions
 from aesi.errors import DataError
 
 DAYS = {"march": date(2017, 3, 11), "april": date(2017, 4, 11), "june": date(2017, 6, 7)}
@@ -77,8 +78,8 @@ def test_a_date_of_no_record_is_refused():
 
 def test_the_slopes_follow_a_shared_course(start, records):
     dates = {"at_25": DAYS["march"], "at_0": DAYS["june"]}
-    model = problem(start, records, None, {}, dates=dates)[0]
-    model_back = problem(start, records[::-1], None, {}, dates=dates)[0]
+    model = problem(start, records, Conditions(dates=dates))[0]
+    model_back = problem(start, records[::-1], Conditions(dates=dates))[0]
     for each in (model, model_back):
         x = 0.1 * np.sin(np.arange(each.layout.size))
         jacobian = each.jacobian(x)

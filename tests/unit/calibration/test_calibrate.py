@@ -1,5 +1,6 @@
 """Calibration over temperatures: recovery, the temperature as an input, intervals, what stays open."""
 
+import warnings
 from dataclasses import replace
 from datetime import date
 
@@ -10,6 +11,7 @@ from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import sampled
+from aesi.calibration.records.conditions import Conditions
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -86,24 +88,24 @@ def test_the_temperature_column_alone_changes_the_answer(start, records, found):
 
 def test_a_record_without_the_column_takes_the_temperature_that_is_given_for_it(start, records, found):
     bare = [replace(r, temperature_degc=None) for r in records]
-    given = problem(start, bare, None, {"at_25": 25.0, "at_0": 0.0})[0]
-    measured = problem(start, records, None, {})[0]
+    given = problem(start, bare, Conditions(temperatures_degc={"at_25": 25.0, "at_0": 0.0}))[0]
+    measured = problem(start, records, Conditions())[0]
     x = np.linspace(-0.2, 0.2, given.layout.size)
     assert given.residual(x) == pytest.approx(measured.residual(x), abs=1e-9)
-    without = problem(start, bare, None, {})
+    without = problem(start, bare, Conditions())
     assert len(without[0].free) < len(given.free)  # nothing tells energies
-    assert any("taken at that of the cell file" in note for note in without[1])
+    assert any("taken at 25 degC, as the cell's file declares" in note for note in without[1])
 
 
 def test_a_temperature_that_cannot_be_used_is_refused(start, records):
     with pytest.raises(DataError, match="no such record"):
-        calibrate(start, records, temperatures_degc={"elsewhere": 5.0})
+        calibrate(start, records, Conditions(temperatures_degc={"elsewhere": 5.0}))
     with pytest.raises(DataError, match="measured temperature of its own"):
-        calibrate(start, records, temperatures_degc={"at_0": 5.0})
+        calibrate(start, records, Conditions(temperatures_degc={"at_0": 5.0}))
 
 
 def test_the_slopes_are_those_of_the_residual(start, records):
-    model = problem(start, records, None, {})[0]
+    model = problem(start, records, Conditions())[0]
     x = 0.1 * np.sin(np.arange(model.layout.size))
     jacobian = model.jacobian(x)
     for j in (0, 4, model.layout.shapes.start + 5, model.layout.soc(1), model.layout.age(0)):
@@ -123,17 +125,27 @@ def test_the_posterior_says_how_far_the_linear_intervals_were_off(found):
     assert posterior.accepted > 0.05
 
 
-def test_a_posterior_of_too_few_steps_is_refused(found):
+def test_a_posterior_of_too_few_samples_is_refused(found):
     pytest.importorskip("emcee")
-    with pytest.raises(InputError, match="four steps"):
+    with pytest.raises(InputError, match="--posterior 2: at least 4 samples"):
         sampled(found, 2)
+
+
+@pytest.mark.slow
+def test_a_chain_whose_walkers_stand_still_warned_of_a_division(found):
+    pytest.importorskip("emcee")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "too short" in sampled(found, 4, seed=1).sentence
 
 
 def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of_half_a_volt(start):
     time = np.arange(0.0, 5200.0, 2.0)
     current = np.where(time < 60, 0.0, 0.75 * start.nominal_capacity_ah)
     voltage = simulate(start.with_soh(1.12), time, current, 1.0, (), None, "backward").voltage_v
-    found = calibrate(start, [Measurement(time, current, voltage, name="longer", hold="backward")], soc0=1.0)
+    found = calibrate(
+        start, [Measurement(time, current, voltage, name="longer", hold="backward")], Conditions(soc0=1.0)
+    )
     (note,) = (n for n in found.notes if "runs empty" in n)
     assert note.startswith("longer: ")
     assert "in the declared cell at" in note
@@ -145,7 +157,10 @@ def test_the_declared_cell_was_judged_on_a_record_of_another_day_with_a_loss_tha
     (record,) = records[:1]
     plain = calibrate(start, [record], evaluations=1)
     dated = calibrate(
-        start, [record], evaluations=1, dates={record.name: date(2024, 1, 1)}, as_of=date(2023, 1, 1)
+        start,
+        [record],
+        Conditions(dates={record.name: date(2024, 1, 1)}, as_of=date(2023, 1, 1)),
+        evaluations=1,
     )
     assert dated.errors[0].before_v == plain.errors[0].before_v
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from aesi.calibration import calibrate
+from aesi.calibration import Conditions, calibrate
 from aesi.calibration.health import health_intervals, health_of
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
@@ -32,7 +32,7 @@ def test_lost_lithium_was_taken_for_lost_material(start):
         record(start, slow, np.where(slow < 600.0, 0.0, start.capacity_ah / 20), 1.0, "slow"),
         record(start, pulses, drawn, 1.0, "pulses"),
     ]
-    found = calibrate(start, records, same_cell=True)
+    found = calibrate(start, records, Conditions(same_cell=True))
     fresh, intervals = health_of(start), health_intervals(found)
     lithium_ah = fresh.inventory_ah - LOST * start.capacity_ah
     for name, true in (

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration.fit import problem
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.rewind import capacities
 from aesi.errors import DataError
@@ -30,5 +31,5 @@ def test_what_is_said_of_a_name_that_two_share_is_refused():
 
 
 def test_two_records_of_one_name_each_have_their_own_share_of_the_capacity(start, records):
-    model, _ = problem(start, [replace(one, name="drive") for one in records], None, {})
+    model, _ = problem(start, [replace(one, name="drive") for one in records], Conditions())
     assert len(capacities(model, np.zeros(model.layout.size))) == len(records)

@@ -6,6 +6,7 @@ import pytest
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD
 from aesi.calibration.fit import problem
 from aesi.calibration.parameters import with_interfaces
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.rewind import capacities, rewound
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -23,7 +24,7 @@ def discharge(cell, name: str, c_rate: float) -> Measurement:
 def model(start):
     whole = with_interfaces(start)
     records = [discharge(whole, "slow", 0.1), discharge(whole, "loaded", 0.5)]
-    return problem(whole, records, None, {}, same_cell=True)[0]
+    return problem(whole, records, Conditions(same_cell=True))[0]
 
 
 def test_it_is_the_one_that_shares_are_deviations_from(model):

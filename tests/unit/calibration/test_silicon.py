@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.calibration.fit import calibrate, problem
+from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.silicon import SILICON_V, silicon_edge, with_silicon
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -54,11 +55,11 @@ def test_of_two_slow_discharges_the_silicon_that_one_has_lost_is_found(start, re
 
 
 def test_one_slow_discharge_does_not_tell_silicon(start, records):
-    assert not problem(start, records[:1], None, {})[0].layout.silicon
+    assert not problem(start, records[:1], Conditions())[0].layout.silicon
 
 
 def test_slopes_are_those_of_differences_with_silicon_too(start, records):
-    model = problem(start, records, None, {})[0]
+    model = problem(start, records, Conditions())[0]
     x = 0.3 * np.random.default_rng(3).standard_normal(model.layout.size)
     x = np.clip(x, model.low + 0.1, model.high - 0.1)
     slopes = model.jacobian(x)

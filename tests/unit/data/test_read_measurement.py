@@ -223,7 +223,7 @@ def test_the_sign_of_a_plain_discharge_is_checked_along_the_test(tmp_path):
 
 def test_a_unit_in_the_name_is_believed(tmp_path):
     message = refusal(tmp_path, text(header="time_s,I[mA],voltage_v"), columns={"current_a": "I[mA]"})
-    assert "ma by its name" in message
+    assert "in mA by its name" in message
 
 
 @pytest.mark.parametrize(
@@ -324,6 +324,25 @@ def test_a_room_in_fahrenheit_is_doubted(tmp_path):
     converted = read_measurement(path, units={"temperature_degc": "F"})
     np.testing.assert_allclose(converted.temperature_degc, 25.0)
     assert not any("starts at" in note for note in converted.notes)
+
+
+def test_a_time_in_hours_is_doubted(tmp_path):
+    path = written(tmp_path, text(time=TIME / 3600.0))
+    (note,) = read_measurement(path).notes
+    assert note.endswith(
+        "every 0.278 ms, quicker than cyclers write them; if the time is in hours: --unit time_s=h."
+    )
+    profile = written(
+        tmp_path, "time_s,current_a\n" + "".join(f"{t / 3600},1\n" for t in TIME), "profile.csv"
+    )
+    assert any("quicker than cyclers" in one for one in read_current(profile).notes)
+    assert not any("quicker" in one for one in read_measurement(path, units={"time_s": "h"}).notes)
+
+
+def test_a_file_of_json_was_told_of_columns_that_are_none(tmp_path):
+    path = written(tmp_path, '\ufeff{"Header": {"BPX": "1.1.0"}}', "cell.bpx.json")
+    with pytest.raises(DataError, match=r"cell.bpx.json is JSON, .* a cell's file is given as --cell"):
+        read_measurement(path)
 
 
 def test_a_thermocouple_that_drops_out_is_doubted(tmp_path):

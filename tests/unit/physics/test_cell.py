@@ -196,7 +196,7 @@ def test_a_negative_thickness_is_refused(content):
         (
             "Cell",
             {"Lower voltage cut-off [V]": 4.2, "Upper voltage cut-off [V]": 2.5},
-            r"the lower cut-off \(4.2 V\) has to be above 0 and below the upper one \(2.5 V\)",
+            r"the lower cut-off \(4.2 V\) has to be at least 0.1 V and below the upper one \(2.5 V\)",
         ),
         (
             "Cell",
@@ -228,6 +228,42 @@ def test_values_that_no_cell_has_are_refused(content, section, changes, sentence
     content["Parameterisation"][section] |= changes
     with pytest.raises(CellError, match=sentence):
         Cell.from_bpx(content)
+
+
+@pytest.mark.parametrize(
+    ("section", "field", "factor", "sentence"),
+    [
+        ("Separator", "Thickness [m]", 1e6, "Separator: thickness = 12 m is outside .* 12 um is 1.2e-05"),
+        ("Separator", "Thickness [m]", 1e3, "Separator: thickness = 0.012 m is outside"),
+        ("Electrolyte", "Conductivity [S.m-1]", 1e-2, "conductivity = 0.00948.* S/m .* 0.01 S/cm is 1"),
+        ("Electrolyte", "Conductivity [S.m-1]", 10.0, "conductivity = 9.48.* S/m .* 10 mS/cm"),
+        (
+            "Electrolyte",
+            "Diffusivity [m2.s-1]",
+            1e4,
+            "diffusivity = 1.769.*e-06 m2/s .* 2e-06 cm2/s is 2e-10",
+        ),
+        ("Negative electrode", "Diffusivity [m2.s-1]", 1e4, "Negative .* = 3.3e-10 m2/s .* in 0.1 s"),
+        ("Positive electrode", "Diffusivity [m2.s-1]", 1e4, "Positive .* 1e-10 cm2/s is 1e-14"),
+        ("Negative electrode", "Reaction rate constant [mol.m-2.s-1]", 1e-4, "Negative .* exchange current"),
+        ("Cell", "Lower voltage cut-off [V]", 1e3, "lower cut-off .2500 V. .* 2500 mV is 2.5"),
+        ("Cell", "Lower voltage cut-off [V]", 1e-3, "lower cut-off .0.0025 V. has to be at least 0.1 V"),
+    ],
+)
+def test_a_value_in_another_unit_is_refused(content, section, field, factor, sentence):
+    fields = content["Parameterisation"][section]
+    value = fields[field]
+    fields[field] = f"({value}) * {factor!r}" if isinstance(value, str) else factor * value
+    with pytest.raises(CellError, match=sentence):
+        Cell.from_bpx(content)
+
+
+def test_a_fit_may_move_transport_further_than_a_file_declares_it(content):
+    fields = content["Parameterisation"]["Negative electrode"]
+    fields["Diffusivity [m2.s-1]"] *= 1e4
+    assert Cell.from_bpx(content, fitted=True).negative.diffusivity(np.array([0.5]))[0] == pytest.approx(
+        3.3e-10
+    )
 
 
 def test_electrodes_that_are_swapped_and_energies_in_kilojoule_are_refused(content):

@@ -62,6 +62,20 @@ def test_a_rest_above_the_upper_cut_off_is_said_to_be_above_it():
     assert said.endswith("check the voltage's sensor, and the cell file, which may be another cell's.")
 
 
+def test_a_cold_start_under_load_was_told_to_be_of_another_cell():
+    """A drop that builds up over seconds is all there at once in a model without double layers."""
+    amperes = 2.0 * LG_M50.capacity_ah
+    time = np.arange(0.0, 60.0)
+    data = record(time, np.full(60, amperes), np.full(60, LG_M50.upper_voltage_v - 0.05))
+    found = initial_state(LG_M50, data)
+    assert found.basis == "full charge"
+    assert "mV above the upper cut-off" in found.sentence
+    assert found.sentence.endswith(
+        "drop that the model has at once, of which the cell may have had less by the first row."
+    )
+    assert "another cell's" not in found.sentence
+
+
 def test_a_rest_as_far_above_full_as_below_leaves_the_same_doubt():
     open_circuit = OpenCircuit(LG_M50, resting(LG_M50.upper_voltage_v))
     below, above = (open_circuit.full_sd(open_circuit.voltage_at(1.0 + off)) for off in (-0.02, 0.02))

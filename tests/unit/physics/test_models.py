@@ -8,7 +8,7 @@ import pytest
 from aesi.errors import InputError, SimulationError
 from aesi.physics import Cell, simulate
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.pipeline.simulation import simulate_file
+from aesi.pipeline.simulation import ProfileRequest, simulate_file
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 CELL = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
@@ -41,9 +41,11 @@ def test_a_saved_model_keeps_which_one_it_is(tmp_path):
     np.savetxt(
         current, np.column_stack([TIME, CURRENT]), delimiter=",", header="time_s,current_a", comments=""
     )
-    run = simulate_file(tmp_path / "model", current, tmp_path / "out.csv", hold="linear")
+    run = simulate_file(tmp_path / "model", current, tmp_path / "out.csv", ProfileRequest(hold="linear"))
     assert (run.voltage_v == voltage(model="dfn")).all()
-    asked = simulate_file(tmp_path / "model", current, tmp_path / "out.csv", hold="linear", model="espm")
+    asked = simulate_file(
+        tmp_path / "model", current, tmp_path / "out.csv", ProfileRequest(hold="linear"), model="espm"
+    )
     assert (asked.voltage_v == voltage()).all()
     predicted = HybridModel.load(tmp_path / "model").predict(TIME, CURRENT, 0.7)
     assert (predicted.voltage_v == voltage(model="dfn")).all()

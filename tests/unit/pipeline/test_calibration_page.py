@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aesi.calibration import calibrate
+from aesi.calibration import Conditions, calibrate
 from aesi.physics import Cell, simulate
 from aesi.pipeline.calibrate import calibrate_files, fit_traces
 from aesi.pipeline.impedance import SpectrumError
@@ -143,7 +143,7 @@ def test_the_start_file_was_drawn_with_a_loss_on_a_record_of_another_day():
     """The table said what it errs by as a cell that has lost nothing."""
     cell = Cell.from_bpx(START)
     data, days = pulses(cell), {"pulses": date(2024, 1, 1)}
-    found = calibrate(cell, [data], evaluations=1, dates=days, as_of=date(2023, 1, 1))
+    found = calibrate(cell, [data], Conditions(dates=days, as_of=date(2023, 1, 1)), evaluations=1)
     (trace,), (error,) = fit_traces(found), found.errors
     assert drawn_rms_v(trace) == pytest.approx((error.before_v, error.simulated_v, error.after_v), rel=1e-9)
 

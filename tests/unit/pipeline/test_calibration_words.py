@@ -1,6 +1,6 @@
 """What a calibration says of parameters that its records do not tell."""
 
-from aesi.pipeline.calibrate import _with_interval, open_line, to_text
+from aesi.pipeline.report.words.calibrations import _with_interval, open_line, to_text
 
 
 def content(weights: list[dict[str, float]], total: int) -> dict[str, object]:

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from small_experiment import BPX, SOC0, experiment, write_record
 
+from aesi.calibration import Conditions
 from aesi.data import read_measurement
 from aesi.errors import CellError, ConfigError, DataError, InputError
 from aesi.pipeline.calibrate import Request, calibrate_files
@@ -112,9 +113,17 @@ def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_pa
         calibrate_files(BPX, [record, record], tmp_path / "new.json")
     with pytest.raises(DataError, match="give records of at least 300 s"):
         calibrate_files(BPX, [record.between(0.0, 100.0)], tmp_path / "new.json")
-    kelvin = Request(temperatures_degc={record.name: 298.15})
+    kelvin = Request(Conditions(temperatures_degc={record.name: 298.15}))
     with pytest.raises(InputError, match=f"the temperature of {record.name} = 298.15 degC is outside"):
         calibrate_files(BPX, [record], tmp_path / "new.json", kelvin)
+
+
+def test_a_posterior_of_too_few_samples_was_refused_after_the_fit(tmp_path, monkeypatch):
+    pytest.importorskip("emcee")
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", lambda *_, **__: pytest.fail("it was fitted"))
+    record = read_measurement(write_record(tmp_path))
+    with pytest.raises(InputError, match="--posterior 2: at least 4"):
+        calibrate_files(BPX, [record], tmp_path / "new.json", Request(posterior=2))
 
 
 def test_an_experiment_has_a_cell_at_its_state_of_health(tmp_path):

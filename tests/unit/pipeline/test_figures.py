@@ -242,6 +242,10 @@ def test_a_model_that_runs_empty_does_not_flatten_the_measured_voltage(views):
 
 def test_a_part_of_a_record_is_placed_in_it(views):
     trace = views.trace("t", "test", 500, np.random.default_rng(0))
-    for first, title in ((0.0, "time, s"), (1260.0, "time after 1260 s of the record, s")):
+    for first, title in (
+        (0.0, "time, s"),
+        (1260.0, "time after 1260 s of the record, s"),
+        (629.999, "time after 630 s of the record, s"),
+    ):
         placed, unit = timeline.end_to_end([replace(trace, time_s=trace.time_s - trace.time_s[0] + first)])
         assert timeline.time_title(placed, unit) == title

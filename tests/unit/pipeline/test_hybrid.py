@@ -8,12 +8,12 @@ from small_experiment import SOC0, experiment, fitted, write_record
 
 import aesi
 from aesi.errors import DataError, InputError
-from aesi.physics.effects import CATALOGUE
+from aesi.physics.effects import CATALOGUE, activated
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
-from aesi.pipeline.simulation import predict_file, simulate_file
+from aesi.pipeline.simulation import predict_file, reached, simulate_file
 from aesi.sparse import SparseModel
 
 
@@ -210,6 +210,17 @@ def test_effects_and_their_defaults_were_simulated_without_a_word(model, record,
     said: list[str] = []
     bare = HybridModel(model.cell).save(tmp_path / "bare")
     simulate_file(
-        bare, record, tmp_path / "o.csv", effects=[("series_resistance", {})], say_notes=said.extend
+        bare,
+        record,
+        tmp_path / "o.csv",
+        effects=activated([("series_resistance", {})]),
+        say_notes=said.extend,
     )
     assert any(note.endswith(": with series_resistance(resistance_ohm=0.001).") for note in said)
+
+
+def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
+    voltage = np.full(len(data), 3.9)
+    for above, said in ((1e-12, False), (0.01, True)):
+        told = reached(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
+        assert any("a state of charge outside 0 to 1" in note for note in told) == said

@@ -7,6 +7,7 @@ import pytest
 
 import aesi
 from aesi.errors import DataError
+from aesi.physics.effects import activated
 from aesi.pipeline.impedance import held_against, impedance_file
 from aesi.records import Spectrum
 
@@ -55,7 +56,11 @@ def test_an_assumed_temperature_is_said_and_a_state_is_not_assumed(cell):
 
 def test_a_spectrum_without_an_arc_was_written_without_a_word(tmp_path):
     said = []
-    for effects, frequencies in (((), "1:1000:4"), ((), "0.01:1:4"), ([("double_layer", {})], "1:1000:4")):
+    for effects, frequencies in (
+        ((), "1:1000:4"),
+        ((), "0.01:1:4"),
+        (activated([("double_layer", {})]), "1:1000:4"),
+    ):
         impedance_file(
             CELLS / "lg_m50_chen2020.bpx.json",
             0.5,

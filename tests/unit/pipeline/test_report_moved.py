@@ -48,6 +48,11 @@ def test_a_state_of_charge_is_told_with_what_was_declared():
     assert text == "the initial state of charge of drive 0.973 (declared 1)"
 
 
+def test_a_state_that_moved_a_little_was_told_to_have_moved_to_where_it_was():
+    moved = row("drive", 0.99951, -2.9, effect="soc0") | {"unit": "1"}
+    assert moved_summary([moved]) == "the initial state of charge of drive 0.9995 (declared 1)"
+
+
 def test_a_refit_that_moved_only_what_was_found_is_the_same_explanation():
     errors = {state: {"test": {"rmse_mv": 1.0}} for state in ("recalibrated", "after")}
     found = errors | {"effects": ["solid_diffusivity"]}

@@ -200,3 +200,14 @@ def test_a_table_of_many_models_and_horizons_shows_the_models_of_the_headline(mo
     assert (shown + folded).count("model, 1, 60 s") == (1 if models == 2 else 2)
     assert shown.count('scope="row"') == (6 if models == 2 else 3)
     assert folded.count('scope="row"') == (0 if models == 2 else 36)
+
+
+def test_one_hypothesis_was_told_as_all_1_hypotheses(views, tmp_path):
+    view = views.discovery_view(200)
+    rows = view.discovery["candidates"][:1]
+    moved = {"effect": "solid_diffusivity", "parameter": "negative_factor", "declared": 1.0, "value": 0.2}
+    moved |= {"unit": "dimensionless", "deviations": -4.0, "at_limit": False}
+    one = {**view.discovery, "candidates": rows, "own_parameters": {"recalibrated": [moved]}}
+    text = write_discovery_report(tmp_path / "r.html", replace(view, discovery=one)).read_text()
+    assert "<summary>The hypothesis with its parameters</summary>" in text
+    assert "<summary>What the refit made of the declared parameter</summary>" in text

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.report import write_discovery_report
 from aesi.pipeline.report.words import discoveries, runs
 from aesi.pipeline.report.words.sizes import finding_line
 
@@ -162,7 +163,7 @@ def test_a_finding_that_the_test_part_contradicts_says_so_at_once(views):
 
 
 def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_sentence(views):
-    view = views.discovery_view(200, verdict="unknown")
+    view = views.discovery_view(200)
     worse = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 9.3}}})
     assert discoveries.discovery_finding(worse).endswith(
         "; on the test part the written model does worse, 9.30 mV against 6.20 mV recalibrated."
@@ -174,6 +175,18 @@ def test_a_written_model_that_does_worse_on_the_test_part_is_told_in_the_first_s
     assert discoveries.short_finding(worse.discovery).endswith("9.30 mV against 6.20 mV recalibrated")
     same = replace(view, discovery={**view.discovery, "after": {"test": {"rmse_mv": 6.2004}}})
     assert "worse" not in discoveries.discovery_finding(same)
+
+
+def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_once(views, tmp_path):
+    view = views.discovery_view(200, verdict="unknown")
+    warning = "on the test part the written model leaves 9.30 mV, the recalibrated model 6.20 mV: do not use it there."
+    left = {"after": {"fit": {"rmse_mv": 9.0}, "test": {"rmse_mv": 9.3}}, "warnings": [warning]}
+    text = write_discovery_report(
+        tmp_path / "r.html", replace(view, discovery=view.discovery | left)
+    ).read_text()
+    header = text[text.index("<h1>") : text.index("</header>")]
+    assert header.count("on the test part") == 1
+    assert "data that chose nothing" not in header
 
 
 def test_the_cell_is_named_once(views):

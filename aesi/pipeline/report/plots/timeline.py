@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 OUTSIDE = "outside the trained range"
+WHOLE_S = 10.0
+"""From here on the start of a part is told to the second."""
 SHARE_A_LETTER = 0.008
 """Width of a letter of a record's name, as a share of the axis of a wide page."""
 
@@ -143,4 +145,7 @@ def time_title(placed: Sequence[Placed], unit: str) -> str:
     if len(placed) > 1:
         return f"time, records end to end, {unit}"
     first = float(placed[0].trace.time_s[0])
-    return f"time after {first:.6g} s of the record, {unit}" if first else f"time, {unit}"
+    if not first:
+        return f"time, {unit}"
+    shown = f"{first:.0f}" if abs(first) >= WHOLE_S else f"{first:.3g}"
+    return f"time after {shown} s of the record, {unit}"

@@ -20,8 +20,9 @@ CERTAIN = 0.99
 
 def discovery_finding(view: DiscoveryView) -> str:
     """The verdict as one sentence; missing physics, wrong parameters and instrument faults are named as such, and so is
-    a test part that contradicts it, or on which the written model does worse than another."""
-    return "; ".join([_verdict(view)[:-1], *_against(view.discovery)]) + "."
+    a test part that contradicts it, or on which a written model that is to explain the data does worse than another."""
+    claims = view.discovery["verdict"] != "unknown"  # of one that does not, the warning below says it
+    return "; ".join([_verdict(view)[:-1], *(_against(view.discovery) if claims else ())]) + "."
 
 
 def short_finding(discovery: Mapping[str, Any]) -> str:
@@ -175,7 +176,10 @@ def _verb(names: Sequence[str]) -> str:
 
 
 def discovery_consequence(view: DiscoveryView) -> str:
-    """What that brings on data that chose nothing, apart from what any refit brings."""
+    """What that brings on data that chose nothing, apart from what any refit brings; '' where it brings less than
+    nothing, which a warning says with the same figures."""
+    if _worse_on_test(view.discovery):
+        return ""
     values = {
         state: view.discovery.get(state, {}).get("test", {}).get("rmse_mv")
         for state in ("before", "recalibrated", "after")

@@ -11,6 +11,8 @@ from aesi.pipeline.report.words.sizes import TELLING, resized, rounded
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""
+MOST_DIGITS = 6
+"""A state of charge is known to a ten-thousandth at best."""
 INITIAL_STATE = "soc0"
 """Stands for the effect of a row where a record's initial state of charge moved."""
 RECALIBRATING, BESIDE, WRITTEN = "Recalibrating", "Beside the finding the fit", "The model that is written"
@@ -65,8 +67,17 @@ def moved_value(row: Row) -> str:
     if row["unit"] == "dimensionless" and row["declared"] == 1.0:
         return f"{row['value']:.2g} times declared"
     if row["unit"] in ("dimensionless", "1"):
-        return f"{row['value']:.3g} (declared {row['declared']:.3g})"
+        there, declared = _apart(row["value"], row["declared"])
+        return f"{there} (declared {declared})"
     return rounded(row["value"], row["unit"])
+
+
+def _apart(value: float, declared: float) -> tuple[str, str]:
+    """Both in as few digits, three at least, as show that they differ."""
+    for digits in range(3, MOST_DIGITS):
+        if f"{value:.{digits}g}" != f"{declared:.{digits}g}":
+            return f"{value:.{digits}g}", f"{declared:.{digits}g}"
+    return f"{value:.{MOST_DIGITS}g}", f"{declared:.{MOST_DIGITS}g}"
 
 
 def parameter_words(row: Row) -> str:

@@ -1,0 +1,87 @@
+"""Whether lengths, diffusivities, conductivities and rate constants of a cell's file are in the units of the standard.
+
+What cannot be told: the conductivity of a solid in S/cm, since those of electrodes span three decades, and one of two
+rate constants or diffusivities in an electrode that is slow by nature.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.constants import FARADAY_C_MOL
+from aesi.errors import CellError
+from aesi.numerics.typing import Array
+from aesi.physics.cell.parts import CellParameters, Electrode
+
+POINTS = 101
+"""Stoichiometries between empty and full at which relations are looked at."""
+HALF_FULL = 0.5
+"""sqrt(x (1 - x)) where it is largest, at x = 1/2."""
+SEPARATOR_M = (1e-6, 1e-3)
+"""Thickness: 12 to 25 um in the shipped files and in twelve published sets (of PyBaMM), 0.7 mm at most in laboratory
+cells (glass fibre); 0.012 in mm, 12 in um."""
+ELECTROLYTE_S_M = (0.05, 8.5)
+"""Conductivity: 0.88 to 2.05 S/m in the shipped files and the same sets, which is 0.009 to 0.02 S/cm and 9 to 20 mS/cm;
+a calibration may move it by a factor of four."""
+LARGEST_SALT_M2_S = 1e-8
+"""Diffusivity of the salt: 2.5e-11 to 7.5e-10 m2/s there, which is 2.5e-7 to 7.5e-6 cm2/s; half way on a logarithmic
+scale."""
+SHORTEST_DIFFUSION_S = 1.0
+"""Radius squared over the median diffusivity in an electrode's window: 2.9 s in one (0.5 um, Kim 2011) and 100 to
+25,000 s in the others of the shipped files and the same sets; with a diffusivity in cm2/s a ten-thousandth of it."""
+LEAST_EXCHANGE_1_H = 2e-3
+"""Exchange current of a half-full electrode over nominal capacity: 0.05 to 470 1/h there, and 0.2 and more without the
+one of sodium; 0.0009 at most in the slower electrode with a rate constant in mol/(cm2 s), and less with one in m/s."""
+
+
+def check_transport(cell: CellParameters, where: str) -> None:
+    """Lengths in m, diffusivities in m2/s, the electrolyte's conductivity in S/m: raises CellError, naming `where`."""
+    least, most = SEPARATOR_M
+    if not least <= cell.separator.thickness_m <= most:
+        raise CellError(
+            f"{where}: Separator: thickness = {cell.separator.thickness_m:g} m is outside {least:g} to {most:g} m, "
+            "where all separators are; it is in m, so that 12 um is 1.2e-05."
+        )
+    electrolyte = cell.electrolyte
+    at_rest = np.array([electrolyte.c0_mol_m3])
+    conductivity = float(electrolyte.conductivity(at_rest)[0])
+    least, most = ELECTROLYTE_S_M
+    if not least <= conductivity <= most:
+        raise CellError(
+            f"{where}: Electrolyte: conductivity = {conductivity:g} S/m at {electrolyte.c0_mol_m3:g} mol/m3 is outside "
+            f"{least:g} to {most:g} S/m, where all electrolytes are; it is in S/m, so that 10 mS/cm or 0.01 S/cm is 1."
+        )
+    diffusivity = float(electrolyte.diffusivity(at_rest)[0])
+    if diffusivity > LARGEST_SALT_M2_S:
+        raise CellError(
+            f"{where}: Electrolyte: diffusivity = {diffusivity:g} m2/s at {electrolyte.c0_mol_m3:g} mol/m3 is above "
+            f"{LARGEST_SALT_M2_S:g} m2/s, faster than any salt; it is in m2/s, so that 2e-06 cm2/s is 2e-10."
+        )
+    for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
+        median = float(np.median(electrode.diffusivity(inside_window(electrode))))
+        seconds = electrode.particle_radius_m**2 / median
+        if seconds < SHORTEST_DIFFUSION_S:
+            raise CellError(
+                f"{where}: {side} electrode: diffusivity = {median:g} m2/s takes lithium across particles of "
+                f"{electrode.particle_radius_m:g} m in {seconds:.2g} s, faster than in any electrode; it is in m2/s, "
+                "so that 1e-10 cm2/s is 1e-14."
+            )
+
+
+def check_kinetics(cell: CellParameters, where: str) -> None:
+    """Rate constants in mol/(m2 s): raises CellError, naming `where`."""
+    area_m2 = cell.electrode_area_m2 * cell.electrode_pairs
+    for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
+        surface_m2 = electrode.area_per_volume_1_m * electrode.thickness_m * area_m2
+        exchange_a = FARADAY_C_MOL * electrode.rate_constant * HALF_FULL * surface_m2
+        if exchange_a < LEAST_EXCHANGE_1_H * cell.nominal_capacity_ah:
+            raise CellError(
+                f"{where}: {side} electrode: reaction rate constant = {electrode.rate_constant:g} makes an exchange "
+                f"current of {exchange_a:.2g} A, less than in any electrode of {cell.nominal_capacity_ah:g} A.h; it is "
+                "in mol/(m2 s), those of cells are 1e-06 to 1e-03."
+            )
+
+
+def inside_window(electrode: Electrode) -> Array:
+    """(n,) stoichiometries within the window, without its ends: potentials may be infinite at 0 or 1."""
+    return np.linspace(electrode.theta_min, electrode.theta_max, POINTS)[1:-1]

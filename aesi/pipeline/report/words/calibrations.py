@@ -1,0 +1,118 @@
+"""A calibration in words, from the content of its report in JSON: as Markdown, and what its records leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from aesi.calibration.health import HEALTH_WORDS
+from aesi.physics.simulation import MODEL_WORDS
+from aesi.pipeline.digits import resolving
+
+NAMED_OPEN = 3
+"""Parameters that the sentence on what is left open names: it is a line on a console, and the report has all."""
+
+
+def open_line(content: Mapping[str, Any]) -> str:
+    """What the records leave open, in one sentence; empty where they tell every parameter."""
+    left = content["undetermined"]
+    if not left:
+        return ""
+    heaviest = list(dict.fromkeys(max(o["weights"], key=lambda name: abs(o["weights"][name])) for o in left))
+    named = ", ".join(heaviest[:NAMED_OPEN]) + (" and others" if len(heaviest) > NAMED_OPEN else "")
+    return (
+        f"these records tell {len(content['parameters']) - len(left)} of {len(content['parameters'])} combinations of "
+        f"parameters better than their priors do; the others ({named}) stay near the priors"
+    )
+
+
+def to_text(content: Mapping[str, Any]) -> str:
+    """The report as Markdown."""
+    lines = [f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", ""]
+    lines += [*_files(content), "", *_health(content), "", *_parameters(content)]
+    if content["impedance"]:
+        lines += ["", *_impedance(content)]
+    sections = (
+        ("Left open by these data", [o["sentence"] for o in content["undetermined"]]),
+        ("On a bound", content["at_bounds"]),
+        ("Notes", content["notes"]),
+    )
+    for title, texts in sections:
+        if texts:
+            lines += ["", f"## {title}", "", *(f"- {text}" for text in texts)]
+    return "\n".join(lines) + "\n"
+
+
+def _files(content: Mapping[str, Any]) -> list[str]:
+    rows = [
+        f"| {f['name']} | {_at(f['temperature_degc'], content['declared_degc'])} "
+        f"| {f['before_rmse_mv']:.2f} | {f['after_rmse_mv']:.2f} | {f['as_simulated_rmse_mv']:.2f} "
+        f"| {f['capacity_share']:.3f} |"
+        for f in content["files"]
+    ]
+    return [
+        "| file | mean temperature, degC | before, mV | after, mV | as simulated, mV | capacity |",
+        "|---|---|---|---|---|---|",
+        *rows,
+        "",
+        "Errors are RMSE on the data that were fitted: after, each record with what it has of its own (its capacity "
+        "over the file's, its start, its cycler's zero); as simulated, the file as it is on the current as measured.",
+    ]
+
+
+def _health(content: Mapping[str, Any]) -> list[str]:
+    rows = [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
+    return ["| state of health | value | 95 % interval |", "|---|---|---|", *rows]
+
+
+def _parameters(content: Mapping[str, Any]) -> list[str]:
+    rows = [
+        f"| {name} | {_with_interval(p)} | {p['unit']} | {_percent(p['of_prior'])} | {p['prior_from']} |"
+        for name, p in content["parameters"].items()
+    ]
+    return [
+        "Of prior: the share of the prior's width that the records leave; of 100 % they say nothing.",
+        "",
+        "| parameter | value | 95 % interval | unit | of prior, % | prior from |",
+        "|---|---|---|---|---|---|",
+        *rows,
+    ]
+
+
+def _impedance(content: Mapping[str, Any]) -> list[str]:
+    low, high = content["impedance"][0]["band_hz"]
+    rows = [
+        f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {_number(s['rms_pct'])} |"
+        for s in content["impedance"]
+    ]
+    return [
+        f"## Impedance, {low:g} to {high:g} Hz, nothing fitted to it",
+        "",
+        "| spectrum | state of charge | degC | root mean square of the error of abs(Z), % |",
+        "|---|---|---|---|",
+        *rows,
+    ]
+
+
+def _at(measured_degc: float | None, declared_degc: float) -> str:
+    """The temperature of a record, or that of the cell file, at which it was taken."""
+    return f"{declared_degc:.1f}, as declared" if measured_degc is None else _number(measured_degc)
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{100.0 * min(share, 1.0):.0f}"
+
+
+def _with_interval(row: Mapping[str, Any]) -> str:
+    """'14.298 | 14.293 to 14.303'."""
+    value, low, high = (row[key] for key in ("value", "low", "high"))
+    if low is None or high is None:
+        return f"{value:.4g} | not fitted; the notes say what it rests on"
+    n = resolving(value, low, high, least=4)
+    return f"{value:.{n}g} | {low:.{n}g} to {high:.{n}g}"
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None or not np.isfinite(value) else f"{value:.1f}"

@@ -1,0 +1,37 @@
+"""One process at a time writes to a folder of results: two would leave a mixture of both, or the one that ends last."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from aesi.errors import InputError
+
+LOCK = ".aesi.lock"
+"""Stays behind, empty: removed, it could be held by two. The kernel frees it with the process that holds it."""
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Within, no other process that asks for it writes to the folder, which is made.
+
+    Raises InputError where another one does now.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    lock = FileLock(folder / LOCK, thread_local=False)
+    try:
+        lock.acquire(blocking=False)
+    except Timeout:
+        raise InputError(
+            f"--out {folder}: another process writes its results there now; wait for its end, or name another folder."
+        ) from None
+    except NotImplementedError:  # a file system without locks
+        yield
+        return
+    try:
+        yield
+    finally:
+        lock.release()

@@ -1,0 +1,86 @@
+"""What is refused has not run: the tracking store and the workspace hold nothing of it."""
+
+from pathlib import Path
+
+import pytest
+
+from aesi.errors import DataAway, DataError, FitError, InputError
+from flows.base.console import Console
+from flows.jobs.run_session import tracked_job
+from flows.tracking.run_records import records
+from flows.tracking.tracker import Subject
+
+CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"
+EXPERIMENT = """
+name: refused
+data: {kind: files, train: [bad.csv], test: [good.csv]}
+cell: {bpx: CELL}
+"""
+
+
+def statuses(name):
+    from flows.tracking.store import Store
+
+    store = Store()
+    return [run.info.status for run in store.runs(store.find_experiment(name), "")]
+
+
+def test_an_invalid_data_file_leaves_no_failed_run(tracked):
+    from flows.jobs.start import start
+
+    (tracked / "bad.csv").write_text("time_s,current_a,voltage_v\n0,1,3.9\n1,x,3.8\n")
+    (tracked / "good.csv").write_text("time_s,current_a,voltage_v\n0,1,3.9\n1,1,3.8\n")
+    path = tracked / "refused.yaml"
+    path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
+    with pytest.raises(DataError, match="'x', which is not a number"):
+        start(path, use_prefect=False)
+    assert statuses("refused") == []
+    assert records("refused") == []
+
+
+def test_data_too_few_for_the_library_leave_no_folder(tracked):
+    from flows.jobs.start import start
+
+    for name, end_v in (("bad", 3.88), ("good", 3.87)):
+        (tracked / f"{name}.csv").write_text(f"time_s,current_a,voltage_v\n0,1,3.9\n1,1,3.89\n2,1,{end_v}\n")
+    path = tracked / "refused.yaml"
+    path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
+    with pytest.raises(InputError, match="needs more than the 2 training"):
+        start(path, use_prefect=False)
+    assert statuses("refused") == []
+    assert [p for p in (tracked / "runs").rglob("*") if p.is_file()] == []
+
+
+@pytest.mark.parametrize(
+    ("error", "left"),
+    [(InputError("no."), []), (DataAway("no network."), ["FAILED"]), (FitError("it fails."), ["FAILED"])],
+)
+def test_only_what_was_refused_is_taken_back(tracked, error, left):
+    with pytest.raises(type(error)), tracked_job(Subject("job", 0, "key"), "title", Console()):
+        raise error
+    assert statuses("job") == left
+
+
+def test_a_job_that_is_refused_after_it_tracked_something_keeps_it(tracked):
+    def work():
+        with tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
+            tracker.nested("candidate:1", "one", "candidate", {}, {})
+            raise InputError("too late.")
+
+    with pytest.raises(InputError, match="too late"):
+        work()
+    assert sorted(statuses("job")) == ["FAILED", "FINISHED"]
+
+
+def test_a_run_that_the_store_does_not_take_back_is_closed_as_failed(tracked, monkeypatch):
+    from flows.tracking.tracker import Tracker
+
+    def away(*_, **__):
+        raise ConnectionError("no answer")
+
+    monkeypatch.setattr(Tracker, "withdraw", away)
+    with pytest.raises(InputError, match="no"), tracked_job(Subject("job", 0, "key"), "title", Console()):
+        raise InputError("no.")
+    assert statuses("job") == ["FAILED"]
+    (record,) = records("job")
+    assert record.status == "failed"
