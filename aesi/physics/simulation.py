@@ -25,6 +25,7 @@ from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Record, Trace, check_contribution, check_row_of
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
+from aesi.physics.solutions import Solution, Solutions
 from aesi.records import Hold, Run
 from aesi.records.checked import check_increasing, check_row, numbers
 
@@ -32,6 +33,8 @@ ModelName = Literal["espm", "dfn"]
 MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
 """How reports call the models."""
 OnDepletion = Literal["raise", "clip"]
+SOLUTIONS = Solutions()
+"""Of this process."""
 
 
 def simulate(
@@ -87,7 +90,12 @@ def simulate(
         soc0 = _soc_from_rest(changed, active, rest_voltage_v)
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
-    rows, extra, fault_at, fault = _solved(solve, changed, record, soc0, hold)
+    if profiles:
+        rows, extra, fault_at, fault = _solved(solve, changed, record, soc0, hold)
+    else:
+        rows, extra, fault_at, fault = SOLUTIONS.of(
+            model, changed, record, soc0, hold, partial(_solved, solve, changed, record, soc0, hold)
+        )
     series = _series(changed.cell, rows) | extra
     if fault_at >= 0:
         if on_depletion == "raise":
@@ -134,11 +142,8 @@ def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, .
     return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
 
 
-Solver = Callable[
-    [EspmModel, Array, Array, Array | None, float, Hold], tuple[Array, dict[str, Array], int, int]
-]
-"""(model, time, current, temperature or None, soc0, hold) -> rows as `plain.run_plain`, further states by name, the
-first fault and what it was."""
+Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution]
+"""(model, time, current, temperature or None, soc0, hold) -> the solution."""
 
 
 def solver(name: str, profiles: dict[str, Array] | None = None) -> Solver:
@@ -159,9 +164,7 @@ def solver(name: str, profiles: dict[str, Array] | None = None) -> Solver:
     )
 
 
-def _solved(
-    solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold
-) -> tuple[Array, dict[str, Array], int, int]:
+def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold) -> Solution:
     """One solution; a temperature that does not move becomes that of the cell."""
     temperature = record.temperature_k
     if temperature is not None and np.ptp(temperature) == 0.0:
@@ -173,7 +176,7 @@ def _solved(
 
 def _run_espm(
     model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
-) -> tuple[Array, dict[str, Array], int, int]:
+) -> Solution:
     if model.is_plain and temperature_k is None:
         rows, fault_at, fault = run_plain(model, time, current, soc0, hold)
         kelvin = np.full(len(time), model.cell.initial_temperature_k)

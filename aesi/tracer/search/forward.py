@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
@@ -19,7 +20,7 @@ from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
-from aesi.tracer.search.grown import ended, growths_on, side_by_side
+from aesi.tracer.search.grown import ended, growths_on
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible
 from aesi.tracer.search.reach import REACH, least_left_v
