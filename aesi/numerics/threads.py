@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-Item = TypeVar("Item")
-Outcome = TypeVar("Outcome")
+Given = TypeVar("Given")
+Made = TypeVar("Made")
 
 
-def side_by_side(do: Callable[[Item], Outcome], items: Iterable[Item]) -> Iterator[Outcome]:
+def side_by_side(do: Callable[[Given], Made], items: Iterable[Given]) -> Iterator[Made]:
     """`do` of each, in the order given, so that what is made of it does not depend on how many threads there are. What
     has not begun is left undone where the caller takes no more."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:

@@ -35,7 +35,7 @@ MAX_CHARACTERS = 20_000
 """Of one expression: far more than any published potential takes."""
 
 Function = Callable[[Array], Array]
-Part = np.float64 | Callable[[Array], Any]
+Operand = np.float64 | Callable[[Array], Any]
 """Of an expression: a function of the variable, or a number where that does not occur. Numbers are worked out when the
 text is read, and not at each of the thousand calls of a fit."""
 
@@ -60,7 +60,7 @@ def compile_expression(text: str) -> Function:
     return part
 
 
-def _part(node: ast.expr, text: str) -> Part:
+def _part(node: ast.expr, text: str) -> Operand:
     if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and node.value is not True:
         return np.float64(node.value)
     if isinstance(node, ast.Name) and node.id == VARIABLE:
@@ -82,13 +82,13 @@ def _part(node: ast.expr, text: str) -> Part:
     )
 
 
-def _of_one(apply: Callable[[Any], Any], argument: Part) -> Part:
+def _of_one(apply: Callable[[Any], Any], argument: Operand) -> Operand:
     if isinstance(argument, np.float64):
         return _number(apply, argument)
     return lambda x: apply(argument(x))
 
 
-def _of_two(apply: Callable[[Any, Any], Any], left: Part, right: Part) -> Part:
+def _of_two(apply: Callable[[Any, Any], Any], left: Operand, right: Operand) -> Operand:
     if isinstance(left, np.float64):
         return (
             _number(apply, left, right) if isinstance(right, np.float64) else lambda x: apply(left, right(x))
