@@ -13,7 +13,7 @@ from pathlib import Path
 
 from aesi.data.fetch import Remote, fetch
 from aesi.errors import DataError, did_you_mean
-from aesi.numerics.cache_folder import cache_folder
+from aesi.numerics.files.cache_folder import cache_folder
 
 FOLDER_VARIABLE = "AESI_DATA"
 """Names a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""

@@ -22,7 +22,7 @@ from typing import Any
 import numba
 from numba import njit
 
-from aesi.numerics.cache_folder import cache_folder
+from aesi.numerics.files.cache_folder import cache_folder
 
 SETTINGS: Any = numba.config
 CHOOSING = threading.Lock()

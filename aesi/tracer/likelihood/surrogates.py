@@ -9,6 +9,7 @@ White, Econometrica 68 (2000) 1097, for the largest of many as the statistic.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -42,12 +43,11 @@ def largest_gains(
     problem, blocks, delta_v = parent.problem, parent.blocks, parent.fit.score.delta_v
     white = _drawn(problem, draws, rng)
     known = parent.white[delta_v][0]
-    without = _said(blocks, known, white)
-    best = np.full(draws, -np.inf)
-    for slopes in slopes_v.values():
-        added = whitened(problem, blocks, slopes, delta_v)[0]
-        best = np.maximum(best, _said(blocks, np.column_stack([known, added]), white) - without)
-    return best
+    every = np.column_stack([known, *slopes_v.values()])
+    every[:, known.shape[1] :] = whitened(problem, blocks, every[:, known.shape[1] :], delta_v)[0]
+    sums = _Sums.over_blocks(blocks, every, white)
+    ends = known.shape[1] + np.cumsum([0, *(slopes.shape[1] for slopes in slopes_v.values())])
+    return _gains(blocks, sums, known.shape[1], list(pairwise(ends.tolist()))).max(axis=0, initial=-np.inf)
 
 
 def _drawn(problem: InverseProblem, draws: int, rng: np.random.Generator) -> Array:
@@ -59,30 +59,59 @@ def _drawn(problem: InverseProblem, draws: int, rng: np.random.Generator) -> Arr
     return np.sqrt(problem.independent)[:, None] * rng.normal(size=(sample[-1] + 1, draws))[sample]
 
 
-def _said(blocks: Blocks, sensitivities: Array, white: Array) -> Array:
-    """(s,) held-out log predictive density of each of s surrogates under a linear hypothesis, nats, up to a constant
-    that all hypotheses share.
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Sums over the rows of each block, or over those that are not left out; whitened.
 
-    sensitivities : (n, m), white : (n, s), both whitened.
+    gram : (b, m, m) of the sensitivities.  moment : (b, m, s) of these and each of s surrogates.
     """
-    rows = list(pairwise(blocks.starts))
-    gram = np.stack([sensitivities[a:b].T @ sensitivities[a:b] for a, b in rows])
-    moment = np.stack([sensitivities[a:b].T @ white[a:b] for a, b in rows])
-    whole = _explained(gram.sum(axis=0), moment.sum(axis=0))
 
-    def of(folds: Sequence[Sequence[int]]) -> Array:
-        out = np.zeros(white.shape[1])
-        for fold in folds:
-            kept = np.setdiff1d(np.arange(len(rows)), fold)
-            out += whole - _explained(gram[kept].sum(axis=0), moment[kept].sum(axis=0))
-        return out
+    gram: Array
+    moment: Array
 
-    conditions = [of(blocks.folds[name]) for name in PARTITIONS_OF_CONDITIONS if name in blocks.folds]
-    return 0.5 * of(blocks.folds["block"]) + 0.5 * np.mean(conditions, axis=0)
+    @classmethod
+    def over_blocks(cls, blocks: Blocks, sensitivities: Array, white: Array) -> _Sums:
+        """sensitivities : (n, m), white : (n, s)."""
+        rows = [sensitivities[block].T for block in blocks.rows]
+        gram = np.stack([one @ one.T for one in rows])
+        moment = np.stack([one @ white[block] for one, block in zip(rows, blocks.rows, strict=True)])
+        return cls(gram, moment)
+
+    def without(self, folds: Sequence[Sequence[int]]) -> _Sums:
+        """Of all data less each fold, and of all data last."""
+        kept = np.ones((len(folds) + 1, len(self.gram)))
+        for row, fold in zip(kept, folds, strict=False):
+            row[list(fold)] = 0.0
+        return _Sums(np.tensordot(kept, self.gram, axes=1), np.tensordot(kept, self.moment, axes=1))
+
+
+def _gains(blocks: Blocks, sums: _Sums, known: int, effects: Sequence[tuple[int, int]]) -> Array:
+    """(e, s) nats: what each effect says of unseen data more than nothing, on each of s surrogates.
+
+    sums : with the sensitivities of the `known` parameters first.  effects : first column of each and the one after its
+    last.
+    """
+    out = np.zeros((len(effects), sums.moment.shape[-1]))
+    conditions = [name for name in PARTITIONS_OF_CONDITIONS if name in blocks.folds]
+    shares = {"block": 0.5} | {name: 0.5 / len(conditions) for name in conditions}
+    for name, share in shares.items():
+        left = sums.without(blocks.folds[name])
+        root = np.linalg.cholesky(left.gram[:, :known, :known] + np.eye(known))
+        shadow = np.linalg.solve(root, left.gram[:, :known, known:])
+        said = np.linalg.solve(root, left.moment[:, :known])
+        across = np.swapaxes(shadow, -1, -2)
+        gram = left.gram[:, known:, known:] - across @ shadow
+        moment = left.moment[:, known:] - across @ said
+        for k, (first, end) in enumerate(effects):
+            own = slice(first - known, end - known)
+            more = _explained(gram[:, own, own], moment[:, own])
+            out[k] += share * (len(more) - 1) * more[-1] - share * more[:-1].sum(axis=0)
+    return out
 
 
 def _explained(gram: Array, moment: Array) -> Array:
-    """(s,) (b'A^-1 b - log|A|) / 2 with A = 1 + gram and b = moment, one column a surrogate."""
-    root = np.linalg.cholesky(gram + np.eye(len(gram)))
+    """(f, s) (b'A^-1 b - log|A|) / 2 with A = 1 + gram (f, k, k) and b the columns of moment (f, k, s)."""
+    root = np.linalg.cholesky(gram + np.eye(gram.shape[-1]))
     half = np.linalg.solve(root, moment)
-    return 0.5 * np.sum(half**2, axis=0) - float(np.sum(np.log(np.diagonal(root))))
+    log_det = np.log(np.diagonal(root, axis1=-2, axis2=-1)).sum(axis=-1)
+    return np.asarray(0.5 * (half**2).sum(axis=-2) - log_det[:, None])

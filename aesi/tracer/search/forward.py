@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
@@ -19,9 +20,9 @@ from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
-from aesi.tracer.search.grown import ended, growths_on, side_by_side
+from aesi.tracer.search.grown import ended, growths_on
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
-from aesi.tracer.search.plausible import most_plausible
+from aesi.tracer.search.plausible import alike, most_plausible, plausibility
 from aesi.tracer.search.reach import REACH, least_left_v
 
 FINALISTS = 6
@@ -82,7 +83,9 @@ def searched(
         chosen = step.admitted
         if len(chosen.hypothesis) > 1 and _hopeless(problem, blocks, base, chosen):
             break
-        others = () if enough(blocks, chosen) else (f for f in step.fitted if f is not chosen)
+        others = [f for f in step.fitted if f is not chosen]
+        if enough(blocks, chosen):
+            others = [f for f in others if alike(chosen, f)]
         parents = [chosen, *others][:BEAM]
     least_nats = max((step.admission_nats for step in steps), default=0.0)
     chosen = without_needless(problem, blocks, chosen, least_nats, archive, base, report)
@@ -115,7 +118,7 @@ def without_needless(
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
             if (
-                not needed(blocks, fit, chosen, least_nats)
+                not needed(blocks, fit, chosen, least_nats, len(problem.competing()))
                 and may_be(fit)
                 and (best is None or fit.score.total > best.score.total)
             ):
@@ -186,7 +189,7 @@ def _step(
     for one in grown:
         report(problem, one, one.score.total - best.score.total)
     ranked = _ranked(grown)
-    least_nats = admission_nats(places[0], slopes)
+    least_nats, competing = admission_nats(places[0], slopes), len(problem.competing())
     fitted = []
     for one in _finalists(ranked, best):
         fit = fitted_hypothesis(problem, blocks, one.hypothesis, one, archive)
@@ -194,8 +197,8 @@ def _step(
             report(problem, fit, fit.score.total - best.score.total)
             fitted.append(fit)
     fitted.sort(key=lambda f: -f.score.total)
-    may = [f for f in fitted if admissible(blocks, best, f, least_nats)]
-    admitted = most_plausible(may, len(problem.competing()))
+    may = [f for f in fitted if admissible(blocks, best, f, least_nats, competing)]
+    admitted = most_plausible(may, competing)
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
 
@@ -233,16 +236,22 @@ def _hopeless(
     return beyond_noise(problem, blocks, chosen) > HOPELESS_SHARE * beyond_noise(problem, blocks, base)
 
 
-def admissible(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
-    """Does the effect say enough of unseen data, move them by more than two solvers of one model differ, and end on no
-    bound? By how much it lowers their error is not asked: the first of several may not lower it at all."""
+def admissible(
+    blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float, competing: int
+) -> bool:
+    """Does the effect say enough of unseen data, is the hypothesis more plausible with it, does it move the voltage by
+    more than two solvers of one model differ, and does it end on no bound? By how much it lowers their error is not
+    asked: the first of several may not lower it at all."""
     moved_v = held_out_residual(blocks, without) - held_out_residual(blocks, fit)
     says = fit.score.total - without.score.total
-    return says > least_nats and float(np.mean(moved_v**2)) > LEAST_V**2 and not fit.at_bounds
+    believed = plausibility(fit, competing) > plausibility(without, competing)
+    return says > least_nats and believed and float(np.mean(moved_v**2)) > LEAST_V**2 and not fit.at_bounds
 
 
-def needed(blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float) -> bool:
+def needed(
+    blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float, competing: int
+) -> bool:
     """Would the effect be admitted on top of all the others, and does it lower the error of unseen data by more than
     two solvers of one model differ?"""
     left_v = unseen_rmse_v(blocks, without), unseen_rmse_v(blocks, fit)
-    return lowers_error(*left_v) and admissible(blocks, without, fit, least_nats)
+    return lowers_error(*left_v) and admissible(blocks, without, fit, least_nats, competing)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from collections.abc import Iterable, Mapping, Sequence
 
+from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
 from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem
 from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, promise
 from aesi.tracer.likelihood.model_error import PRIORS
 from aesi.tracer.search.archive import Archive, fit_name
-
-T = TypeVar("T")
 
 PROMISING = 9
 """Effects that are grown on a hypothesis with effects: those that say most to first order. A convention that saves
@@ -69,19 +65,6 @@ def ended(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown |
         return found
 
     return side_by_side(one, growths)
-
-
-def side_by_side(do: Callable[[EffectGrowth], T], growths: Sequence[EffectGrowth]) -> Iterator[T]:
-    """In threads, since simulations do not hold the interpreter's lock; in the order given, so that the outcome does
-    not depend on how many threads there are."""
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = [pool.submit(do, growth) for growth in growths]
-        try:
-            for future in futures:
-                yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
 
 
 def _key(parent: Parent, name: str) -> str:

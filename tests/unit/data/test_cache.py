@@ -5,7 +5,7 @@ import pytest
 
 from aesi.data.laboratory.cache import cached, key_of
 from aesi.errors import DataError
-from aesi.numerics.cache_folder import cache_folder
+from aesi.numerics.files.cache_folder import cache_folder
 
 
 @pytest.fixture(autouse=True)

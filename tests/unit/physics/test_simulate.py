@@ -200,6 +200,7 @@ def test_a_clipped_simulation_that_ends_in_no_numbers_says_since_when(nmc, load,
         rows[0, 20:] = np.nan
         return rows, further, 10, 1
 
+    monkeypatch.setattr("aesi.physics.simulation.MOST_ROWS", 0)
     monkeypatch.setattr("aesi.physics.simulation.solver", lambda model, profiles: lost)
     with pytest.raises(
         SimulationError, match=f"no solution at {time[20]:g} s: the cell ran out at {time[10]:g} s"

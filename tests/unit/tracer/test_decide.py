@@ -228,9 +228,10 @@ def test_an_effect_is_admitted_by_the_largest_gain_on_surrogates(path):
     parent = Parent(path.problem, path.blocks, path.base)
     few = largest_gains(parent, dict(list(slopes.items())[:2]), 200, np.random.default_rng(1))
     every = largest_gains(parent, slopes, 200, np.random.default_rng(1))
-    assert np.all(every >= few)
+    assert np.all(every >= few - 1e-9)  # sums over more columns round otherwise
     assert np.mean(every > admission_nats(parent, slopes)) <= 0.04  # 1 % of draws that set nothing
-    assert step.admission_nats == admission_nats(parent, slopes) < step.best_gain
+    assert step.admission_nats == pytest.approx(admission_nats(parent, slopes), rel=1e-9)
+    assert step.admission_nats < step.best_gain
 
 
 def test_what_was_fitted_carries_to_a_part_left_out(path):

@@ -95,27 +95,40 @@ def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
 BLOCKS = SimpleNamespace(of_row=np.zeros(100, dtype=int), compared=np.ones(100, dtype=bool))
 
 
-def left(residual_v, total):
+COMPETING = 20
+
+
+def left(residual_v, total, evidence=None, names=("one",)):
     """A fit without parameters that leaves this of unseen data."""
-    score = SimpleNamespace(total=total, shifts={"block": np.zeros((1, 0))})
+    evidence = total if evidence is None else evidence
+    score = SimpleNamespace(total=total, evidence=evidence, shifts={"block": np.zeros((1, 0))})
     point = SimpleNamespace(residual_v=residual_v, jacobian_v=np.zeros((100, 0)))
-    return SimpleNamespace(score=score, point=point, at_bounds=())
+    return SimpleNamespace(score=score, point=point, at_bounds=(), hypothesis=names)
 
 
 def test_an_effect_that_moves_unseen_data_is_a_step_though_it_is_no_end_before_it_lowers_the_error():
     wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
-    before, moved, lower = left(wave_v, 0.0), left(-wave_v, 50.0), left(0.5 * wave_v, 50.0)
-    assert admissible(BLOCKS, before, moved, 5.0)
-    assert not needed(BLOCKS, before, moved, 5.0)
-    assert admissible(BLOCKS, before, lower, 5.0)
-    assert needed(BLOCKS, before, lower, 5.0)
+    before = left(wave_v, 0.0, names=())
+    moved, lower = left(-wave_v, 50.0), left(0.5 * wave_v, 50.0)
+    assert admissible(BLOCKS, before, moved, 5.0, COMPETING)
+    assert not needed(BLOCKS, before, moved, 5.0, COMPETING)
+    assert admissible(BLOCKS, before, lower, 5.0, COMPETING)
+    assert needed(BLOCKS, before, lower, 5.0, COMPETING)
 
 
 def test_an_effect_that_says_little_or_moves_less_than_two_solvers_differ_by_is_no_step():
     wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
-    before = left(wave_v, 0.0)
-    assert not admissible(BLOCKS, before, left(0.5 * wave_v, 4.0), 5.0)
-    assert not admissible(BLOCKS, before, left(0.9 * wave_v, 50.0), 5.0)
+    before = left(wave_v, 0.0, names=())
+    assert not admissible(BLOCKS, before, left(0.5 * wave_v, 4.0), 5.0, COMPETING)
+    assert not admissible(BLOCKS, before, left(0.9 * wave_v, 50.0), 5.0, COMPETING)
+
+
+def test_what_one_of_many_names_foretells_by_luck_is_no_step_where_it_makes_the_data_less_likely():
+    wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
+    before = left(wave_v, 0.0, names=())
+    paid = float(np.log(COMPETING))
+    assert not admissible(BLOCKS, before, left(0.5 * wave_v, 8.5, evidence=paid - 0.1), 5.0, COMPETING)
+    assert admissible(BLOCKS, before, left(0.5 * wave_v, 8.5, evidence=paid + 0.1), 5.0, COMPETING)
 
 
 def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_right_one(cell, few, make):
