@@ -30,6 +30,7 @@ from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.likelihood.fit import said_at
+from aesi.tracer.likelihood.model_error import Size
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
@@ -47,7 +48,7 @@ def said_by_size(case: BlindCase) -> Array | None:
     fit = fitted_hypothesis(problem, blocks, case.effects, None, Archive(None, ""))
     if fit is None:
         return None
-    said = np.array([said_at(problem, blocks, fit.point, size).total for size in SIZES_V])
+    said = np.array([said_at(problem, blocks, fit.point, Size(size)).total for size in SIZES_V])
     return said - said.max()
 
 

@@ -63,7 +63,7 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
     if base is None:
         return {"cell": cell, "good": good, "other": other, "failed": True}
     grown = ended(growths_on([Parent(problem, blocks, base)], {}, archive), archive)
-    ratios = [_ratio(one) for one in grown if one is not None]
+    ratios = [ratio(one) for one in grown if one is not None]
     return {
         "cell": cell,
         "good": good,
@@ -74,7 +74,7 @@ def scatter(cell: str, good: str, other: str, cells: str = "experiments/cells") 
     }
 
 
-def _ratio(one: Grown) -> tuple[str, float]:
+def ratio(one: Grown) -> tuple[str, float]:
     """Of the amplitude of the effect that was grown which is furthest from nought; nought where all ended there."""
     effect = one.hypothesis[-1]
     sds = np.sqrt(np.diagonal(one.score.covariance))
@@ -100,15 +100,15 @@ def main() -> None:
     errors_mv = [row["model_error_mv"] for row in ran]
     summary = {
         "pairs": len(ran),
-        "rms_sds": {name: round(_rms(sds), 2) for name, sds in by_effect.items()},
-        "rms_sds_of_all": round(_rms([v for sds in by_effect.values() for v in sds]), 2),
+        "rms_sds": {name: round(rms(sds), 2) for name, sds in by_effect.items()},
+        "rms_sds_of_all": round(rms([v for sds in by_effect.values() for v in sds]), 2),
         "pairs_beyond": beyond,
         "model_error_mv": round(float(np.exp(np.mean(np.log(errors_mv)))), 2),
     }
     print(json.dumps({"summary": True, **summary}))
 
 
-def _rms(values: list[float]) -> float:
+def rms(values: list[float]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 

@@ -24,9 +24,47 @@ FEWEST_MEASURED = 6
 which lasts longer there."""
 RANGES = 3
 """Ranges of the current's RMS, and of the state of charge, by which blocks are left out together."""
+WINDOW_S = 20.0
+"""What is gone from a mean over so long is an error within seconds: it lasts 4 to 6 s on six development records. Over
+60 s it is 7 to 10 s, since the drift of what lasts is part of it (`python -m aesi.bench.fast_error`)."""
 OTHER_RATE = 1.1
 """Times the smallest mean of such a range that the largest one has to be: where the current never changes there is one
 rate. A convention."""
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """of_row : (n,) number of each row's window.  lasts_s : (n,) s that each row stands for."""
+
+    of_row: IntArray
+    lasts_s: Array
+
+    @classmethod
+    def within(cls, starts: IntArray, time_s: Array, lasts_s: Array, length_s: float) -> Windows:
+        """Windows of a length within each block.  starts : (b + 1,) first rows of blocks, and the number of rows."""
+        of_row = np.zeros(len(time_s), dtype=int)
+        opened = 0
+        for rows in _slices(starts):
+            since = time_s[rows] - time_s[rows.start]
+            of_row[rows] = opened + np.unique(np.floor(since / length_s), return_inverse=True)[1]
+            opened = int(of_row[rows.stop - 1]) + 1
+        return cls(of_row, lasts_s)
+
+    @cached_property
+    def whole_s(self) -> Array:
+        """(n,) s that the window of each row lasts."""
+        return np.asarray(np.bincount(self.of_row, self.lasts_s)[self.of_row], dtype=float)
+
+    @cached_property
+    def fast_share(self) -> Array:
+        """(n,) of each row, what is left of its freedom once the mean of its window is known: none of a lone row."""
+        return 1.0 - self.lasts_s / self.whole_s
+
+    def means(self, columns: Array) -> Array:
+        """Of each column (n, m) over the window of each row."""
+        weighted = columns * (self.lasts_s / self.whole_s)[:, None]
+        opens = np.flatnonzero(np.diff(self.of_row, prepend=-1))
+        return np.asarray(np.add.reduceat(weighted, opens, axis=0)[self.of_row])
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +72,15 @@ class Blocks:
     """starts : (b + 1,) first rows of the blocks, and the number of rows.  record : (b,) number of each block's record.
 
     folds : partition -> list of sets of blocks that are left out in turn.  compared : (n,) True for the rows by which
-    an error on unseen data is told, see `InverseProblem.compared`.
+    an error on unseen data is told, see `InverseProblem.compared`.  windows : of `WINDOW_S` within each block, None
+    where errors at the scale of seconds are not told apart.
     """
 
     starts: IntArray
     record: IntArray
     folds: dict[str, tuple[tuple[int, ...], ...]]
     compared: BoolArray
+    windows: Windows | None = None
 
     def __len__(self) -> int:
         return len(self.record)
@@ -84,7 +124,10 @@ def blocks_of(problem: InverseProblem) -> Blocks:
         if name == "charge" or _differ([rate[list(r)] for r in ranges]):
             folds[name] = ranges
     folds["end"] = (tuple(b for b in range(len(record)) if b >= round(SEEN_SHARE * len(record))),)
-    return Blocks(bounds, np.array(record), folds, problem.compared)
+    windows = None
+    if problem.two_scales:
+        windows = Windows.within(bounds, problem.time_s, problem.lasts_s, WINDOW_S)
+    return Blocks(bounds, np.array(record), folds, problem.compared, windows)
 
 
 def _slices(bounds: IntArray) -> list[slice]:

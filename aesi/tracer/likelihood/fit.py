@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Protocol
 
 import numpy as np
@@ -23,7 +23,7 @@ from aesi.tracer.likelihood.gaussian import (
     block_sums,
     score_at,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, off_within_seconds, whitened
 
 OWN_STEP = 0.1
 EFFECT_STEP = 4e-3
@@ -128,7 +128,7 @@ class HypothesisFitter:
     def descend(
         self,
         x: Array,
-        delta_v: float,
+        size: Size,
         rounds: int,
         slopes_v: Array | None = None,
         without: Sequence[int] = (),
@@ -138,7 +138,7 @@ class HypothesisFitter:
         slopes_v : (n, k) V, the model's sensitivities as they are near x, to begin with.  without : blocks that are
         not looked at.
         """
-        whitened_one = _Whitened(self, delta_v, ~np.isin(self.blocks.of_row, without))
+        whitened_one = _Whitened(self, size, ~np.isin(self.blocks.of_row, without))
         begin = None if slopes_v is None else whitened_one.columns(slopes_v)
         return descend(whitened_one, x, self.low, self.high, rounds, GAIN_NATS, begin).known_x
 
@@ -148,7 +148,8 @@ class HypothesisFitter:
         jacobian = None if e is None else self.jacobian(x, e)
         if e is None or jacobian is None:
             return None
-        point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]))
+        off_v = off_within_seconds(self.problem, self.blocks, self.hypothesis)
+        point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]), off_v)
         return FittedHypothesis(self.hypothesis, self.free, point, self.scored(point), self.simulations)
 
     def scored(self, point: Linearised) -> PredictiveScore:
@@ -160,26 +161,35 @@ def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> Predic
     """The predictive score of a linear form, over sizes of the model error."""
     prior = PRIORS[problem.trust]
     return best_over_sizes(
-        [said_at(problem, blocks, point, size, prior.log_density(size)) for size in prior.sizes_v]
+        [said_at(problem, blocks, point, size, prior.log_density(size)) for size in prior.sizes]
     )
 
 
 def said_at(
-    problem: InverseProblem, blocks: Blocks, point: Linearised, delta_v: float, log_prior: float = 0.0
+    problem: InverseProblem, blocks: Blocks, point: Linearised, size: Size, log_prior: float = 0.0
 ) -> PredictiveScore:
     """The predictive score of a linear form at one size of the model error."""
-    white, log_det = whitened(problem, blocks, point.table(), delta_v)
-    return score_at(blocks, block_sums(blocks, white, log_det), point.x, point.bounds, delta_v, log_prior)
+    white, log_det = whitened(problem, blocks, point.table(), size)
+    sums = block_sums(blocks, white, log_det)
+    said = score_at(blocks, sums, point.padded_x, point.padded_bounds, size, log_prior)
+    return said.of(np.arange(len(point.x)))
 
 
 @dataclass(frozen=True, eq=False)
 class _Whitened:
     """What a descent minimises at one size of the model error: whitened residual of the rows that are looked at (n,),
-    then the coordinates."""
+    less what the file may be off by at the scale of seconds, then the coordinates."""
 
     fitter: HypothesisFitter
-    delta_v: float
+    size: Size
     seen: BoolArray
+
+    @cached_property
+    def _off(self) -> Array:
+        """(n + k, k) orthonormal basis of what the file may be off by, over its prior."""
+        fitter = self.fitter
+        off = self._seen(off_within_seconds(fitter.problem, fitter.blocks, fitter.hypothesis))
+        return np.asarray(np.linalg.qr(np.vstack([off, np.eye(off.shape[1])]))[0])
 
     def residual(self, x: Array) -> Array | None:
         e = self.fitter.residual(x)
@@ -194,7 +204,12 @@ class _Whitened:
         return np.vstack([-self._white(jacobian_v), np.eye(jacobian_v.shape[1])])
 
     def _white(self, columns_v: Array) -> Array:
-        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.delta_v)[0][self.seen]
+        white, k = self._seen(columns_v), self._off.shape[1]
+        stacked = np.vstack([white, np.zeros((k, columns_v.shape[1]))])
+        return np.asarray(stacked - self._off @ (self._off.T @ stacked)) if k else white
+
+    def _seen(self, columns_v: Array) -> Array:
+        return whitened(self.fitter.problem, self.fitter.blocks, columns_v, self.size)[0][self.seen]
 
 
 class LinearForm(Protocol):
@@ -221,11 +236,12 @@ def prediction_sd_v(
     partition : of `blocks.folds`, in which each block is left out once.
     """
     x, jacobian = fit.point.x, fit.point.jacobian_v
-    white, log_det = whitened(problem, blocks, fit.point.table(), PRIORS[problem.trust].median_v)
+    white, log_det = whitened(problem, blocks, fit.point.table(), PRIORS[problem.trust].median)
     folds = blocks.folds[partition]
-    posterior = Posterior(block_sums(blocks, white, log_det), x, folds)
+    posterior = Posterior(block_sums(blocks, white, log_det), fit.point.padded_x, folds)
     out = np.empty(len(jacobian))
     for fold, covariance in zip(folds, posterior.covariances_without, strict=True):
         rows = np.isin(blocks.of_row, fold)
-        out[rows] = np.sqrt(np.einsum("ij,ij->i", jacobian[rows] @ covariance, jacobian[rows]))
+        own = covariance[: len(x), : len(x)]
+        out[rows] = np.sqrt(np.einsum("ij,ij->i", jacobian[rows] @ own, jacobian[rows]))
     return out

@@ -16,7 +16,7 @@ is of the rest.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -25,8 +25,8 @@ from scipy.optimize import lsq_linear
 
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import TINY
-from aesi.tracer.likelihood.model_error import LOG_2PI
+from aesi.tracer.case.free_parameter import FURTHEST_SDS, TINY
+from aesi.tracer.likelihood.model_error import LOG_2PI, Size
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,16 +164,36 @@ class Posterior:
 @dataclass(frozen=True, eq=False)
 class Linearised:
     """A hypothesis about a point: coordinates (m,), residual (n,) V, sensitivities of the model (n, m) V, and bounds
-    (m, 2) of the coordinates."""
+    (m, 2) of the coordinates.
+
+    off_v : (n, k) V, what the file may be off by at the scale of seconds alone, for one standard deviation of each:
+    part of the model error, not of the model.
+    """
 
     x: Array
     residual_v: Array
     jacobian_v: Array
     bounds: Array
+    off_v: Array
 
     def table(self) -> Array:
-        """(n, 1 + m)."""
-        return np.column_stack([self.residual_v, self.jacobian_v])
+        """(n, 1 + m + k)."""
+        return np.column_stack([self.residual_v, self.jacobian_v, self.off_v])
+
+    @property
+    def padded_x(self) -> Array:
+        """(m + k,) with what the file is off by at nought."""
+        return np.concatenate([self.x, np.zeros(self.off_v.shape[1])])
+
+    @property
+    def padded_bounds(self) -> Array:
+        """(m + k, 2), of what the file is off by as of its own parameters."""
+        return np.vstack([self.bounds, bounds_of_own(self.off_v.shape[1])])
+
+
+def bounds_of_own(k: int) -> Array:
+    """(k, 2) bounds of coordinates of own parameters."""
+    return np.tile([-FURTHEST_SDS, FURTHEST_SDS], (k, 1))
 
 
 PARTITIONS_OF_CONDITIONS = ("record", "rate", "charge")
@@ -183,18 +203,29 @@ PARTITIONS_OF_CONDITIONS = ("record", "rate", "charge")
 class PredictiveScore:
     """What a hypothesis says of data that it has not seen, at the size of the model error at which it says most.
 
-    delta_v : that size.  log_density : by partition, (f,) nats of each fold.  total : half over blocks, half over the
+    size : that size.  log_density : by partition, (f,) nats of each fold.  total : half over blocks, half over the
     mean of the conditions, and the log prior of the size.  evidence : log marginal likelihood at that size.
     shifts : by partition, (f, m) change of the parameters without each fold.
     """
 
-    delta_v: float
+    size: Size
     log_density: Mapping[str, Array]
     total: float
     evidence: float
     shifts: Mapping[str, Array]
     shift: Array
     covariance: Array
+
+    @property
+    def delta_v(self) -> float:
+        """Size of what lasts of the model error, V."""
+        return self.size.delta_v
+
+    def of(self, columns: IntArray) -> PredictiveScore:
+        """The same with the shifts and the covariance of some of the parameters; the others are marginalised."""
+        shifts = {name: shift[:, columns] for name, shift in self.shifts.items()}
+        covariance = self.covariance[np.ix_(columns, columns)]
+        return replace(self, shifts=shifts, shift=self.shift[columns], covariance=covariance)
 
 
 def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArray]:
@@ -211,7 +242,7 @@ def held_at_bounds(posterior: Posterior, bounds: Array) -> tuple[Array, BoolArra
 
 
 def score_at(
-    blocks: Blocks, sums: BlockSums, x: Array, bounds: Array, delta_v: float, log_prior: float
+    blocks: Blocks, sums: BlockSums, x: Array, bounds: Array, size: Size, log_prior: float
 ) -> PredictiveScore:
     """The score of a hypothesis at one size of the model error.
 
@@ -234,7 +265,7 @@ def score_at(
     shift[free], covariance[np.ix_(free, free)] = posterior.shift, posterior.covariance
     evidence = posterior.evidence - 0.5 * float(np.sum((x + to_bounds)[held] ** 2))
     shifts = dict(zip(names, np.split(whole, ends), strict=True))
-    return PredictiveScore(delta_v, parts, total, evidence, shifts, shift, covariance)
+    return PredictiveScore(size, parts, total, evidence, shifts, shift, covariance)
 
 
 def best_over_sizes(scores: Sequence[PredictiveScore]) -> PredictiveScore:

@@ -25,9 +25,10 @@ from aesi.tracer.likelihood.gaussian import (
     PredictiveScore,
     best_over_sizes,
     block_sums,
+    bounds_of_own,
     score_at,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, off_within_seconds, whitened
 
 ROUNDS = 6
 """Slopes are taken so many times at most."""
@@ -42,11 +43,12 @@ class Parent:
     fit: FittedHypothesis
 
     @cached_property
-    def white(self) -> dict[float, tuple[Array, Array]]:
-        """Size -> whitened sensitivities (n, m) and log|C| (n,)."""
+    def white(self) -> dict[Size, tuple[Array, Array]]:
+        """Size -> whitened sensitivities and what the file may be off by (n, m + k), and log|C| (n,)."""
+        columns = self.fit.point.table()[:, 1:]
         return {
-            delta: whitened(self.problem, self.blocks, self.fit.point.jacobian_v, delta)
-            for delta in PRIORS[self.problem.trust].sizes_v
+            size: whitened(self.problem, self.blocks, columns, size)
+            for size in PRIORS[self.problem.trust].sizes
         }
 
     @cached_property
@@ -90,7 +92,7 @@ class Grown:
 class EffectGrowth:
     """A parent and an effect that is being fitted on it.
 
-    delta_v : one of the tried sizes, at which the effect's parameters are fitted.
+    size : one of the tried sizes, at which the effect's parameters are fitted.
     known : coordinates of the effect's parameters where an earlier descent ended.  near : where one with the other
     model of the cell did, to start from; None: from the best of several starts.
     """
@@ -99,11 +101,11 @@ class EffectGrowth:
         self,
         parent: Parent,
         effect: str,
-        delta_v: float,
+        size: Size,
         known: Array | None = None,
         near: Array | None = None,
     ) -> None:
-        self.parent, self.effect, self.delta_v = parent, effect, delta_v
+        self.parent, self.effect, self.size = parent, effect, size
         self.known = known
         self.problem, fit = parent.problem, parent.fit
         self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
@@ -116,7 +118,10 @@ class EffectGrowth:
         self.starts = begin[:1] or [np.clip(u, self.low, self.high) for u in starts(self.added)]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
-        basis = np.vstack([parent.white[delta_v][0][:, self.rest], np.eye(len(self.rest))])
+        self.off_v = off_within_seconds(self.problem, parent.blocks, (*fit.hypothesis, effect))
+        off = whitened(self.problem, parent.blocks, self.off_v, size)[0]
+        known_columns = np.column_stack([parent.white[size][0][:, self.rest], off])
+        basis = np.vstack([known_columns, np.eye(known_columns.shape[1])])
         self.q = np.linalg.qr(basis)[0]
         self._errors: dict[bytes, Array | None] = {}
         self._slopes: dict[bytes, Array] = {}
@@ -155,8 +160,8 @@ class EffectGrowth:
 
     def projected(self, columns: Array, tail: Array) -> Array:
         """Whitened columns over those of the rest's prior, less what the rest can take up."""
-        white = whitened(self.problem, self.parent.blocks, columns, self.delta_v)[0]
-        stacked = np.vstack([white, tail])
+        white = whitened(self.problem, self.parent.blocks, columns, self.size)[0]
+        stacked = np.vstack([white, tail, np.zeros((self.off_v.shape[1], columns.shape[1]))])
         return stacked - self.q @ (self.q.T @ stacked)
 
     def residual(self, u: Array) -> Array | None:
@@ -223,18 +228,19 @@ class EffectGrowth:
         return min(promised, key=lambda one: one[0])[1] if promised else None
 
 
-def promise(parent: Parent, slopes_v: Array, delta_v: float) -> float:
+def promise(parent: Parent, slopes_v: Array, size: Size) -> float:
     """What an effect would say of unseen data on top of a parent, nats up to a constant, to first order and with the
     slopes that it had on another one: costs no simulation."""
     fit = parent.fit
-    known, log_det = parent.white[delta_v]
+    known, log_det = parent.white[size]
     own = np.column_stack([fit.point.residual_v, slopes_v])
-    new, _ = whitened(parent.problem, parent.blocks, own, delta_v)
+    new, _ = whitened(parent.problem, parent.blocks, own, size)
     table = np.column_stack([new[:, :1], known, new[:, 1:]])
-    x = np.concatenate([fit.point.x, np.zeros(slopes_v.shape[1])])
+    x = np.concatenate([fit.point.padded_x, np.zeros(slopes_v.shape[1])])
     open_ends = np.tile([-np.inf, np.inf], (slopes_v.shape[1], 1))
+    bounds = np.vstack([fit.point.padded_bounds, open_ends])
     sums = block_sums(parent.blocks, table, log_det)
-    return score_at(parent.blocks, sums, x, np.vstack([fit.point.bounds, open_ends]), delta_v, 0.0).total
+    return score_at(parent.blocks, sums, x, bounds, size, 0.0).total
 
 
 def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
@@ -245,17 +251,20 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     bounds = np.vstack(
         [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
     )
-    own_columns = np.column_stack([e, jacobian[:, inside]])
-    for delta in prior.sizes_v:
-        known, _ = parent.white[delta]
-        new, log_det = whitened(growth.problem, parent.blocks, own_columns, delta)
+    own_columns = np.column_stack([e, jacobian[:, inside], growth.off_v])
+    off = bounds_of_own(growth.off_v.shape[1])
+    padded_x, padded_bounds = np.concatenate([x, np.zeros(len(off))]), np.vstack([bounds, off])
+    for size in prior.sizes:
+        known, _ = parent.white[size]
+        new, log_det = whitened(growth.problem, parent.blocks, own_columns, size)
         table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
         sums = block_sums(parent.blocks, table, log_det)
-        out.append(score_at(parent.blocks, sums, x, bounds, delta, prior.log_density(delta)))
+        said = score_at(parent.blocks, sums, padded_x, padded_bounds, size, prior.log_density(size))
+        out.append(said.of(np.arange(len(x))))
     hypothesis = (*fit.hypothesis, growth.effect)
     free = (*(fit.free[j] for j in growth.rest), *(f for f, i in zip(growth.added, inside, strict=True) if i))
     slopes = np.column_stack([fit.point.jacobian_v[:, growth.rest], jacobian[:, inside]])
-    point = Linearised(x, e, slopes, bounds)
+    point = Linearised(x, e, slopes, bounds, growth.off_v)
     on_bounds = {f.key: f.value(float(v)) for f, v, i in zip(growth.added, u, inside, strict=True) if not i}
     score, held = best_over_sizes(out), growth.held_on_bounds()
     return Grown(hypothesis, free, point, score, growth.simulations, on_bounds, held, u, jacobian)

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from aesi.numerics.typing import Array
-from aesi.tracer.case.blocks import Blocks
+from aesi.tracer.case.blocks import Blocks, Windows
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.gaussian import PARTITIONS_OF_CONDITIONS
 from aesi.tracer.likelihood.growth import Parent
@@ -39,24 +39,31 @@ def admission_nats(parent: Parent, slopes_v: Mapping[str, Array], seed: int = 0)
 def largest_gains(
     parent: Parent, slopes_v: Mapping[str, Array], draws: int, rng: np.random.Generator
 ) -> Array:
-    """(draws,) nats, the largest gain over the effects on each surrogate."""
-    problem, blocks, delta_v = parent.problem, parent.blocks, parent.fit.score.delta_v
-    white = _drawn(problem, draws, rng)
-    known = parent.white[delta_v][0]
-    every = np.column_stack([known, *slopes_v.values()])
-    every[:, known.shape[1] :] = whitened(problem, blocks, every[:, known.shape[1] :], delta_v)[0]
-    sums = _Sums.over_blocks(blocks, every, white)
+    """(draws,) nats, the largest gain over the effects on each surrogate; of none less than any number."""
+    if not slopes_v:
+        return np.full(draws, -np.inf)
+    problem, blocks, size = parent.problem, parent.blocks, parent.fit.score.size
+    white = _drawn(problem, blocks.windows, draws, rng)
+    known = parent.white[size][0]
+    added = whitened(problem, blocks, np.column_stack(list(slopes_v.values())), size)[0]
+    sums = _Sums.over_blocks(blocks, np.column_stack([known, added]), white)
     ends = known.shape[1] + np.cumsum([0, *(slopes.shape[1] for slopes in slopes_v.values())])
-    return _gains(blocks, sums, known.shape[1], list(pairwise(ends.tolist()))).max(axis=0, initial=-np.inf)
+    return _gains(blocks, sums, known.shape[1], list(pairwise(ends.tolist()))).max(axis=0)
 
 
-def _drawn(problem: InverseProblem, draws: int, rng: np.random.Generator) -> Array:
+def _drawn(problem: InverseProblem, windows: Windows | None, draws: int, rng: np.random.Generator) -> Array:
     """(n, draws) of model error and noise, whitened: standard normal numbers. Under a coarsened likelihood the rows
-    that make up one independent sample share its draw."""
+    that make up one independent sample share its draw; what is gone within seconds has a draw in each row, less the
+    mean of its window."""
     if not problem.coarse:
         return rng.normal(size=(len(problem.time_s), draws))
     sample = np.floor(np.cumsum(problem.independent) - problem.independent).astype(int)
-    return np.sqrt(problem.independent)[:, None] * rng.normal(size=(sample[-1] + 1, draws))[sample]
+    root = np.sqrt(problem.independent)[:, None]
+    lasting = root * rng.normal(size=(sample[-1] + 1, draws))[sample]
+    if windows is None:
+        return lasting
+    gone = rng.normal(size=lasting.shape) / root
+    return np.asarray(lasting + root * (gone - windows.means(gone)))
 
 
 @dataclass(frozen=True, eq=False)

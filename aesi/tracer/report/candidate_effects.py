@@ -118,8 +118,9 @@ def _reach(path: Path, one: Explanation) -> dict[tuple[str, str], tuple[float, f
             point.residual_v,
             np.column_stack([point.jacobian_v, one.slopes_v[:, further]]),
             np.vstack([point.bounds, np.array([added[j].bounds for j in further]).reshape(-1, 2)]),
+            point.off_v,
         )
-    white, log_det = whitened(path.problem, path.blocks, point.table(), one.score.delta_v)
-    posterior = Posterior(block_sums(path.blocks, white, log_det), point.x, ())
-    ends = reaches(posterior, point.bounds, SHARE)
+    white, log_det = whitened(path.problem, path.blocks, point.table(), one.score.size)
+    posterior = Posterior(block_sums(path.blocks, white, log_det), point.padded_x, ())
+    ends = reaches(posterior, point.padded_bounds, SHARE)[: len(keys)]
     return {key: (float(below), float(above)) for key, (below, above) in zip(keys, ends, strict=True)}

@@ -13,7 +13,7 @@ from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, coor
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
 from aesi.tracer.likelihood.growth import Explanation
-from aesi.tracer.likelihood.model_error import PRIORS
+from aesi.tracer.likelihood.model_error import PRIORS, SizePrior, replace_fast
 from aesi.tracer.search.archive import Archive, fit_name
 
 FIT_ROUNDS = 8
@@ -47,12 +47,23 @@ def fitted_hypothesis(
     if x is None:
         prior = PRIORS[problem.trust]
         if near is None:
-            x = fitter.descend(np.zeros(len(fitter.free)), prior.nearest(prior.median_v), FIT_ROUNDS)
+            x = _from_the_middle(fitter, prior)
         else:
-            x0, size = coordinates_of(fitter.free, near.placed), prior.nearest(near.score.delta_v)
+            x0, size = coordinates_of(fitter.free, near.placed), prior.nearest(near.score.size)
             x = fitter.descend(x0, size, FIT_ROUNDS, _slopes_v(near, fitter.free))
         archive.put(name, x)
     return fitter.finished(x)
+
+
+def _from_the_middle(fitter: HypothesisFitter, prior: SizePrior) -> Array:
+    """Coordinates after a descent from the middle of every prior at the median size of the model error, and after one
+    more where so much is left within seconds that what the file may be off by would go beyond its bounds to make up for
+    it. A lag of 2 s in a Panasonic's drive ended at 0.5 s with 3 mV and at 2.1 s with the 24 mV that were left."""
+    x = fitter.descend(np.zeros(len(fitter.free)), prior.nearest(prior.median), FIT_ROUNDS)
+    there = fitter.finished(x) if prior.fast is not None else None
+    if there is None or there.score.size.fast_v <= prior.median.fast_v:
+        return x
+    return fitter.descend(x, replace_fast(prior.median, there.score.size), FIT_ROUNDS)
 
 
 def values_without(
@@ -61,7 +72,7 @@ def values_without(
     """owner -> name -> value where the data without some blocks put a hypothesis: with the whole model, by steps from
     where all data put it and updates of the slopes that it has there."""
     fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
-    x = fitter.descend(fit.point.x, fit.score.delta_v, 0, fit.point.jacobian_v, fold)
+    x = fitter.descend(fit.point.x, fit.score.size, 0, fit.point.jacobian_v, fold)
     return values_of(fit.free, x)
 
 

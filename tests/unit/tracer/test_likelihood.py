@@ -6,6 +6,7 @@ import pytest
 from aesi.numerics.noise.discrepancy import CORRELATION_LENGTHS_S, whiten
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums, held_at_bounds, score_at
+from aesi.tracer.likelihood.model_error import Size
 
 RNG = np.random.default_rng(4)
 N, M = 60, 3
@@ -71,7 +72,7 @@ def test_what_the_data_push_beyond_a_bound_is_held_there_and_scored_as_if_it_wer
     assert held.tolist() == [True, False, False]
     assert to_bounds == pytest.approx([1.0, 0.0, 0.0])
 
-    score = score_at(BLOCKS, sums, x, bounds, 1.0, 0.0)
+    score = score_at(BLOCKS, sums, x, bounds, Size(1.0), 0.0)
     known = np.column_stack([residual - jacobian[:, 0], jacobian[:, 1:]])
     table, log_det = whiten(known, TIME, STARTS[:-1], AMPLITUDE, WHITE)
     two = Posterior(block_sums(BLOCKS, table, log_det), np.zeros(2), BLOCKS.folds["block"])
