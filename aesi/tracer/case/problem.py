@@ -29,12 +29,13 @@ from aesi.tracer.case.free_parameter import (
 )
 from aesi.tracer.case.records import PreparedRecord
 
-Trust = Literal["exact", "tight", "loose", "measured", "beside"]
+Trust = Literal["exact", "tight", "loose", "measured", "lasting", "beside"]
 """How far the declared parameters are believed. exact: fitted to this very cell by this very model.  tight: a careful
 parametrisation of this cell.  loose: one of another cell of its make.  measured: fitted to this very cell by a model
-that errs as models of measured cells do, its records read by instruments that may be off.  beside: the same, with
-records of the cell that are known to be good, so that the question is what is different about the others."""
-MEASURED_CELL: tuple[Trust, ...] = ("measured", "beside")
+that errs as models of measured cells do, its records read by instruments that may be off.  lasting: the same, where
+what is gone within seconds does not count.  beside: as lasting, with records of the cell that are known to be good, so
+that the question is what is different about the others."""
+MEASURED_CELL: tuple[Trust, ...] = ("measured", "lasting", "beside")
 INDEPENDENT_S, INDEPENDENT_CHARGE = 200.0, 0.05
 """How long, and over how much charge, the error of a model of a measured cell lasts: its integral correlation time is
 45 to 670 s on eight development records of `aesi bench real`, geometric mean 140 s about the mean and 260 s about

@@ -97,7 +97,8 @@ def gathered(
     if verdict.word != "unknown":
         return _adopted(path, paths, with_confidence(verdict), recalibrated)
     measured, blocks = path_of("measured"), path.blocks
-    options = [*recalibrations, Option.of(measured.problem, blocks, measured.base)]
+    lasting = _by_what_lasts(problem, measured, archive)
+    options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base)]
     if path.beyond_reach_v is not None and len(problem.records) > 1:
         options += _with_stand_ins(path_of("loose"), blocks)
     named: list[Option] = []
@@ -105,7 +106,7 @@ def gathered(
         path = measured  # the only one that tried anything
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, thresholds)
-        named = named_options(path, paths["tight"], blocks, archive)
+        named = named_options(lasting, paths["tight"], blocks, archive)
     after, why = written(Option.of(problem, blocks, None), options, named)
     limits = (*stand_ins(after, verdict.effects), *limits_of(after)) if after.hypothesis else ()
     return Evidence(path, paths, recalibrated, after, with_confidence(verdict), why, limits)
@@ -202,6 +203,17 @@ def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> 
     if found is not None:
         named.append(Option.of(found.problem, blocks, found.chosen))
     return named
+
+
+def _by_what_lasts(problem: InverseProblem, measured: Path, archive: Archive) -> Path:
+    """What a search on a measured cell named, fitted by what lasts of the model error alone: seconds tell which effect
+    it is, but what is written has to hold over hours.
+
+    Of a Panasonic drive read 2 s late, a development record of `aesi bench real`, 2.9 mV are left so and 3.9 by both
+    scales, of its drive at -10 degC with its temperature 15.4 and 18.3.
+    """
+    found = refitted(replace(problem, trust="lasting"), measured, archive)
+    return measured if found is None else found
 
 
 def _with_stand_ins(wide: Path, blocks: Blocks) -> list[Option]:

@@ -12,13 +12,14 @@ from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
 from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
+from aesi.tracer.likelihood.model_error import PRIORS, Size
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
 ADDED_OHM = 2e-3
-SIZE_V = 2e-4
+SIZE = PRIORS["tight"].nearest(Size(2e-4))
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ def test_an_effect_grows_about_the_declared_values_as_it_fits_though_the_rest_ha
     assert own_coordinates(there) == [0.0] * len(own_coordinates(base))
     whole = fitted_hypothesis(problem, blocks, ("series_resistance",), None, archive)
     gains = [
-        EffectGrowth(Parent(problem, blocks, one), "series_resistance", SIZE_V).ended().score.total
+        EffectGrowth(Parent(problem, blocks, one), "series_resistance", SIZE).ended().score.total
         for one in (base, there)
     ]
     off = [abs(gain - whole.score.total) for gain in gains]
