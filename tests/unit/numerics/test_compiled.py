@@ -47,10 +47,10 @@ print(total(Point(1.0, 2.0)), sum(total.stats.cache_hits.values()))
 def package(tmp_path):
     """A small package in place of ours, with its compiler."""
     home = tmp_path / "aesi"
-    (home / "numerics").mkdir(parents=True)
-    for name in ("numerics/compiled.py", "numerics/cache_folder.py", "errors.py"):
+    (home / "numerics" / "files").mkdir(parents=True)
+    for name in ("numerics/compiled.py", "numerics/files/cache_folder.py", "errors.py"):
         shutil.copy(ROOT / "aesi" / name, home / name)
-    for name in ("__init__.py", "numerics/__init__.py"):
+    for name in ("__init__.py", "numerics/__init__.py", "numerics/files/__init__.py"):
         (home / name).touch()
     (home / "layout.py").write_text(LAYOUT)
     (home / "total_kernels.py").write_text(KERNEL)
