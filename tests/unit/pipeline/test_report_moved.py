@@ -31,6 +31,11 @@ def test_what_moved_is_named_with_how_far_and_what_ended_on_its_limit_is_said_so
     )
 
 
+def test_a_factor_that_moved_by_a_little_is_not_called_once_what_was_declared():
+    moved = row("conductivity_factor", 1.04, 1.4, effect="electrolyte_transport")
+    assert moved_summary([moved]) == "electrolyte transport (conductivity) 1.04 times declared"
+
+
 def test_with_a_finding_the_fit_beside_it_is_told_too():
     texts = moved_findings(
         {"effects": ["self_heating"], "own_parameters": {"recalibrated": [FAR], "after": [STAYED]}}

@@ -65,16 +65,16 @@ def _moved(row: Row) -> str:
 def moved_value(row: Row) -> str:
     """Where a parameter went: '0.42 times declared', '0.97 (declared 1)', '3.1 mohm'."""
     if row["unit"] == "dimensionless" and row["declared"] == 1.0:
-        return f"{row['value']:.2g} times declared"
+        return f"{_apart(row['value'], 1.0, least=2)[0]} times declared"
     if row["unit"] in ("dimensionless", "1"):
         there, declared = _apart(row["value"], row["declared"])
         return f"{there} (declared {declared})"
     return rounded(row["value"], row["unit"])
 
 
-def _apart(value: float, declared: float) -> tuple[str, str]:
-    """Both in as few digits, three at least, as show that they differ."""
-    for digits in range(3, MOST_DIGITS):
+def _apart(value: float, declared: float, least: int = 3) -> tuple[str, str]:
+    """Both in as few digits as show that they differ."""
+    for digits in range(least, MOST_DIGITS):
         if f"{value:.{digits}g}" != f"{declared:.{digits}g}":
             return f"{value:.{digits}g}", f"{declared:.{digits}g}"
     return f"{value:.{MOST_DIGITS}g}", f"{declared:.{MOST_DIGITS}g}"
