@@ -277,10 +277,9 @@ class InverseProblem:
     def off_at_seconds(self, hypothesis: Sequence[str]) -> Array:
         """(n, k) V: what each of the declared parameters that a file may be off by at the scale of seconds, but not
         beyond, does to the voltage of the declared cell, for one standard deviation."""
-        if not self.two_scales:
-            return np.zeros((len(self.time_s), 0))
-        kept = [column for owner, column in self._off_at_seconds if owner not in hypothesis]
-        return np.column_stack(kept)
+        off = self._off_at_seconds if self.two_scales else ()
+        kept = [column for owner, column in off if owner not in hypothesis]
+        return np.column_stack([np.zeros((len(self.time_s), 0)), *kept])
 
     @cached_property
     def _off_at_seconds(self) -> tuple[tuple[str, Array], ...]:

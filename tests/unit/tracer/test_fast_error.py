@@ -14,7 +14,7 @@ from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size, amplitude_v, whitened
 from aesi.tracer.likelihood.surrogates import _drawn
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import base_of
+from aesi.tracer.search.fitted import base_of, fitted_hypothesis
 
 SIZE = Size(9e-3, 3e-3)
 
@@ -67,6 +67,14 @@ def test_the_file_may_be_off_in_contacts_and_in_what_careful_parametrisations_di
     assert problem.off_at_seconds(("series_resistance",)).shape[1] == 2
     for other in ("tight", "loose", "beside"):
         assert replace(problem, trust=other).off_at_seconds(()).shape[1] == 0
+
+
+def test_a_search_for_one_effect_alone_on_a_measured_cell_has_nothing_else_that_may_be_off(problem):
+    alone = replace(problem, effects={"series_resistance": CATALOGUE["series_resistance"]})
+    blocks, archive = blocks_of(alone), Archive(None, "")
+    assert alone.off_at_seconds(("series_resistance",)).shape == (len(alone.time_s), 0)
+    fit = fitted_hypothesis(alone, blocks, ("series_resistance",), base_of(alone, blocks, archive), archive)
+    assert np.isfinite(fit.score.total)
 
 
 def test_a_lag_of_a_second_says_more_where_seconds_count(cell, few, make):
