@@ -197,6 +197,11 @@ def _remembered(model: ModelName, changed: EspmModel, told: _Told, soc0: float, 
     return _solved(solver(model), changed, told.record, soc0, hold)
 
 
+def forget_solutions() -> None:
+    """Solve anew what was solved before: for who times it."""
+    _remembered.cache_clear()
+
+
 def _copied(solution: Solution) -> Solution:
     """The caller's own arrays."""
     rows, extra, fault_at, fault = solution

@@ -13,6 +13,7 @@ import numpy as np
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, simulate
+from aesi.physics.simulation import forget_solutions
 from aesi.pipeline.cross_check import DEFAULT_MESH, FINE_MESH, pybamm_run
 
 DEFAULT_CELL = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
@@ -73,6 +74,7 @@ def random_load(samples: int, capacity_ah: float, rng: np.random.Generator) -> t
 
 
 def _timed(cell: Cell, time: Array, current: Array) -> tuple[float, Array]:
+    forget_solutions()
     start = process_time()
     run = simulate(cell, time, current, soc0=SOC0)
     return process_time() - start, run.voltage_v

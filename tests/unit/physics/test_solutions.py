@@ -5,7 +5,7 @@ import pytest
 
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.simulation import _remembered
+from aesi.physics.simulation import _remembered, forget_solutions
 
 TIME_S = np.arange(60.0)
 
@@ -13,7 +13,7 @@ TIME_S = np.arange(60.0)
 @pytest.fixture
 def solved():
     """How many solutions were found since the last time that this was asked."""
-    _remembered.cache_clear()
+    forget_solutions()
     before = [0]
 
     def since() -> int:
@@ -63,3 +63,10 @@ def test_who_changes_an_answer_changes_nobody_elses(lg_m50: Cell, solved):
     assert solved() == 1
     assert np.array_equal(third.voltage_v, kept)
     assert np.array_equal(third.series["c_e0"], second.series["c_e0"])
+
+
+def test_what_is_timed_is_solved_anew(lg_m50: Cell, solved):
+    simulate(lg_m50, TIME_S, np.ones(60), soc0=0.8)
+    forget_solutions()
+    simulate(lg_m50, TIME_S, np.ones(60), soc0=0.8)
+    assert _remembered.cache_info().misses == 1
