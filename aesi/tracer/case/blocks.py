@@ -51,20 +51,24 @@ class Windows:
         return cls(of_row, lasts_s)
 
     @cached_property
-    def whole_s(self) -> Array:
-        """(n,) s that the window of each row lasts."""
-        return np.asarray(np.bincount(self.of_row, self.lasts_s)[self.of_row], dtype=float)
+    def of_window(self) -> Array:
+        """(n,) share of its window that each row stands for."""
+        return np.asarray(self.lasts_s / np.bincount(self.of_row, self.lasts_s)[self.of_row], dtype=float)
 
     @cached_property
     def fast_share(self) -> Array:
         """(n,) of each row, what is left of its freedom once the mean of its window is known: none of a lone row."""
-        return 1.0 - self.lasts_s / self.whole_s
+        return 1.0 - self.of_window
+
+    @cached_property
+    def _opens(self) -> IntArray:
+        """First row of each window."""
+        return np.flatnonzero(np.diff(self.of_row, prepend=-1))
 
     def means(self, columns: Array) -> Array:
         """Of each column (n, m) over the window of each row."""
-        weighted = columns * (self.lasts_s / self.whole_s)[:, None]
-        opens = np.flatnonzero(np.diff(self.of_row, prepend=-1))
-        return np.asarray(np.add.reduceat(weighted, opens, axis=0)[self.of_row])
+        weighted = columns * self.of_window[:, None]
+        return np.asarray(np.add.reduceat(weighted, self._opens, axis=0)[self.of_row])
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,8 +60,8 @@ EXACT_SHARE = 0.1
 """Of the tight spread of a declared parameter, where the file is believed exactly. A convention: not nought, so that
 what the numerics round off is no evidence for an effect."""
 
-STEP_SDS = 0.1
-"""Standard deviations over which a slope about the declared value is taken."""
+OWN_STEP = 0.1
+"""Of finite differences in a declared parameter, in standard deviations of its prior."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
@@ -258,8 +258,8 @@ class InverseProblem:
     def independent(self) -> Array:
         """(n,) share of an independent sample of the model error that each row stands for."""
         out = []
-        for data in self.seen:
-            lasts = np.gradient(data.time_s)
+        for data, rows in zip(self.seen, self.slices, strict=True):
+            lasts = self.lasts_s[rows]
             moved_ah = float(np.abs(data.current_a) @ lasts) / SECONDS_PER_HOUR
             by_charge = moved_ah / self.cell.nominal_capacity_ah / INDEPENDENT_CHARGE
             many = min(float(lasts.sum()) / INDEPENDENT_S, by_charge)
@@ -296,9 +296,9 @@ class InverseProblem:
                 if p.spread is None or p.spread.tight is None:
                     continue
                 one = own(effect.id, name, p, p.spread.tight)
-                moved = self._declared_with(effect, name, one.value(STEP_SDS))
+                moved = self._declared_with(effect, name, one.value(OWN_STEP))
                 if moved is not None:
-                    out.append((effect.id, (moved - held) / STEP_SDS))
+                    out.append((effect.id, (moved - held) / OWN_STEP))
         return tuple(out)
 
     def _declared_with(self, effect: Effect, name: str, value: float) -> Array | None:

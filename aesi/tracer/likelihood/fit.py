@@ -14,7 +14,7 @@ from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
-from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.problem import OWN_STEP, InverseProblem
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
     Posterior,
@@ -25,9 +25,8 @@ from aesi.tracer.likelihood.gaussian import (
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, off_within_seconds, whitened
 
-OWN_STEP = 0.1
 EFFECT_STEP = 4e-3
-"""Of finite differences, in standard deviations of the prior."""
+"""Of finite differences in a parameter of an effect, in standard deviations of the prior."""
 GAIN_NATS = 0.05
 """A descent stops when a step gains less than this."""
 
