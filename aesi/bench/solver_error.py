@@ -30,7 +30,7 @@ from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.likelihood.fit import said_at
-from aesi.tracer.likelihood.model_error import Size
+from aesi.tracer.likelihood.model_error import Size, SplitTable
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 
@@ -48,7 +48,8 @@ def said_by_size(case: BlindCase) -> Array | None:
     fit = fitted_hypothesis(problem, blocks, case.effects, None, Archive(None, ""))
     if fit is None:
         return None
-    said = np.array([said_at(problem, blocks, fit.point, Size(size)).total for size in SIZES_V])
+    table = SplitTable(problem, blocks, fit.point.table())
+    said = np.array([said_at(table, fit.point, Size(size)).total for size in SIZES_V])
     return said - said.max()
 
 

@@ -23,7 +23,7 @@ from aesi.tracer.likelihood.gaussian import (
     block_sums,
     score_at,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, Size, off_within_seconds, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
 
 EFFECT_STEP = 4e-3
 """Of finite differences in a parameter of an effect, in standard deviations of the prior."""
@@ -158,18 +158,14 @@ class HypothesisFitter:
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
     """The predictive score of a linear form, over sizes of the model error."""
-    prior = PRIORS[problem.trust]
-    return best_over_sizes(
-        [said_at(problem, blocks, point, size, prior.log_density(size)) for size in prior.sizes]
-    )
+    prior, table = PRIORS[problem.trust], SplitTable(problem, blocks, point.table())
+    return best_over_sizes([said_at(table, point, size, prior.log_density(size)) for size in prior.sizes])
 
 
-def said_at(
-    problem: InverseProblem, blocks: Blocks, point: Linearised, size: Size, log_prior: float = 0.0
-) -> PredictiveScore:
-    """The predictive score of a linear form at one size of the model error."""
-    white, log_det = whitened(problem, blocks, point.table(), size)
-    sums = block_sums(blocks, white, log_det)
+def said_at(table: SplitTable, point: Linearised, size: Size, log_prior: float = 0.0) -> PredictiveScore:
+    """The predictive score of a linear form at one size of the model error.  table : that of the point."""
+    blocks = table.blocks
+    sums = block_sums(blocks, *table.whitened(size))
     said = score_at(blocks, sums, point.padded_x, point.padded_bounds, size, log_prior)
     return said.of(np.arange(len(point.x)))
 

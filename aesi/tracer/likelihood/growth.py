@@ -28,7 +28,7 @@ from aesi.tracer.likelihood.gaussian import (
     bounds_of_own,
     score_at,
 )
-from aesi.tracer.likelihood.model_error import PRIORS, Size, off_within_seconds, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
 
 ROUNDS = 6
 """Slopes are taken so many times at most."""
@@ -45,11 +45,8 @@ class Parent:
     @cached_property
     def white(self) -> dict[Size, tuple[Array, Array]]:
         """Size -> whitened sensitivities and what the file may be off by (n, m + k), and log|C| (n,)."""
-        columns = self.fit.point.table()[:, 1:]
-        return {
-            size: whitened(self.problem, self.blocks, columns, size)
-            for size in PRIORS[self.problem.trust].sizes
-        }
+        columns = SplitTable(self.problem, self.blocks, self.fit.point.table()[:, 1:])
+        return {size: columns.whitened(size) for size in PRIORS[self.problem.trust].sizes}
 
     @cached_property
     def movable(self) -> IntArray:
@@ -251,12 +248,14 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
     bounds = np.vstack(
         [fit.point.bounds[growth.rest], np.column_stack([growth.low, growth.high])[inside].reshape(-1, 2)]
     )
-    own_columns = np.column_stack([e, jacobian[:, inside], growth.off_v])
+    own_columns = SplitTable(
+        growth.problem, parent.blocks, np.column_stack([e, jacobian[:, inside], growth.off_v])
+    )
     off = bounds_of_own(growth.off_v.shape[1])
     padded_x, padded_bounds = np.concatenate([x, np.zeros(len(off))]), np.vstack([bounds, off])
     for size in prior.sizes:
         known, _ = parent.white[size]
-        new, log_det = whitened(growth.problem, parent.blocks, own_columns, size)
+        new, log_det = own_columns.whitened(size)
         table = np.column_stack([new[:, :1], known[:, growth.rest], new[:, 1:]])
         sums = block_sums(parent.blocks, table, log_det)
         said = score_at(parent.blocks, sums, padded_x, padded_bounds, size, prior.log_density(size))

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -131,19 +132,41 @@ def amplitude_v(steepness: Array, delta_v: float, trust: Trust) -> Array:
     return np.sqrt(delta_v**2 + (charge * steepness) ** 2)
 
 
+@dataclass(frozen=True, eq=False)
+class SplitTable:
+    """Columns (n, m) in V that are whitened at several sizes of the model error: what lasts and what is gone within
+    seconds are told apart once for all of them."""
+
+    problem: InverseProblem
+    blocks: Blocks
+    table: Array
+
+    @cached_property
+    def _parts(self) -> tuple[Array, Array]:
+        """Means over the windows, and the rest: (n, m) V each."""
+        assert self.blocks.windows is not None
+        slow = self.blocks.windows.means(self.table)
+        return slow, self.table - slow
+
+    def whitened(self, size: Size) -> tuple[Array, Array]:
+        """The columns (n, m), whitened at a size, and log|C| by rows (n,)."""
+        problem, windows = self.problem, self.blocks.windows
+        amplitude = amplitude_v(problem.steepness, size.delta_v, problem.trust)
+        if not problem.coarse:
+            return whiten(self.table, problem.time_s, self.blocks.starts[:-1], amplitude, problem.white_v)
+        share = problem.independent
+        log_det = share * (2.0 * np.log(amplitude) + LOG_2PI) - LOG_2PI  # of so many samples, not of a row
+        if windows is None:
+            return self.table * (np.sqrt(share) / amplitude)[:, None], log_det
+        slow, rest = self._parts
+        over = slow / amplitude[:, None] + rest / size.fast_v
+        gone = share * windows.fast_share * (2.0 * np.log(size.fast_v) + LOG_2PI)
+        return over * np.sqrt(share)[:, None], log_det + gone
+
+
 def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) -> tuple[Array, Array]:
-    """Columns (n, m) in V, whitened at a size of the model error, and log|C| by rows (n,)."""
-    amplitude = amplitude_v(problem.steepness, size.delta_v, problem.trust)
-    if not problem.coarse:
-        return whiten(table, problem.time_s, blocks.starts[:-1], amplitude, problem.white_v)
-    share = problem.independent
-    log_det = share * (2.0 * np.log(amplitude) + LOG_2PI) - LOG_2PI  # of so many samples, not of a row
-    if blocks.windows is None:
-        return table * (np.sqrt(share) / amplitude)[:, None], log_det
-    slow = blocks.windows.means(table)
-    over = slow / amplitude[:, None] + (table - slow) / size.fast_v
-    gone = share * blocks.windows.fast_share * (2.0 * np.log(size.fast_v) + LOG_2PI)
-    return over * np.sqrt(share)[:, None], log_det + gone
+    """Columns (n, m) in V, whitened at one size of the model error, and log|C| by rows (n,)."""
+    return SplitTable(problem, blocks, table).whitened(size)
 
 
 def off_within_seconds(problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> Array:

@@ -11,7 +11,7 @@ from aesi.tracer.case.blocks import Windows, blocks_of
 from aesi.tracer.case.problem import OHMIC_SHARE
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
-from aesi.tracer.likelihood.model_error import PRIORS, Size, amplitude_v, whitened
+from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, amplitude_v, whitened
 from aesi.tracer.likelihood.surrogates import _drawn
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis
@@ -48,6 +48,20 @@ def test_what_lasts_counts_as_before_and_what_is_gone_by_its_own_size(problem):
     both = whitened(problem, blocks, slow + fast, SIZE)[0]
     assert both == pytest.approx(white + gone)
     assert np.sum(both**2) == pytest.approx(np.sum(white**2) + by_rows, rel=0.01)
+
+
+def test_a_table_is_split_once_for_all_sizes_of_the_model_error(problem, monkeypatch):
+    blocks = blocks_of(problem)
+    table = np.random.default_rng(0).normal(0.0, 5e-3, (len(problem.time_s), 3))
+    sizes = PRIORS["measured"].sizes
+    one_by_one = [whitened(problem, blocks, table, size) for size in sizes]
+    means, calls = Windows.means, []
+    monkeypatch.setattr(Windows, "means", lambda *given: calls.append(1) or means(*given))
+    at_once = SplitTable(problem, blocks, table)
+    for size, (white, log_det) in zip(sizes, one_by_one, strict=True):
+        assert np.array_equal(at_once.whitened(size)[0], white)
+        assert np.array_equal(at_once.whitened(size)[1], log_det)
+    assert len(calls) == 1
 
 
 def test_sizes_of_both_are_tried_together_where_they_are_told_apart():
