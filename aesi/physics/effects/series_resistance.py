@@ -37,6 +37,7 @@ EFFECT = Effect(
     __doc__,
     PARAMETERS,
     on_model=add_resistance,
+    ohmic=True,
     experiment="impedance at 1 kHz",
     told_apart={
         "electrolyte_transport": (

@@ -278,17 +278,18 @@ class InverseProblem:
         """(n, k) V: what each of the declared parameters that a file may be off by at the scale of seconds, but not
         beyond, does to the voltage of the declared cell, for one standard deviation."""
         off = self._off_at_seconds if self.two_scales else ()
-        kept = [column for owner, column in off if owner not in hypothesis]
+        kept = [column for restating, column in off if restating.isdisjoint(hypothesis)]
         return np.column_stack([np.zeros((len(self.time_s), 0)), *kept])
 
     @cached_property
-    def _off_at_seconds(self) -> tuple[tuple[str, Array], ...]:
-        """(effect that restates the parameter, (n,) V for one standard deviation); the first is the contact."""
+    def _off_at_seconds(self) -> tuple[tuple[frozenset[str], Array], ...]:
+        """(effects that restate the parameter, (n,) V for one standard deviation); the first is of the contacts."""
         current = np.concatenate([data.current_a for data in self.seen])
         held = np.concatenate([run.voltage_v for run in self._declared])
         moves, responds = np.diff(current), np.diff(held)
         resistance = max(-float(moves @ responds) / max(float(moves @ moves), 1e-12), 0.0)
-        out = [("series_resistance", -OHMIC_SHARE * resistance * current)]
+        ohmic = frozenset(name for name, effect in self.effects.items() if effect.ohmic)
+        out = [(ohmic, -OHMIC_SHARE * resistance * current)]
         for effect in self.effects.values():
             if effect.kind != "parameter" or effect.refines is not None:
                 continue
@@ -298,7 +299,7 @@ class InverseProblem:
                 one = own(effect.id, name, p, p.spread.tight)
                 moved = self._declared_with(effect, name, one.value(OWN_STEP))
                 if moved is not None:
-                    out.append((effect.id, (moved - held) / OWN_STEP))
+                    out.append((frozenset({effect.id}), (moved - held) / OWN_STEP))
         return tuple(out)
 
     def _declared_with(self, effect: Effect, name: str, value: float) -> Array | None:

@@ -83,6 +83,12 @@ def test_the_file_may_be_off_in_contacts_and_in_what_careful_parametrisations_di
         assert replace(problem, trust=other).off_at_seconds(()).shape[1] == 0
 
 
+def test_an_ohmic_effect_takes_the_place_of_what_the_contacts_may_be_off_by_whatever_it_is_called(problem):
+    own = replace(CATALOGUE["series_resistance"], id="busbar")
+    problem = replace(problem, effects=problem.effects | {"busbar": own})
+    assert problem.off_at_seconds(("busbar",)).shape[1] == problem.off_at_seconds(()).shape[1] - 1
+
+
 def test_a_search_for_one_effect_alone_on_a_measured_cell_has_nothing_else_that_may_be_off(problem):
     alone = replace(problem, effects={"series_resistance": CATALOGUE["series_resistance"]})
     blocks, archive = blocks_of(alone), Archive(None, "")
