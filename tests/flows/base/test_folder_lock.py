@@ -1,9 +1,11 @@
 """A folder of results is written by one process at a time."""
 
+import errno
 import subprocess
 import sys
 
 import pytest
+from filelock import FileLock
 
 from aesi.errors import InputError
 from flows.base.folder_lock import LOCK, alone_in
@@ -27,4 +29,27 @@ def test_two_processes_that_wrote_to_one_folder_left_a_mixture(tmp_path):
 
 def test_one_folder_does_not_wait_for_another(tmp_path):
     with alone_in(tmp_path / "a"), alone_in(tmp_path / "b"):
+        pass
+
+
+@pytest.mark.parametrize("error", [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")])
+def test_a_file_system_without_locks_let_two_in_without_a_word(tmp_path, monkeypatch, capsys, error):
+    def refuse(self, blocking=True):
+        raise error
+
+    monkeypatch.setattr(FileLock, "acquire", refuse)
+    with alone_in(tmp_path / "out"), alone_in(tmp_path / "out"):
+        pass
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 2
+    assert "no locks" in said[0]
+    assert "--out" in said[0]
+
+
+def test_a_folder_that_cannot_be_locked_for_another_reason_is_no_folder_without_locks(tmp_path, monkeypatch):
+    def refuse(self, blocking=True):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(FileLock, "acquire", refuse)
+    with pytest.raises(OSError, match="No space left"), alone_in(tmp_path / "out"):
         pass
