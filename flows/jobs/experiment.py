@@ -67,6 +67,8 @@ def _stages(
     folder = environment.run_folder(config.name, tracker.run_id)
     track_start(tracker, config, loaded, folder)
     problem = run("library and resamples", lambda: build_problem(loaded, config))
+    # Bad input has been refused by now, and a run that it refuses is taken back.
+    console.say(f"run {tracker.run_id} {'resumed' if tracker.resumed else 'started'}")
     follow = CandidateTracker(tracker, config, loaded, problem)
     name = f"{config.name}, seed {config.seed} ({tracker.run_id[:8]})"
     found = run(

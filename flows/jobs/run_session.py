@@ -117,7 +117,6 @@ def _begin(
         else RunRecord(tracker.run_id, config.name, resume_key(config), store.uri, time.time())
     )
     record.write()
-    console.say(f"run {tracker.run_id} {'resumed' if old else 'started'}")
     return tracker, record
 
 

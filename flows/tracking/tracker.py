@@ -56,7 +56,7 @@ class Subject:
 class Tracker:
     """Tracks one flow run, new or resumed.
 
-    run_id : MLflow's id of the parent run, which also names the folder below runs/.
+    run_id : MLflow's id of the parent run, which also names the folder below runs/.  resumed : whether it is old.
     title : what a new run is called; None names the experiment and the seed.
     """
 
@@ -72,6 +72,7 @@ class Tracker:
         self._config = config
         self._experiment_id = store.experiment(config.name)
         self._tracked: set[str] = set()
+        self.resumed = run_id is not None
         if run_id is None:
             tags = {KIND: "run", "aesi.config_digest": config.digest, **source_tags()}
             name = title or f"{config.name}, seed {config.seed}"

@@ -38,7 +38,7 @@ def test_an_invalid_data_file_leaves_no_failed_run(tracked):
     assert records("refused") == []
 
 
-def test_data_too_few_for_the_library_leave_no_folder(tracked):
+def test_data_too_few_for_the_library_leave_no_folder_nor_a_word_of_a_run(tracked, capsys):
     from flows.jobs.start import start
 
     for name, end_v in (("bad", 3.88), ("good", 3.87)):
@@ -49,6 +49,7 @@ def test_data_too_few_for_the_library_leave_no_folder(tracked):
         start(path, use_prefect=False)
     assert statuses("refused") == []
     assert [p for p in (tracked / "runs").rglob("*") if p.is_file()] == []
+    assert "started" not in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
