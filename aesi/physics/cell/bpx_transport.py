@@ -1,7 +1,9 @@
 """Whether lengths, diffusivities, conductivities and rate constants of a cell's file are in the units of the standard.
 
-What cannot be told: the conductivity of a solid in S/cm, since those of electrodes span three decades, and one of two
-rate constants or diffusivities in an electrode that is slow by nature.
+What cannot be told: the conductivity of a solid in S/cm where it is good all the same, since those of electrodes span
+three decades, and one of two rate constants or diffusivities in an electrode that is slow by nature. Those of graphite
+alone are 1e-11 m2/s along its planes and 1e-15 along grain boundaries (Persson et al., J. Phys. Chem. Lett. 1 (2010)
+1176, doi:10.1021/jz100188d), so that a slow electrode in cm2/s is a fast one in m2/s.
 """
 
 from __future__ import annotations
@@ -29,6 +31,10 @@ scale."""
 SHORTEST_DIFFUSION_S = 1.0
 """Radius squared over the median diffusivity in an electrode's window: 2.9 s in one (0.5 um, Kim 2011) and 100 to
 25,000 s in the others of the shipped files and the same sets; with a diffusivity in cm2/s a ten-thousandth of it."""
+LARGEST_SOLID_DROP_V = 0.2
+"""Ohmic drop in an electrode's solid at the nominal capacity in an hour, I L / (3 A sigma): 0.7 uV to 7 mV in the
+shipped files and in twelve published sets (of PyBaMM), most in the 0.18 S/m of Chen et al., J. Electrochem. Soc. 167
+(2020) 080534, which is 0.0018 S/cm and makes 0.7 V."""
 LEAST_EXCHANGE_1_H = 2e-3
 """Exchange current of a half-full electrode over nominal capacity: 0.05 to 470 1/h there, and 0.2 and more without the
 one of sodium; 0.0009 at most in the slower electrode with a rate constant in mol/(cm2 s), and less with one in m/s."""
@@ -66,6 +72,18 @@ def check_transport(cell: CellParameters, where: str) -> None:
                 f"{electrode.particle_radius_m:g} m in {seconds:.2g} s, faster than in any electrode; it is in m2/s, "
                 "so that 1e-10 cm2/s is 1e-14."
             )
+        _check_solid(cell, electrode, f"{where}: {side} electrode")
+
+
+def _check_solid(cell: CellParameters, electrode: Electrode, what: str) -> None:
+    """A current that runs empty along the electrode's thickness meets a third of its solid's resistance."""
+    current_a_m2 = cell.nominal_capacity_ah / (cell.electrode_area_m2 * cell.electrode_pairs)
+    drop_v = current_a_m2 * electrode.thickness_m / (3.0 * electrode.conductivity_s_m)
+    if drop_v > LARGEST_SOLID_DROP_V:
+        raise CellError(
+            f"{what}: conductivity = {electrode.conductivity_s_m:g} S/m takes {drop_v:.2g} V of the cell's voltage at "
+            f"{cell.nominal_capacity_ah:g} A, more than in any electrode; it is in S/m, so that 0.01 S/cm is 1."
+        )
 
 
 def check_kinetics(cell: CellParameters, where: str) -> None:

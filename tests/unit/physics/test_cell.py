@@ -245,6 +245,12 @@ def test_values_that_no_cell_has_are_refused(content, section, changes, sentence
         ),
         ("Negative electrode", "Diffusivity [m2.s-1]", 1e4, "Negative .* = 3.3e-10 m2/s .* in 0.1 s"),
         ("Positive electrode", "Diffusivity [m2.s-1]", 1e4, "Positive .* 1e-10 cm2/s is 1e-14"),
+        (
+            "Positive electrode",
+            "Conductivity [S.m-1]",
+            1e-2,
+            "Positive .* = 0.0018 S/m takes 0.68 V .* 0.01 S/cm is 1",
+        ),
         ("Negative electrode", "Reaction rate constant [mol.m-2.s-1]", 1e-4, "Negative .* exchange current"),
         ("Cell", "Lower voltage cut-off [V]", 1e3, "lower cut-off .2500 V. .* 2500 mV is 2.5"),
         ("Cell", "Lower voltage cut-off [V]", 1e-3, "lower cut-off .0.0025 V. has to be at least 0.1 V"),
