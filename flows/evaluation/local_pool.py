@@ -6,6 +6,7 @@ a lost process costs milliseconds. Elsewhere each builds the problem for itself.
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -13,7 +14,8 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
@@ -118,12 +120,24 @@ class LocalPool:
         process = self._context.Process(
             target=_serve, args=(theirs, self._build, self._memory_mb, os.getpid()), daemon=True
         )
-        with warnings.catch_warnings(), leaving_interrupts_to_us():
+        with warnings.catch_warnings(), leaving_interrupts_to_us(), _leaving_objects_to_us():
             # The forks run numpy code alone and leave by os._exit, so locks of other threads do not matter.
             warnings.simplefilter("ignore", DeprecationWarning)
             process.start()
         theirs.close()
         return _Process(process, ours)
+
+
+@contextmanager
+def _leaving_objects_to_us() -> Iterator[None]:
+    """Forks made within never look for garbage among what is there now: what our other threads hold is out of reach in
+    them and would end there, aloud where it was at work (Prefect's services), and the pages would no longer be shared.
+    """
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, parent: int) -> None:

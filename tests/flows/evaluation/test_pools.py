@@ -1,5 +1,6 @@
 """Processes that evaluate: what goes wrong in one candidate stays in it."""
 
+import gc
 import os
 import signal
 import sys
@@ -49,6 +50,33 @@ def outcomes(pool, genomes, timeout_s=20.0):
 
 def test_outcomes_come_back_with_their_tags(pool):
     assert outcomes(pool, [("return", i) for i in range(20)]) == list(range(20))
+
+
+class Service:
+    """Held by a thread of the parent, and so out of reach in a fork."""
+
+    def __init__(self, ended):
+        self.itself, self.ended = self, ended
+
+    def __del__(self):
+        self.ended.write_text(self.ended.read_text() + f"{os.getpid()} ")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forks are made on Linux")
+def test_a_fork_ended_what_threads_of_its_parent_were_at_work_on(tmp_path):
+    ended = tmp_path / "ended"
+    ended.write_text("")
+    gc.disable()
+    try:
+        Service(ended)
+        pool = LocalPool(lambda: lambda _: gc.collect() >= 0, workers=1, timeout_s=5.0, memory_mb=500)
+        assert outcomes(pool, [None]) == [True]
+        pool.close()
+        assert ended.read_text() == ""
+    finally:
+        gc.enable()
+    gc.collect()
+    assert ended.read_text() == f"{os.getpid()} "
 
 
 def test_a_hang_is_cut_off_and_the_pool_goes_on(pool):
