@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 
 from aesi.data.readers.formats import recognise
@@ -14,6 +14,8 @@ LINES_LOOKED_AT = 600
 """BioLogic writes some 100 lines above its table, Novonix one a step of the protocol."""
 SEPARATORS = ",;\t|"
 KNOWN = ("time_s", "current_a", "voltage_v", "test time / s", "current / a", "voltage / v")
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
+WITH_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 UNIT_CELL = re.compile(
     r"[\[(<]?\s*(s|sec|ms|min|h|hr|d|hh:mm:ss(\.\w+)?|h:m(in)?:s|[mkµu]?a|[mkµu]?v|°?c|degc|k|%|[mk]?ah|[mk]?wh|"
     r"[mk]?w|[mµu]?ohm|[mµu]?ω|cnt|#|-|1)?\s*[\])>]?",
@@ -59,6 +61,27 @@ def find_heading(rows: Sequence[Sequence[str]], wanted: Collection[str] = ()) ->
         if fallback is None and len(same) >= 2:
             fallback = Heading(line, header, None, _units(header, below))
     return fallback
+
+
+def likely_heading(rows_from: Iterable[Sequence[Sequence[str]]]) -> Heading | None:
+    """The first row of names with as many cells below it, at least two of them numbers; None where there is none.
+
+    For tables that name nothing known: what names they have is what a message can propose.
+    rows_from : of each line, its cells and those of the two below.
+    """
+    for line, (cells, *below) in enumerate(rows_from):
+        names = tuple(cell.strip() for cell in cells)
+        if sum(map(bool, names)) < 2 or any(_is_number(name) for name in names):
+            continue
+        units = _units(names, below[0]) if below else ()
+        first = below[bool(units) :][:1]
+        if first and len(first[0]) == len(names) and sum(_is_number(cell) for cell in first[0]) >= 2:
+            return Heading(line, names, None, units)
+    return None
+
+
+def _is_number(cell: str) -> bool:
+    return bool(NUMBER.fullmatch(cell.strip()) or WITH_COMMA.fullmatch(cell.strip()))
 
 
 def split(line: str, separator: str) -> list[str]:

@@ -5,12 +5,19 @@ from __future__ import annotations
 import codecs
 import csv
 import io
-import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from aesi.data.readers.formats.format import Format
-from aesi.data.readers.heading import LINES_LOOKED_AT, SEPARATORS, find_heading, split
+from aesi.data.readers.heading import (
+    LINES_LOOKED_AT,
+    NUMBER,
+    SEPARATORS,
+    WITH_COMMA,
+    find_heading,
+    likely_heading,
+    split,
+)
 from aesi.errors import DataError
 
 COMMENT = "#"
@@ -21,8 +28,6 @@ BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", re.ASCII | re.IGNORECASE)
-WITH_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -67,7 +72,7 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
         lines = lines[:-1]  # the last one may be cut by the size of the look
     notes: list[str] = []
     rows = [_cells(line) for line in lines[:LINES_LOOKED_AT]]
-    heading = find_heading(rows, wanted)
+    heading = find_heading(rows, wanted) or likely_heading(_rows_from(lines))
     if heading is None:
         start, header, last = *_first_line(lines, name), 0
     else:
@@ -91,6 +96,18 @@ def layout_of(text: str, encoding: str, *, whole: bool, name: str, wanted: Colle
     if layer:
         notes.append("The rows of cycles and steps between the records were passed over.")
     return Layout(encoding, separator, decimal, header, start + 1 + last, tuple(notes), form, units, layer)
+
+
+def _rows_from(lines: Sequence[str]) -> Iterator[list[list[str]]]:
+    """Of each line, its cells and those of the two below, all split as the line itself is: decimal commas may outnumber
+    the separators below."""
+    for start, line in enumerate(lines[:LINES_LOOKED_AT]):
+        separator = max(SEPARATORS, key=line.count)
+        below = lines[start + 1 : start + 3]
+        yield [
+            [] if line.startswith(COMMENT) else split(line, separator),
+            *(split(b, separator) for b in below),
+        ]
 
 
 def _layer(header: tuple[str, ...], below: Sequence[str], separator: str) -> int:

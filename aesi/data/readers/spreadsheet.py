@@ -1,21 +1,21 @@
 """Excel workbooks (.xlsx), as Arbin and Neware write them, through openpyxl.
 
-The table is taken from the first sheet whose rows hold a heading, and a note names further sheets with the same
-columns, as Arbin makes them of a long test; clock times and dates become text, so that they are read in the same way as
-from a text file.
+The table is taken from the first sheet whose rows hold a heading (of known names, or else of any), and a note names
+further sheets with the same columns, as Arbin makes them of a long test; clock times and dates become text, so that
+they are read in the same way as from a text file.
 """
 
 from __future__ import annotations
 
 import datetime
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.readers.frame import FrameTable
-from aesi.data.readers.heading import LINES_LOOKED_AT, Heading, find_heading
+from aesi.data.readers.heading import LINES_LOOKED_AT, Heading, find_heading, likely_heading
 from aesi.errors import DataError
 
 
@@ -45,8 +45,11 @@ def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
 
 
 def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:
-    headings = [(sheet, _heading(sheet, wanted)) for sheet in book.worksheets]
-    tables = [(sheet, heading) for sheet, heading in headings if heading is not None]
+    heads = [(sheet, _head(sheet)) for sheet in book.worksheets]
+    tables = _with_headings((sheet, find_heading(head, wanted)) for sheet, head in heads)
+    tables = tables or _with_headings(
+        (sheet, likely_heading(head[i : i + 3] for i in range(len(head)))) for sheet, head in heads
+    )
     if tables:
         sheet, heading = tables[0]
         alike = [repr(other.title) for other, its in tables[1:] if its.header == heading.header]
@@ -58,9 +61,14 @@ def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:
     )
 
 
-def _heading(sheet: Any, wanted: Collection[str]) -> Heading | None:
-    head = islice(sheet.iter_rows(values_only=True), LINES_LOOKED_AT)
-    return find_heading([[_word(cell) for cell in row] for row in head], wanted)
+def _head(sheet: Any) -> list[list[str]]:
+    return [
+        [_word(cell) for cell in row] for row in islice(sheet.iter_rows(values_only=True), LINES_LOOKED_AT)
+    ]
+
+
+def _with_headings(sheets: Iterable[tuple[Any, Heading | None]]) -> list[tuple[Any, Heading]]:
+    return [(sheet, heading) for sheet, heading in sheets if heading is not None]
 
 
 def _table(path: Path, sheet: Any, heading: Heading, alike: Sequence[str]) -> FrameTable:

@@ -1,6 +1,7 @@
 """Text tables: comma, semicolon, tab or bar between the cells, plain or gzip, in any encoding loggers write.
 
-The header is the first line that names known columns, or else the first that is neither blank nor a comment (#).
+The header is the first line that names known columns, or else the first of names with numbers below, or else the first
+that is neither blank nor a comment (#).
 Numbers are converted by pyarrow as a stream, so that ten million rows cost the memory of their numbers; only when that
 fails does a slow pass in Python look for the first cell at fault.
 """
@@ -20,7 +21,8 @@ from typing import BinaryIO, cast
 
 import numpy as np
 
-from aesi.data.readers.layout import NUMBER, Layout, decoded, layout_of
+from aesi.data.readers.heading import NUMBER
+from aesi.data.readers.layout import Layout, decoded, layout_of
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 
@@ -224,4 +226,6 @@ def _advice(cell: str) -> str:
         return (
             ": write nothing between the thousands and a decimal point, or separate the cells by semicolons"
         )
+    if re.match(r"[+-]?[\d.]+\s*[^\W\d_]", cell):
+        return ": write numbers alone, and the unit in the name of the column"
     return ""

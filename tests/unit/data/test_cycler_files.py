@@ -401,6 +401,39 @@ def test_all_that_is_missing_is_said_at_once_with_the_right_names(tmp_path):
     assert '--column voltage_v="U (V)"' in message
 
 
+def test_the_names_below_a_block_about_the_test_were_not_proposed(tmp_path):
+    """Decimal commas outnumber the semicolons of the rows."""
+    path = tmp_path / "logger.csv"
+    path.write_text(
+        "Cell: 12\nDate;12.3.2024\n\nZeit [min];Strom [mA];Spannung [V];Temp.\n"
+        "0,0;-1,5;3,70;25,0\n0,5;-1,5;3,71;25,0\n"
+    )
+    with pytest.raises(DataError) as caught:
+        read_measurement(path)
+    message = str(caught.value)
+    assert '--column time_s="Zeit [min]" --unit time_s=min --column current_a="Strom [mA]"' in message
+    assert "'Temp.'" in message
+
+
+def test_the_names_of_a_sheet_were_not_proposed(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    book.active.append(["Bench 7"])
+    sheet = book.create_sheet("Record")
+    for row in (["Elapsed (s)", "Current (A)", "U (V)"], [0, 1.0, 3.7], [1, 1.0, 3.69]):
+        sheet.append(row)
+    book.save(tmp_path / "logger.xlsx")
+    with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):
+        read_measurement(tmp_path / "logger.xlsx")
+
+
+def test_a_unit_in_a_cell_is_told_where_it_belongs(tmp_path):
+    path = tmp_path / "logger.csv"
+    path.write_text("time_s,current_a,voltage_v\n0,1.0 A,3.7\n1,1.0 A,3.69\n")
+    with pytest.raises(DataError, match=r"'1.0 A', which is not a number: write numbers alone, and the unit"):
+        read_measurement(path)
+
+
 @pytest.mark.parametrize(
     ("name", "module", "package"),
     [
