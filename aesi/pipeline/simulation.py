@@ -170,7 +170,9 @@ def _placed(
 
 
 def _with_effects(record: Measurement, effects: Sequence[ActiveEffect]) -> list[str]:
-    """A sentence on the effects that are simulated, with their values, which may be defaults."""
+    """A sentence on the effects that act, with their values, which may be defaults."""
+    if record.temperature_degc is not None:
+        effects = [one for one in effects if one.effect.infers != "temperature"]
     return [f"{record.name}: with {', '.join(map(repr, effects))}."] if effects else []
 
 

@@ -147,7 +147,12 @@ def _window(data: Columns, context: Context, reading: Reading, notes: list[str])
             f"{context.file}: {' '.join(_asked(reading))} leaves {len(keep)} of its rows, and a record needs two; its "
             f"times run from {np.nanmin(time):g} s to {np.nanmax(time):g} s."
         )
-    if len(keep) < len(time):
+    if len(keep) == len(time):
+        notes.append(
+            f"{' '.join(_asked(reading))} leaves out nothing: its times run from {np.nanmin(time):g} s to "
+            f"{np.nanmax(time):g} s."
+        )
+    else:
         ends = [f"before {low:g} s"] * (reading.start_s is not None)
         ends += [f"after {high:g} s"] * (reading.stop_s is not None)
         notes.append(f"{_rows(len(time) - len(keep))} left out as asked, {' and '.join(ends)}.")

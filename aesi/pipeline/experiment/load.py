@@ -21,7 +21,7 @@ from aesi.pipeline.experiment.drives import by_role, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
-from aesi.pipeline.experiment.sources import Sources, cell_path, check_roles, sources_of
+from aesi.pipeline.experiment.sources import Sources, cell_path, check_roles, sources_of, with_keys
 from aesi.pipeline.notes import temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -159,7 +159,12 @@ def _on_grid(
         start = initial_state(cell, measurement, declared, data.hold, given.effects, model=given.model)
         held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: ")
         even = to_even(measurement, data.dt_s)
-        notes += [start.sentence, held, temperature_sentence(cell, measurement, given.effects), *even.notes]
+        notes += [
+            with_keys(start.sentence),
+            held,
+            temperature_sentence(cell, measurement, given.effects),
+            *even.notes,
+        ]
         records[name] = no_rows(even, start.soc)
     notes += without_energies(cell, (m.temperature_degc for m, _ in sources.records.values()))
     return records, notes

@@ -26,6 +26,7 @@ KEYS = {
     "--unit": "data.units",
     "--state": "data.columns: {state: COLUMN}",
     "--duplicates": "data.duplicates",
+    "--soc0": "cell.soc0",
     "--step": "a file of its own, by `aesi data convert --step`",
     "--to-s": "a file of its own, by `aesi data convert --to-s`",
 }
@@ -152,11 +153,13 @@ def _record(path: Path, reading: Reading) -> Measurement:
     try:
         return read(path, reading)
     except DataError as error:
-        text = str(error)
-        keys = [key for option, key in KEYS.items() if option in text]
-        if not keys:
-            raise
-        raise DataError(f"{text.removesuffix('.')} (in an experiment file: {', '.join(keys)}).") from None
+        raise DataError(with_keys(str(error))) from None
+
+
+def with_keys(sentence: str) -> str:
+    """A sentence with the keys of an experiment file beside the options of a command that it names."""
+    keys = [key for option, key in KEYS.items() if option in sentence]
+    return f"{sentence.removesuffix('.')} (in an experiment file: {', '.join(keys)})." if keys else sentence
 
 
 def _locator(config: ExperimentConfig) -> Callable[[str], Path]:

@@ -183,6 +183,11 @@ def test_a_gap_is_refused_with_both_ways_out(tmp_path):
     assert len(read_measurement(written(tmp_path, content), start_s=149)) == N - 149
 
 
+def test_a_part_that_is_the_whole_file_was_taken_without_a_word(tmp_path):
+    notes = read_measurement(written(tmp_path, text()), stop_s=99_999).notes
+    assert any("--to-s 99999 leaves out nothing: its times run from 0 s to 199 s." in note for note in notes)
+
+
 def test_a_sparsely_logged_rest_is_no_gap_but_a_note(tmp_path):
     time = np.concatenate([np.arange(50.0), [500.0], 500 + np.arange(1.0, 50)])
     current = np.concatenate([np.tile([5.0, -5.0], 20), np.zeros(20), np.tile([5.0, -5.0], 20)])

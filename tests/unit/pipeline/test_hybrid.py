@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 from small_experiment import SOC0, experiment, fitted, write_record
 
@@ -13,7 +14,7 @@ from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
-from aesi.pipeline.simulation import predict_file, reached, simulate_file
+from aesi.pipeline.simulation import ProfileRequest, predict_file, reached, simulate_file
 from aesi.sparse import SparseModel
 
 
@@ -112,6 +113,22 @@ def test_a_simulation_or_a_discovery_of_a_hybrid_left_its_correction_out_without
     assert any("learnt correction is left out" in note for note in case_of_files(folder, [record]).notes)
     bare = HybridModel(model.cell).save(tmp_path / "bare")
     assert not any("correction" in note for note in case_of_files(bare, [record]).notes)
+
+
+def test_self_heating_that_a_measured_temperature_leaves_idle_was_told_as_simulated(model, data, tmp_path):
+    folder = HybridModel(model.cell).save(tmp_path / "physics")
+    record, asked = tmp_path / "drive.csv", ProfileRequest(self_heating=True)
+    said = {}
+    for measured in (True, False):
+        degc = {"temperature_degc": np.full(len(data), 25.0)} if measured else {}
+        columns = {"time_s": data.time_s, "current_a": data.current_a, "voltage_v": data.voltage_v}
+        pd.DataFrame(columns | degc).to_csv(record, index=False)
+        notes = []
+        simulate_file(folder, record, tmp_path / "out.csv", asked, say_notes=notes.extend)
+        said[measured] = " ".join(notes)
+    assert "self_heating has nothing to add" in said[True]
+    assert "with self_heating(" not in said[True]
+    assert "with self_heating(" in said[False]
 
 
 def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):

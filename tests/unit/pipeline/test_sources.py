@@ -7,7 +7,7 @@ import pytest
 
 from aesi.data.reading import Reading
 from aesi.errors import DataError
-from aesi.pipeline.experiment.sources import _record
+from aesi.pipeline.experiment.sources import _record, with_keys
 
 
 def written(folder: Path, header: str, sign: float = 1.0) -> Path:
@@ -37,3 +37,8 @@ def test_what_needs_no_option_is_told_as_it_is(tmp_path):
     path.touch()
     with pytest.raises(DataError, match=r"at least two rows\.$"):
         _record(path, Reading())
+
+
+def test_a_state_of_charge_that_a_run_may_be_given_was_called_by_a_command_s_option():
+    sentence = "drive starts under 1 A at 3.9 V: state of charge 0.7 +/- 0.1; give --soc0 if it is known."
+    assert with_keys(sentence).endswith("if it is known (in an experiment file: cell.soc0).")
