@@ -52,6 +52,17 @@ def signs(
     return result, f"The sign of the current was taken from column {column!r}: {told}."
 
 
+def both_ways(words: Sequence[str], current_a: Array) -> bool:
+    """Whether words that are known say charge beside some of the currents and discharge beside others.
+
+    words : (n,) a column's.  current_a : (n,) A, of any sign.
+    """
+    sizes = np.abs(current_a)
+    flows = sizes > REST_SHARE * float(np.nanmax(sizes, initial=0.0))
+    said = {word.strip() for word, flow in zip(words, flows, strict=True) if flow}
+    return {"charge", "discharge"} <= {_meaning(word) for word in said}
+
+
 def _meaning(word: str) -> Direction | None:
     if DISCHARGE.search(word):
         return "discharge"

@@ -7,11 +7,12 @@ from functools import partial
 import numpy as np
 
 from aesi.data import units
+from aesi.data.channels import headers
 from aesi.data.channels.checks import Columns, Context
 from aesi.data.channels.columns import QUANTITIES, Mapped, map_columns
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, bounds
-from aesi.data.state import signs
+from aesi.data.state import both_ways, signs
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 
@@ -85,6 +86,8 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
             data["current_a"] = way * np.abs(current)  # an empty cell stays one, at rest too
             notes.append(note)
             return
+    elif not signed:
+        _check_words(table, current, mapped, reading)
     if reading.state_words:
         notes.append(
             "Words of a state were declared, and the sign of the current comes from itself; name their column: --state."
@@ -101,6 +104,18 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
     else:
         notes.append(f"{mapped.maker} writes the current positive on charge; its sign was turned.")
     data["current_a"] = 0.0 - current  # no negative zeros
+
+
+def _check_words(table: TableFile, current: Array, mapped: Mapped, reading: Reading) -> None:
+    """Refuse magnitudes beside words that say both directions, in a column that nobody named or left out."""
+    name = None if "state" in reading.columns else headers.nearest("state", table.header)
+    if name is None or not both_ways(table.read_text((table.header.index(name),))[0], current):
+        return
+    raise DataError(
+        f"{table.path.name}: the current ({mapped.header['current_a']!r}) never changes its sign, and yet column "
+        f"{name!r} has the cell charged and discharged: the file holds magnitudes. Take the direction from there: "
+        f'--state "{name}"; if it means something else, leave it out: --column state=.'
+    )
 
 
 def keep_rows(columns: Columns, context: Context, keep: AnyArray) -> tuple[Columns, Context]:

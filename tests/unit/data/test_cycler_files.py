@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from aesi.data import read_measurement
+from aesi.data.current import read_current
 from aesi.data.read import read
 from aesi.data.reading import Reading
 from aesi.errors import DataError
@@ -425,6 +426,23 @@ def test_the_names_of_a_sheet_were_not_proposed(tmp_path):
     book.save(tmp_path / "logger.xlsx")
     with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):
         read_measurement(tmp_path / "logger.xlsx")
+
+
+def test_magnitudes_beside_the_words_of_both_directions_were_read_as_a_discharge(tmp_path):
+    path = tmp_path / "profile.csv"
+    body = rows(TIME, np.abs(CURRENT), words("Entladen", "Laden", "Pause"))
+    path.write_text("\n".join(["time_s,current_a,Mode", *body, ""]), encoding="utf-8")
+    with pytest.raises(DataError, match=r'.Mode. has the cell charged and discharged: .* --state "Mode"'):
+        read_current(path)
+    np.testing.assert_allclose(read_current(path, Reading({"state": "Mode"})).current_a, CURRENT)
+    np.testing.assert_allclose(read_current(path, Reading({"state": None})).current_a, np.abs(CURRENT))
+
+
+def test_words_that_say_one_direction_alone_leave_a_discharge_what_it_is(tmp_path):
+    path = tmp_path / "profile.csv"
+    body = rows(TIME, np.abs(CURRENT), words("DChg", "DChg", "Rest"))
+    path.write_text("\n".join(["time_s,current_a,Mode", *body, ""]), encoding="utf-8")
+    np.testing.assert_allclose(read_current(path).current_a, np.abs(CURRENT))
 
 
 def test_a_unit_in_a_cell_is_told_where_it_belongs(tmp_path):
