@@ -32,13 +32,14 @@ def together(notes: Iterable[str]) -> tuple[str, ...]:
 
 def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[ActiveEffect]) -> str:
     """At what temperature a record is simulated, and on what that rests."""
-    inferred = " and ".join(active.id for active in effects if active.effect.infers == "temperature")
+    inferring = [active.id for active in effects if active.effect.infers == "temperature"]
+    inferred, several = " and ".join(inferring), len(inferring) > 1
     if record.temperature_degc is not None:
         low, high = float(np.min(record.temperature_degc)), float(np.max(record.temperature_degc))
-        beside = f"; {inferred} has nothing to add" if inferred else ""
+        beside = f"; {inferred} {'have' if several else 'has'} nothing to add" if inferred else ""
         return f"{record.name}: at its measured temperature, {low:.1f} to {high:.1f} degC{beside}."
     degc = cell.initial_temperature_k - ZERO_CELSIUS_K
-    beside = f" and {inferred} changes it" if inferred else ""
+    beside = f" and {inferred} {'change' if several else 'changes'} it" if inferred else ""
     return (
         f"{record.name}: no temperature in it; taken at {degc:.4g} degC, as the cell's file declares{beside}."
     )

@@ -8,6 +8,7 @@ they are read in the same way as from a text file.
 from __future__ import annotations
 
 import datetime
+import zipfile
 from collections.abc import Collection, Iterable, Sequence
 from itertools import islice
 from pathlib import Path
@@ -18,12 +19,16 @@ from aesi.data.readers.frame import FrameTable
 from aesi.data.readers.heading import LINES_LOOKED_AT, Heading, find_heading, likely_heading
 from aesi.errors import DataError
 
+WORKBOOK = "[Content_Types].xml"
+"""In every one of Office Open XML (ECMA-376, part 2)."""
+
 
 def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
     """The first sheet with a table of measurements.
 
     Raises DataError where openpyxl is missing, the file is no workbook, or no sheet has a heading.
     """
+    _check_no_archive(path)
     try:
         import openpyxl  # type: ignore[import-untyped]
     except ImportError:
@@ -42,6 +47,19 @@ def open_sheet(path: Path, wanted: Collection[str] = ()) -> FrameTable:
         return _first_table(path, book, wanted)
     finally:
         book.close()
+
+
+def _check_no_archive(path: Path) -> None:
+    """A workbook is a zip archive of its own kind; one of other files has to be unpacked."""
+    if not zipfile.is_zipfile(path):
+        return
+    with zipfile.ZipFile(path) as archive:
+        names = archive.namelist()
+    if WORKBOOK not in names:
+        raise DataError(
+            f"{path.name} is a zip archive ({', '.join(names[:3])}{', ...' * (len(names) > 3)}); unpack it, and give a "
+            "file of it."
+        )
 
 
 def _first_table(path: Path, book: Any, wanted: Collection[str]) -> FrameTable:

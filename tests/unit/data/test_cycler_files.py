@@ -5,6 +5,7 @@ The files are written here in the layout of real exports; those were read with t
 
 import sys
 import warnings
+import zipfile
 from collections.abc import Callable
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -426,6 +427,13 @@ def test_the_names_of_a_sheet_were_not_proposed(tmp_path):
     book.save(tmp_path / "logger.xlsx")
     with pytest.raises(DataError, match=r'--column time_s="Elapsed .s." --column current_a="Current .A."'):
         read_measurement(tmp_path / "logger.xlsx")
+
+
+def test_a_zip_archive_of_a_record_was_taken_for_a_workbook(tmp_path):
+    with zipfile.ZipFile(tmp_path / "cell7.zip", "w") as archive:
+        archive.writestr("cell7.csv", "time_s,current_a,voltage_v\n0,1,3.7\n1,1,3.69\n")
+    with pytest.raises(DataError, match=r"is a zip archive \(cell7.csv\); unpack it, and give a file of it"):
+        read_measurement(tmp_path / "cell7.zip")
 
 
 def test_magnitudes_beside_the_words_of_both_directions_were_read_as_a_discharge(tmp_path):

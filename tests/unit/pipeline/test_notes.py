@@ -5,7 +5,9 @@ from pathlib import Path
 import numpy as np
 
 from aesi.physics import Cell
-from aesi.pipeline.notes import together, without_energies
+from aesi.physics.effects import CATALOGUE
+from aesi.pipeline.notes import temperature_sentence, together, without_energies
+from aesi.records import Measurement
 
 NMC = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 
@@ -36,3 +38,12 @@ def test_a_cold_record_of_a_cell_without_activation_energies_was_simulated_in_si
         "the cell's file declares no activation energy for electrolyte diffusivity: taken as at 25 degC, which is "
         "up to 15 K off."
     )
+
+
+def test_two_effects_that_change_the_temperature_were_one():
+    cell, record = Cell.from_bpx(NMC), Measurement(np.arange(3.0), np.zeros(3), np.full(3, 3.7), name="rest")
+    both = [CATALOGUE[name].activate() for name in ("self_heating", "ambient_temperature")]
+    assert temperature_sentence(cell, record, both).endswith(
+        "self_heating and ambient_temperature change it."
+    )
+    assert temperature_sentence(cell, record, both[:1]).endswith("and self_heating changes it.")
