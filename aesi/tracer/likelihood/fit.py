@@ -223,15 +223,15 @@ def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
 
 
 def prediction_sd_v(
-    problem: InverseProblem, blocks: Blocks, fit: LinearForm, partition: str = "block"
+    problem: InverseProblem, blocks: Blocks, fit: LinearForm, size: Size, partition: str = "block"
 ) -> Array:
     """(n,) V, standard deviation of what is predicted of each block by the parameters that those outside its fold give,
-    if the hypothesis is right: with a model error as small as that of a right one.
+    where the model errs by as much as `size`.
 
     partition : of `blocks.folds`, in which each block is left out once.
     """
     x, jacobian = fit.point.x, fit.point.jacobian_v
-    white, log_det = whitened(problem, blocks, fit.point.table(), PRIORS[problem.trust].median)
+    white, log_det = whitened(problem, blocks, fit.point.table(), size)
     folds = blocks.folds[partition]
     posterior = Posterior(block_sums(blocks, white, log_det), fit.point.padded_x, folds)
     out = np.empty(len(jacobian))

@@ -25,7 +25,7 @@ from aesi.tracer.decide.verdict import (
 from aesi.tracer.decide.written import Option, carries_best, stand_ins, worst_ratio, written
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
-from aesi.tracer.likelihood.model_error import MEASURED_V
+from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.likelihood.surrogates import admission_nats, largest_gains
 from aesi.tracer.search.archive import Archive, context_of, identity
@@ -155,7 +155,7 @@ def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
         bounds=np.vstack([one.point.bounds, [[-9.0, 9.0]]]),
     )
     flexible = replace(one, point=point, score=scored(path.problem, blocks, point))
-    sd_v = prediction_sd_v(path.problem, blocks, flexible)
+    sd_v = prediction_sd_v(path.problem, blocks, flexible, PRIORS[path.problem.trust].median)
     assert sd_v[blocks.rows[5]] == pytest.approx(1.0, rel=1e-3)
     assert max(sd_v[blocks.rows[4]]) < 1e-3
     assert structured_v(path, flexible) > 0.1
@@ -164,7 +164,7 @@ def test_what_a_hypothesis_cannot_tell_of_a_block_is_not_asked_of_it(path):
 
 def test_what_the_data_could_not_have_spoken_against_is_not_found(path):
     blocks, one = path.blocks, path.chosen
-    assert foretold_share(path.problem, blocks, one, 1e-3, "charge") > 0.8
+    assert foretold_share(path.problem, blocks, one, 1e-3, "charge") > Thresholds().foretold_share
     assert judged(path, Thresholds()).word == "found"
     by_charge = np.zeros((len(one.point.residual_v), len(blocks.folds["charge"])))
     for k, fold in enumerate(blocks.folds["charge"]):
@@ -181,6 +181,22 @@ def test_what_the_data_could_not_have_spoken_against_is_not_found(path):
     verdict = judged(replace(path, chosen=anything, blocks=steady), Thresholds())
     assert (verdict.word, verdict.effects) == ("unknown", ())
     assert "other currents" in verdict.reason
+
+
+def test_what_only_a_model_without_error_could_tell_is_not_foretold(path):
+    blocks, one = path.blocks, path.base
+    soc = path.problem.declared_soc
+    emptier = (np.max(soc) - soc) / np.ptp(soc)
+    point = replace(
+        one.point,
+        x=np.append(one.point.x, 0.0),
+        jacobian_v=np.column_stack([one.point.jacobian_v, 1e-3 * np.exp(12.0 * emptier)]),
+        bounds=np.vstack([one.point.bounds, [[-9.0, 9.0]]]),
+    )
+    smooth = replace(one, point=point, score=scored(path.problem, blocks, point))
+    shares = [foretold_share(path.problem, blocks, each, 4e-4, "charge") for each in (one, smooth)]
+    assert shares[0] > 0.8
+    assert shares[1] < shares[0] - 0.2
 
 
 def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_written(
