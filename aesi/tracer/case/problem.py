@@ -60,8 +60,9 @@ EXACT_SHARE = 0.1
 """Of the tight spread of a declared parameter, where the file is believed exactly. A convention: not nought, so that
 what the numerics round off is no evidence for an effect."""
 
-OWN_STEP = 0.1
-"""Of finite differences in a declared parameter, in standard deviations of its prior."""
+STEP = 4e-3
+"""Of finite differences, in standard deviations of a parameter's prior: short against how well data can tell it. Ten
+rows a second tell a lag to a thousandth of its spread."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
@@ -297,9 +298,9 @@ class InverseProblem:
                 if p.spread is None or p.spread.tight is None:
                     continue
                 one = own(effect.id, name, p, p.spread.tight)
-                moved = self._declared_with(effect, name, one.value(OWN_STEP))
+                moved = self._declared_with(effect, name, one.value(STEP))
                 if moved is not None:
-                    out.append((frozenset({effect.id}), (moved - held) / OWN_STEP))
+                    out.append((frozenset({effect.id}), (moved - held) / STEP))
         return tuple(out)
 
     def _declared_with(self, effect: Effect, name: str, value: float) -> Array | None:

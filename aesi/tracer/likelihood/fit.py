@@ -14,7 +14,7 @@ from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
-from aesi.tracer.case.problem import OWN_STEP, InverseProblem
+from aesi.tracer.case.problem import STEP, InverseProblem
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
     Posterior,
@@ -25,8 +25,6 @@ from aesi.tracer.likelihood.gaussian import (
 )
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
 
-EFFECT_STEP = 4e-3
-"""Of finite differences in a parameter of an effect, in standard deviations of the prior."""
 GAIN_NATS = 0.05
 """A descent stops when a step gains less than this."""
 
@@ -109,8 +107,7 @@ class HypothesisFitter:
     def _slope(self, x: Array, residual: Array, j: int) -> tuple[Array | None, int]:
         """(n,) V, None where the model fails on both sides, and the simulations that it took."""
         one = self.free[j]
-        size = OWN_STEP if one.own else EFFECT_STEP
-        size = min(size, 0.25 * (self.high[j] - self.low[j]))
+        size = min(STEP, 0.25 * (self.high[j] - self.low[j]))
         only = int(one.name) if one.owner == STATE_OF_CHARGE else None
         rows = slice(None) if only is None else self.problem.slices[only]
         sides = (size, -size) if x[j] + size <= self.high[j] else (-size, size)

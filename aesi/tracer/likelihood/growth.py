@@ -18,8 +18,8 @@ from aesi.numerics.bounded import descend, foreseen_cost
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import FURTHEST_SDS, FreeParameter, of_effect, starts, values_of
-from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
-from aesi.tracer.likelihood.fit import EFFECT_STEP, GAIN_NATS, FittedHypothesis
+from aesi.tracer.case.problem import STEP, InverseProblem, ValuesByOwner
+from aesi.tracer.likelihood.fit import GAIN_NATS, FittedHypothesis
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
     PredictiveScore,
@@ -139,7 +139,7 @@ class EffectGrowth:
             return self._slopes[u.tobytes()]
         out = np.zeros((len(e), len(u)))
         for j in range(len(u)):
-            size = min(EFFECT_STEP, 0.25 * (self.high[j] - self.low[j]))
+            size = min(STEP, 0.25 * (self.high[j] - self.low[j]))
             for h in (size, -size) if u[j] + size <= self.high[j] else (-size, size):
                 moved = u.copy()
                 moved[j] += h
