@@ -24,7 +24,8 @@ from aesi.tracer.likelihood.model_error import whitened
 DRAWS = 400
 """The 99 % quantile of so many is known to a tenth of its value."""
 FAMILY_WISE = 0.01
-"""Chance that any effect at all is admitted at a step where nothing is missing."""
+"""Chance that any effect at all is admitted at a step where nothing is missing, and of cells whose declared parameters
+scatter as their spreads say, the share that have one which is called wrong."""
 
 
 def admission_nats(parent: Parent, slopes_v: Mapping[str, Array], seed: int = 0) -> float:

@@ -9,6 +9,7 @@ from scipy.stats import norm
 
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.likelihood.surrogates import FAMILY_WISE
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import fitted_hypothesis
 from aesi.tracer.search.forward import without_needless
@@ -17,9 +18,6 @@ from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 
 NINETY = 1.645
 """Standard deviations either side of a 90 % interval."""
-WRONG_IN = 0.05
-"""Of cells whose declared parameters scatter as their spreads say, so many have one that is called wrong, whichever. A
-convention."""
 
 
 def with_wrong_parameters(path: Path, most: int, archive: Archive) -> Path:
@@ -79,7 +77,7 @@ def beyond_spread(problem: InverseProblem, fit: FittedHypothesis) -> list[str]:
 
 
 def wrong_sds(parameters: int) -> float:
-    """Deviations that one of so many normal deviates exceeds in WRONG_IN of all draws (Sidak, J. Am. Stat. Assoc. 62
-    (1967) 626)."""
-    each = 1.0 - (1.0 - WRONG_IN) ** (1.0 / max(parameters, 1))
+    """Deviations that one of so many normal deviates exceeds as rarely as an effect is admitted where nothing is
+    missing (Sidak, J. Am. Stat. Assoc. 62 (1967) 626)."""
+    each = 1.0 - (1.0 - FAMILY_WISE) ** (1.0 / max(parameters, 1))
     return float(norm.isf(0.5 * each))
