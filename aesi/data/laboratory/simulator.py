@@ -45,9 +45,9 @@ MESH: dict[LaboratoryModel, dict[str, int]] = {
     "DFN": {"x_n": 60, "x_s": 20, "x_p": 60, "r_n": 80, "r_p": 80},
 }
 """Of Chebyshev points across and graded ones along a radius. Even points across err in proportion to their width, like
-a resistance: 80 by 27 microohm on the LG M50, which 10 rows a second show. On its pulses
-of up to 1.2C, half an hour, against 160 points across and 200 along a radius, 80 even ones and 60 err by 0.072 mV RMS
-and 0.66 at most, these by 0.011 to 0.013 and 0.10 to 0.12 in as much time."""
+a resistance: 80 by 27 microohm on the LG M50, which 10 rows a second show. On its pulses of up to 1.2C, half an hour,
+against 160 points across and 200 along a radius, 80 even ones and 60 err by 0.072 mV RMS and 0.66 at most, these by
+0.011 to 0.013 and 0.10 to 0.12 in as much time."""
 SIZES_MESH = {"x_n": 12, "x_s": 6, "x_p": 12, "r_n": 20, "r_p": 20, "R_n": 5, "R_p": 5}
 """Of a DFN with particles of several sizes, where each point across holds a particle of each size. On the NMC cell with
 radii that scatter by 61 %, under a drive at 0.8C, against 24 points across, 30 along a radius and 7 sizes, it errs by

@@ -41,7 +41,7 @@ class Thresholds:
     fewer nats, are not told apart.
     foretold_share : of the rows, that a hypothesis has to foretell where ranges of the current or of charge are left
     out. 31 right ones foretold 69 to 98 % on development cases of `aesi bench blind`, what fits a smooth discharge of a
-    measured cell to its noise (the NMC cell's at 1C and C/20, cut at 40 to 85 %) 9 to 12 %.
+    measured cell to its noise (the NMC cell's at 1C and C/20, cut at 50 to 85 %) 9 to 12 %.
     """
 
     noise_share: float = 0.45
