@@ -128,7 +128,8 @@ def problem(
         ageing,
         physics,
     )
-    taken = (*(s for r in ready for s in (r.start.sentence, hold_told(r))), *ageing.sentences)
+    starts = (r.start.sentence for r in ready if not r.start.against_voltage)  # those are warnings
+    taken = (*starts, *map(hold_told, ready), *ageing.sentences)
     return model, (*notes, *zero.sentences, *(n for _, more in kept for n in more), *told, *typical, *taken)
 
 

@@ -84,6 +84,25 @@ class Calibration:
     x: Array
     covariance: Array
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why the cell may be bent to what is not its own, a sentence each: a state of charge that was given against
+        the voltage, and records on which the fit errs by more than the start file, which one cell's seldom do."""
+        against = (r.start for r in self.model.records if r.start.against_voltage)
+        return (
+            *(
+                f"{start.sentence[:-1]}: the fit bends the cell's parameters to make up for the difference; leave out "
+                "--soc0, or correct it, unless the charge was counted and the start file is another cell's."
+                for start in against
+            ),
+            *(
+                f"{e.name}: the fit errs by more there than the start file; is it a record of the same cell, at the "
+                "same age and at the temperature that it was taken at?"
+                for e in self.errors
+                if e.after_v > e.before_v
+            ),
+        )
+
     def __repr__(self) -> str:
         errors = ", ".join(
             f"{e.name} {MV_PER_V * e.before_v:.1f} -> {MV_PER_V * e.after_v:.1f} mV" for e in self.errors

@@ -210,19 +210,10 @@ def calibration_content(
             for s in spectra
         ],
         "at_bounds": list(found.at_bounds),
-        "notes": list(together((*_worse(found), *read, *found.notes, *sampled_notes))),
+        "warnings": list(found.warnings),
+        "notes": list(together((*read, *found.notes, *sampled_notes))),
         "seconds": round(found.seconds, 2),
     }  # fmt: skip
-
-
-def _worse(found: Calibration) -> tuple[str, ...]:
-    """Records on which the fit errs by more than the start file, which one cell's seldom do."""
-    return tuple(
-        f"{e.name}: the fit errs by more there than the start file; is it a record of the same cell, at the same age "
-        "and at the temperature that it was taken at?"
-        for e in found.errors
-        if e.after_v > e.before_v
-    )
 
 
 def _health_rows(found: Calibration) -> dict[str, dict[str, float | None]]:

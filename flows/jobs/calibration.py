@@ -42,5 +42,7 @@ def calibrate(
         console.say(f"  {left} (each with its weights in the report)")
     if content["at_bounds"]:
         console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")
+    for warning in content["warnings"]:
+        console.say(f"  WARNING: {warning}")
     console.say(f"Written: {out}. Report: {out.with_suffix('.report.html')}")
     return content

@@ -29,6 +29,11 @@ class InitialState:
     ends: tuple[float, float] | None = None
     by_voltage: float | None = None
 
+    @property
+    def against_voltage(self) -> bool:
+        """Was a state of charge taken as it was given, though the record's voltage contradicts it?"""
+        return self.contradicted and self.basis == "given"
+
     def off(self, soc: float) -> float:
         """How far a state of charge is from all that the voltage may mean; 0 within."""
         low, high = self.ends or (self.soc - 2.0 * self.sd, self.soc + 2.0 * self.sd)

@@ -170,3 +170,16 @@ def test_a_cell_calibrated_in_python_did_not_say_which_model_it_was_fitted_with(
     assert dict(found.cell.capacity_shares) == found.capacities
     other = calibrate(replace(start, fitted_with="dfn"), records[:1], evaluations=1)
     assert other.cell.fitted_with == "espm"
+
+
+def test_a_start_given_against_the_voltage_bent_the_file_with_no_more_than_a_note(start, records):
+    alone = calibrate(start, records[:1], Conditions(soc0=0.8), evaluations=1)
+    (warning,) = (words for words in alone.warnings if "--soc0" in words)
+    assert warning.startswith("at_25 starts at a state of charge of 0.8, as given; its first voltage (4.")
+    assert "rather says 1.000: the fit bends the cell's parameters" in warning
+    assert not any("starts at a state of charge" in note for note in alone.notes)  # it is told once
+
+    believed = calibrate(start, records[:1], Conditions(soc0=0.98), evaluations=1)
+    assert not any("--soc0" in words for words in believed.warnings)
+    of_several = calibrate(start, records, Conditions(soc0=0.8), evaluations=1)  # they start where they say
+    assert not any("--soc0" in words for words in of_several.warnings)

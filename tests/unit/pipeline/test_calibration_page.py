@@ -52,6 +52,7 @@ def content():
         "undetermined": [{"weights": {}, "narrowed": 1.0, "sentence": "the data do not determine it"}],
         "impedance": [],
         "at_bounds": ["negative.film"],
+        "warnings": ["slow: started <elsewhere>."],
         "notes": ["pulses: no temperature."],
         "seconds": 3.0,
     }
@@ -86,6 +87,7 @@ def test_the_finding_comes_first_and_the_best_known_parameter_before_the_others(
     assert (
         html.index("by 2.0\u00a0mV RMSE")
         < html.index("4.0 to 6.0")
+        < html.index("slow: started &lt;elsewhere&gt;.")
         < html.index("On a bound")
         < html.index("These tell 1 of 5.")
     )

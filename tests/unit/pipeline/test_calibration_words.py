@@ -52,9 +52,11 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
             "impedance": [],
             "undetermined": [],
             "at_bounds": [],
+            "warnings": ["a starts elsewhere."],
             "notes": [],
         }
     )
+    assert "**Warning:** a starts elsewhere." in text
     assert "| a | 25.0, as declared | 2.00 |" in text
     assert "| b | 9.5 | 2.00 |" in text
     assert "| negative.rate | 1 | 0.9 to 1.1 | factor | 3 | convention |" in text

@@ -31,6 +31,7 @@ def open_line(content: Mapping[str, Any]) -> str:
 def to_text(content: Mapping[str, Any]) -> str:
     """The report as Markdown."""
     lines = [f"# Calibration of {content['cell']}", "", f"Fitted with {MODEL_WORDS[content['model']]}.", ""]
+    lines += [line for warning in content["warnings"] for line in (f"**Warning:** {warning}", "")]
     lines += [*_files(content), "", *_health(content), "", *_parameters(content)]
     if content["impedance"]:
         lines += ["", *_impedance(content)]
