@@ -2,9 +2,11 @@
 
 A logger writes a row at the end of an interval: row k's current held over (t[k-1], t[k]]. The average of the
 current over any interval then follows from the charge, which is piecewise linear in time, and the charge
-between two kept stamps is exact. The voltage is taken as straight lines between rows; its average over the
-same interval belongs to that average current (the ohmic drop is linear in it). Where rows are no denser than
-the new step there is nothing to average, and the voltage is that at the stamp.
+between two kept stamps is exact. A current that was declared to run straight between rows is taken so
+instead: held over the interval before its row it would come half an interval early. The voltage is taken as
+straight lines between rows; its average over the same interval belongs to that average current (the ohmic
+drop is linear in it). Where rows are no denser than the new step there is nothing to average, and the voltage
+is that at the stamp.
 """
 
 from __future__ import annotations
@@ -15,10 +17,11 @@ import numpy as np
 
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
-from aesi.records import Measurement
+from aesi.records import Hold, Measurement
 
 DENSE = 0.75
 """Below this share of the new step the old rows count as denser, and the voltage is averaged."""
+AVERAGES, AT_STAMPS = "interval averages", "values at the stamps"
 MOST_EVEN_ROWS = 20_000_000
 """A fortnight at 10 Hz and more: beyond, a wrong step is likelier than a wish."""
 
@@ -69,12 +72,12 @@ def is_even(time_s: Array, dt_s: float, tolerance: float = 1e-6) -> bool:
     return bool(np.all(np.abs(np.diff(time_s) - dt_s) <= tolerance * dt_s))
 
 
-def to_even(measurement: Measurement, dt_s: float) -> Measurement:
+def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> Measurement:
     """The measurement on stamps dt_s apart (s), with a note; itself where it already is.
 
-    Current: interval averages (the charge is kept). Voltage and temperature: interval averages where the rows
-    are denser than dt_s, values at the stamps elsewhere. Raises DataError for a step that is not positive,
-    that is longer than the record, or that would make more than 20 million rows.
+    Voltage and temperature: interval averages where the rows are denser than dt_s, values at the stamps elsewhere.
+    Current: of hold "backward" interval averages (the charge is kept), of "linear" as the voltage. Raises DataError
+    for a step that is not positive, that is longer than the record, or that would make more than 20 million rows.
     """
     time = measurement.time_s
     length = float(time[-1] - time[0])
@@ -92,10 +95,10 @@ def to_even(measurement: Measurement, dt_s: float) -> Measurement:
     if is_even(time, dt_s):
         return measurement
     note = (
-        f"Resampled from {len(time):,} rows to {{rows:,}} rows every {dt_s:g} s: interval averages of the "
-        "current, {voltage}."
+        f"Resampled from {len(time):,} rows to {{rows:,}} rows every {dt_s:g} s: {{current}} of the current, "
+        "{voltage} of the voltage."
     )
-    return _onto(measurement, even_stamps(time, dt_s), note)
+    return _onto(measurement, even_stamps(time, dt_s), note, hold)
 
 
 def decimate(measurement: Measurement, max_rows: int) -> Measurement:
@@ -111,23 +114,24 @@ def decimate(measurement: Measurement, max_rows: int) -> Measurement:
     run = -(-(n - 1) // (max_rows - 1))
     left = (n - 1) % run
     note = (
-        f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, interval averages of the current, "
-        "{voltage}" + (f"; the last {left} rows, no whole run, were left out." if left else ".")
+        f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{current}} of the current, "
+        "{voltage} of the voltage"
+        + (f"; the last {left} rows, no whole run, were left out." if left else ".")
     )
-    return _onto(measurement, measurement.time_s[::run], note)
+    return _onto(measurement, measurement.time_s[::run], note, "backward")
 
 
-def _onto(measurement: Measurement, stamps: Array, note: str) -> Measurement:
+def _onto(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Measurement:
     intervals = BetweenStamps(measurement.time_s, stamps)
     dense = bool(np.median(np.diff(measurement.time_s)) < DENSE * np.median(np.diff(stamps)))
-    along = intervals.linear if dense else intervals.sampled
+    along, voltage = (intervals.linear, AVERAGES) if dense else (intervals.sampled, AT_STAMPS)
+    charge, current = (intervals.held, AVERAGES) if hold == "backward" else (along, voltage)
     temperature = measurement.temperature_degc
-    voltage = "interval averages of the voltage" if dense else "the voltage at the stamps"
-    told = f"{measurement.name}: {note.format(rows=len(stamps), voltage=voltage)}"
+    told = f"{measurement.name}: {note.format(rows=len(stamps), current=current, voltage=voltage)}"
     return replace(
         measurement,
         time_s=stamps,
-        current_a=intervals.held(measurement.current_a),
+        current_a=charge(measurement.current_a),
         voltage_v=along(measurement.voltage_v),
         temperature_degc=None if temperature is None else along(temperature),
         notes=(*measurement.notes, told),

@@ -14,6 +14,7 @@ from aesi.constants import MV_PER_V
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
+from aesi.data.resample import DENSE
 from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
@@ -123,18 +124,12 @@ def predict_file(
     saved = HybridModel.load(model).with_soh(asked.soh)
     placed = _placed(replace(saved, hold=asked.hold or saved.hold), profile, current, asked, say)
     hybrid, record = placed.model, placed.record
-    prediction = hybrid.predict(
-        profile.time_s,
-        profile.current_a,
-        soc0=placed.start.soc,
-        voltage_v=profile.voltage_v if measured else None,
-        temperature_degc=profile.temperature_degc,
-    )
+    prediction = hybrid.predict_record(record, placed.start.soc, one_step=measured)
     frame = prediction.to_frame()
     frame.insert(1, "current_a", profile.current_a)
     _write(out, frame)
     say(reached(hybrid.cell, record, prediction.voltage_v, prediction.soc))
-    say(_of_band(record, prediction, hybrid.correction is not None))
+    say(_of_band(record, prediction, hybrid, measured))
     return len(frame)
 
 
@@ -199,26 +194,54 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
     return said
 
 
-def _of_band(record: Measurement, prediction: Prediction, corrected: bool) -> list[str]:
-    said = []
-    if corrected:
-        said.append(
-            f"{record.name}: {_percent(prediction.outside)} of the rows lie outside the range the correction was "
-            "trained on."
-        )
-    else:
-        said.append(
+def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
+    """Sentences on where the correction is used, and on what its band holds of the rows that have one."""
+    if model.correction is None:
+        said = [
             "the model carries no learnt correction: one step ahead is the same as a free run, and lower_v and upper_v "
             "are empty."
-        )
+        ]
+    else:
+        said = [
+            f"{record.name}: {_percent(prediction.outside)} of the rows lie outside the range the correction was "
+            "trained on."
+        ]
+    banded = np.isfinite(prediction.lower_v)
     if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
-        inside = (record.voltage_v >= prediction.lower_v) & (record.voltage_v <= prediction.upper_v)
-        width = MV_PER_V * float(np.nanmean(prediction.upper_v - prediction.lower_v))
+        low, high = prediction.lower_v[banded], prediction.upper_v[banded]
+        inside = _within(record.voltage_v[banded], low, high)
         said.append(
             f"{record.name}: the {100 * prediction.nominal:.0f} % band holds {100 * np.mean(inside):.1f} % of the "
-            f"measured voltage; it is {width:.1f} mV wide in the mean."
+            f"measured voltage; it is {MV_PER_V * float(np.mean(high - low)):.1f} mV wide in the mean."
+        )
+        if measured:
+            said += _of_observed(record, model, ~_within(prediction.voltage_v[banded], low, high))
+    return said
+
+
+def _of_observed(record: Measurement, model: HybridModel, apart: BoolArray) -> list[str]:
+    """Sentences on what a band one step ahead is of.  apart : of the rows with a band, those predicted outside it."""
+    said = []
+    if np.any(apart):
+        said.append(
+            f"{record.name}: in {_percent(apart)} of the rows voltage_v lies outside its own band, which follows the "
+            "errors of the rows before; the middle of lower_v and upper_v is the better estimate there."
+        )
+    if float(np.median(np.diff(record.time_s))) < DENSE * model.dt_s:
+        said.append(
+            f"{record.name}: its rows are denser than the model's step of {model.dt_s:g} s, of whose averages the band "
+            "is: single rows scatter more."
+        )
+    if np.any(gaps := model.after_gap(record.time_s)):
+        said.append(
+            f"{record.name}: {_percent(gaps)} of the rows are more than a step of {model.dt_s:g} s after the one "
+            "before; what is filled in between holds some of their own voltage, so that they are no predictions."
         )
     return said
+
+
+def _within(voltage_v: Array, lower_v: Array, upper_v: Array) -> BoolArray:
+    return (voltage_v >= lower_v) & (voltage_v <= upper_v)
 
 
 def _percent(rows: BoolArray) -> str:

@@ -158,7 +158,7 @@ def _on_grid(
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
         start = initial_state(cell, measurement, declared, data.hold, given.effects, model=given.model)
         held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: ")
-        even = to_even(measurement, data.dt_s)
+        even = to_even(measurement, data.dt_s, data.hold)
         notes += [
             with_keys(start.sentence),
             held,

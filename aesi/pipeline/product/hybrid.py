@@ -15,7 +15,7 @@ import numpy as np
 from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import DataError, InputError
-from aesi.numerics.typing import Array, Numbers
+from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_voltage
 from aesi.physics.effects import active_effect
@@ -26,6 +26,11 @@ from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
+
+MOST_STEP = 1.5
+"""Steps of the correction between two rows, beyond which the voltage a step before the later one is not known from
+rows before it: of what would be filled in a third and more is the row's own. A convention: loggers' stamps wander by
+less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,30 +72,43 @@ class HybridModel:
         """Voltage under a current, with its band.
 
         time_s, current_a : (n,) s, A (discharge positive).  voltage_v : (n,) V measured: one step ahead, each
-        sample predicted from those before it; None: free run, from the voltage error `error0_v` at the start.
+        sample predicted from those before it, the first by the physics alone and without a band; None: free run, from
+        the voltage error `error0_v` at the start.
         soc0 : state of charge at the first sample; None takes it from the first measured voltage at rest, else
         the model's own.  temperature_degc : as in `simulate`.
 
-        Raises DataError where the record cannot be simulated, its first voltage is no such cell's, or soc0 is unknown.
+        Raises DataError where the record cannot be simulated, its first voltage is no such cell's, soc0 is unknown, or
+        one step ahead is asked for of rows that are further apart than the correction's step.
         """
-        measured = np.full(np.shape(time_s), np.nan) if voltage_v is None else numbers(voltage_v, "voltage_v")
+        free = voltage_v is None
+        measured = np.full(np.shape(time_s), np.nan) if free else numbers(voltage_v, "voltage_v")
         warm = _each_row(temperature_degc, np.shape(time_s))
         record = Measurement(time_s, current_a, measured, warm, "the record")
-        if voltage_v is not None and not np.isfinite(measured).all():
+        return self.predict_record(record, soc0, one_step=not free, error0_v=error0_v)
+
+    def predict_record(
+        self, record: Measurement, soc0: float | None = None, *, one_step: bool = False, error0_v: float = 0.0
+    ) -> Prediction:
+        """`predict` of a record, under its name: one step ahead of its voltage, or in free run, which sees none."""
+        measured = record.voltage_v
+        if one_step and not np.isfinite(measured).all():
             row = int(np.flatnonzero(~np.isfinite(measured))[0])
             raise DataError(
                 f"voltage_v has no value at {record.time_s[row]:g} s ({row_words(row)}); predict the parts before "
                 "and after the gap as records of their own, or leave voltage_v out for a free run."
             )
-        if voltage_v is not None:
+        if one_step:
             check_voltage(self.cell, record.take(slice(0, 1)))  # from which state and error start
-        soc0 = self._soc0(record, soc0, voltage_v is not None)
+            self._check_dense(record)
+        else:
+            record = replace(record, voltage_v=np.full(len(record), np.nan))
+        soc0 = self._soc0(record, soc0, one_step)
         even = self._even(record)
         series = self._series(even, soc0)
-        if voltage_v is None:
-            prediction = self._free_run(self._with_slopes(series, even, soc0), error0_v)
-        else:
+        if one_step:
             prediction = self._one_step(series)
+        else:
+            prediction = self._free_run(self._with_slopes(series, even, soc0), error0_v)
         return prediction if even is record else self._back(prediction, record, soc0)
 
     def save(self, folder: str | Path) -> Path:
@@ -139,6 +157,25 @@ class HybridModel:
             raise DataError("a free run needs soc0, the state of charge at the first sample; give it.")
         return self.soc0
 
+    def _check_dense(self, record: Measurement) -> None:
+        gaps = self.after_gap(record.time_s)
+        if 2 * np.count_nonzero(gaps) > len(record):
+            apart_s = float(np.median(np.diff(record.time_s)))
+            raise DataError(
+                f"{record.name}: its rows are {apart_s:g} s apart, and one step of the correction is {self.dt_s:g} s, "
+                "so that the voltage a step before a row would have to be filled in from that row itself; leave out "
+                "the measured voltage (--measured) for a free run, or give a record of denser rows."
+            )
+
+    def after_gap(self, time_s: Array) -> BoolArray:
+        """(n,) True for a row with none a step before it: what is filled in there is partly the row's own.
+
+        time_s : (n,) s, of the rows.
+        """
+        if self.correction is None:
+            return np.zeros(len(time_s), dtype=bool)
+        return np.concatenate([[False], np.diff(time_s) > MOST_STEP * self.dt_s])
+
     def _even(self, record: Measurement) -> Measurement:
         """The record at the correction's step, or itself where that is nothing to do."""
         if self.correction is None or is_even(record.time_s, self.dt_s):
@@ -148,7 +185,7 @@ class HybridModel:
                 f"{record.name} lasts {record.time_s[-1] - record.time_s[0]:g} s, and the correction steps by "
                 f"{self.dt_s:g} s; give a longer one."
             )
-        return to_even(record, self.dt_s)
+        return to_even(record, self.dt_s, self.hold)
 
     def _series(self, record: Measurement, soc0: float) -> ErrorSeries:
         run = simulate(
@@ -195,7 +232,7 @@ class HybridModel:
             residual = series.error_v - error
             residual[0] = np.nan
             band = self.intervals.intervals(residual, series.current_a)
-            low, high = band.lower_v, band.upper_v
+            low, high = (np.concatenate([[np.nan], bound[1:]]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
         return Prediction.of(series, error, low, high, self.correction.outside(series), alpha)
 

@@ -84,3 +84,14 @@ def test_rows_behind_the_last_whole_run_are_said_to_be_left_out():
     whole = decimate(measurement(np.arange(601.0), np.ones(601)), 11)
     assert whole.time_s[-1] == 600.0
     assert "left out" not in whole.notes[-1]
+
+
+def test_a_current_that_runs_straight_was_resampled_as_a_staircase():
+    time = np.arange(0.0, 20.0, 2.0)
+    record = measurement(time, 3.0 * time)
+    straight, held = to_even(record, 1.0, "linear"), to_even(record, 1.0)
+    np.testing.assert_allclose(straight.current_a, 3.0 * straight.time_s)
+    np.testing.assert_allclose(held.current_a[1:3], 6.0)  # A, of the row that ends the first interval
+    assert "values at the stamps of the current, values at the stamps of the voltage" in straight.notes[-1]
+    dense = to_even(measurement(np.arange(0.0, 10.5, 0.5), np.arange(0.0, 10.5, 0.5)), 1.0, "linear")
+    np.testing.assert_allclose(dense.current_a[1:], dense.time_s[1:] - 0.5)  # averages of the second before

@@ -1,6 +1,7 @@
 """The saved product: data alone, the same predictions after a round trip, and stated behaviour off its path."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -61,7 +62,7 @@ def test_both_regimes_beat_the_physics_and_carry_bands(model, data):
         left = np.sqrt(np.mean((data.voltage_v - prediction.voltage_v) ** 2))
         bare = np.sqrt(np.mean((data.voltage_v - prediction.physics_v) ** 2))
         assert left < 0.1 * bare
-        assert (prediction.upper_v > prediction.lower_v).all()
+        assert (prediction.upper_v > prediction.lower_v)[1:].all()
         inside = (data.voltage_v >= prediction.lower_v) & (data.voltage_v <= prediction.upper_v)
         assert inside[1:].mean() > 0.8
 
@@ -71,6 +72,71 @@ def test_another_sampling_is_brought_to_the_models_own_and_back(model, data):
     prediction = model.predict(data.time_s[rows], data.current_a[rows], SOC0)
     assert len(prediction.voltage_v) == len(rows)
     assert np.isfinite(prediction.voltage_v).all()
+
+
+def linear_drive(model, dt_s, every_s=1.0, seconds=900.0):
+    """Time, current and voltage of the model's own physics on a drive that runs straight between points `every_s`."""
+    rng = np.random.default_rng(0)
+    points_s = np.arange(0.0, seconds + every_s, every_s)
+    time_s = np.arange(0.0, seconds, dt_s)
+    current_a = np.interp(time_s, points_s, rng.normal(0.0, 3.0, len(points_s)))
+    return time_s, current_a, aesi.simulate(model.cell, time_s, current_a, SOC0, hold="linear").voltage_v
+
+
+def test_a_current_that_runs_straight_came_early_where_a_record_was_brought_to_another_step(model):
+    straight = replace(model, hold="linear")
+    time_s, current_a, _ = linear_drive(model, 1.0, every_s=2.0)
+    kept = np.delete(np.arange(len(time_s)), slice(31, 200, 6))  # rows on a straight line between the others
+    whole = straight.predict(time_s, current_a, SOC0)
+    brought = straight.predict(time_s[kept], current_a[kept], SOC0)
+    np.testing.assert_allclose(brought.voltage_v, whole.voltage_v[kept], atol=2e-5)
+
+
+def test_one_step_of_rows_further_apart_than_a_step_saw_the_row_that_it_predicts(model, tmp_path):
+    time_s, current_a, voltage_v = linear_drive(model, 2.0)
+    with pytest.raises(DataError, match="its rows are 2 s apart, and one step of the correction is 1 s"):
+        model.predict(time_s, current_a, SOC0, voltage_v)
+    model.predict(time_s, current_a, SOC0)  # a free run is none of its rows
+
+    folder = model.save(tmp_path / "model")
+    rows = {"time_s": time_s, "current_a": current_a, "voltage_v": voltage_v}
+    pd.DataFrame(rows).to_csv(tmp_path / "sparse.csv", index=False)
+    with pytest.raises(DataError, match="sparse: its rows are 2 s apart"):
+        predict_file(folder, tmp_path / "sparse.csv", tmp_path / "out.csv", measured=True)
+
+
+def test_the_first_row_had_the_band_of_one_step_though_nothing_was_measured_before_it(model, data):
+    prediction = model.predict(data.time_s, data.current_a, SOC0, data.voltage_v)
+    assert np.isnan(prediction.lower_v[0])
+    assert prediction.voltage_v[0] == prediction.physics_v[0]
+    assert np.isfinite(prediction.lower_v[1:]).all()
+
+
+def test_a_band_one_step_ahead_said_nothing_of_rows_that_it_is_not_of(model, data, tmp_path):
+    folder = model.save(tmp_path / "model")
+
+    def told(time_s, current_a, voltage_v):
+        rows = {"time_s": time_s, "current_a": current_a, "voltage_v": voltage_v}
+        pd.DataFrame(rows).to_csv(tmp_path / "drive.csv", index=False)
+        said = []
+        asked = ProfileRequest(soc0=SOC0)
+        predict_file(folder, tmp_path / "drive.csv", tmp_path / "out.csv", asked, True, said.extend)
+        return " ".join(said)
+
+    as_trained = told(data.time_s, data.current_a, data.voltage_v)
+    assert "denser" not in as_trained
+    assert "after the one before" not in as_trained
+
+    fine_s = np.arange(0.0, data.time_s[-1], 0.25)
+    fine = (np.interp(fine_s, data.time_s, each) for each in (data.current_a, data.voltage_v))
+    assert "denser than the model's step of 1 s, of whose averages the band is" in told(fine_s, *fine)
+
+    kept = np.delete(np.arange(len(data)), [50, 150])
+    with_gap = told(data.time_s[kept], data.current_a[kept], data.voltage_v[kept])
+    assert "more than a step of 1 s after the one before" in with_gap
+
+    drifting_v = data.voltage_v + 0.02  # all of it one way: the band follows, the point does not
+    assert "lies outside its own band" in told(data.time_s, data.current_a, drifting_v)
 
 
 def test_one_step_finds_its_start_from_the_rest_voltage(model, data):
