@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import errno
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from filelock import FileLock, Timeout
-
 from aesi.errors import InputError
-from flows.base.console import Console
+from flows.base.locks import ProcessLock
 
 LOCK = ".aesi.lock"
-"""Stays behind, empty: removed, it could be held by two. The kernel frees it with the process that holds it."""
-NO_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP)
 
 
 @contextmanager
@@ -24,23 +19,11 @@ def alone_in(folder: Path) -> Iterator[None]:
 
     Raises InputError where another one does now.
     """
-    folder.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(folder / LOCK, thread_local=False)
-    try:
-        lock.acquire(blocking=False)
-    except Timeout:
+    lock = ProcessLock(folder / LOCK, f"--out {folder}", "writing its results there too")
+    if not lock.acquire():
         raise InputError(
             f"--out {folder}: another process writes its results there now; wait for its end, or name another folder."
-        ) from None
-    except (NotImplementedError, OSError) as error:
-        if isinstance(error, OSError) and error.errno not in NO_LOCKS:
-            raise
-        Console().say(
-            f"--out {folder}: its file system has no locks, so that nothing keeps a second process from writing its "
-            "results there too; start no other one with the same --out before this one has ended."
         )
-        yield
-        return
     try:
         yield
     finally:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 
-from filelock import FileLock, Timeout
-
 from aesi.numerics.files.whole import write_whole
+from flows.base.locks import ProcessLock
 
 
 class FileOutcomes:
@@ -15,7 +14,7 @@ class FileOutcomes:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._locks: dict[str, FileLock] = {}
+        self._locks: dict[str, ProcessLock] = {}
 
     def get(self, key: str) -> bytes | None:
         try:
@@ -32,12 +31,10 @@ class FileOutcomes:
     def claim(self, key: str) -> bool:
         if key in self._locks:
             return True
-        path = self._folder / "claims" / key
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lock = FileLock(path, thread_local=False)
-        try:
-            lock.acquire(blocking=False)
-        except Timeout:
+        lock = ProcessLock(
+            self._folder / "claims" / key, str(self._folder), "evaluating the same candidates again"
+        )
+        if not lock.acquire():
             return False
         self._locks[key] = lock
         return True
@@ -46,7 +43,7 @@ class FileOutcomes:
         lock = self._locks.pop(key, None)
         if lock is not None:
             with suppress(PermissionError):  # Windows keeps a file that is open
-                Path(lock.lock_file).unlink(missing_ok=True)
+                lock.path.unlink(missing_ok=True)
             lock.release()
 
     def close(self) -> None:

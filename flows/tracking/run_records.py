@@ -11,10 +11,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 
-from filelock import FileLock, Timeout
-
 from aesi.numerics.files.whole import READ_BY_OWNER, write_whole
 from flows.base import environment
+from flows.base.locks import ProcessLock
 
 
 @dataclass(frozen=True)
@@ -54,24 +53,21 @@ def records(experiment: str | None = None) -> list[RunRecord]:
 
 
 class RunLock:
-    """The right to work on a run; `held` says whether this process has it."""
+    """The right to work on a run; `held` says whether this process has it, as none is known to where the workspace's
+    file system has no locks."""
 
     def __init__(self, run_id: str) -> None:
-        self._lock = FileLock(_folder() / f"{run_id}.lock", thread_local=False)
+        folder = _folder()
+        self._lock = ProcessLock(folder / f"{run_id}.lock", str(folder), "working on the same run")
 
     @property
     def held(self) -> bool:
         """Whether this process works on the run."""
-        return self._lock.is_locked
+        return self._lock.held
 
     def acquire(self) -> bool:
-        """Take the lock if nobody has it."""
-        _folder().mkdir(parents=True, exist_ok=True)
-        try:
-            self._lock.acquire(blocking=False)
-        except Timeout:
-            return False
-        return True
+        """Take the lock; False where another process has it."""
+        return self._lock.acquire()
 
     def release(self) -> None:
         """Give it back."""

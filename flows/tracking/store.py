@@ -18,10 +18,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock
-
 from aesi.errors import AesiError, InputError
 from flows.base import environment
+from flows.base.locks import ProcessLock
 from flows.tracking.relocation import artifact_folder, follow
 from flows.tracking.whole_run import read_runs
 
@@ -216,10 +215,13 @@ def _alone(local: bool) -> Iterator[None]:
     if not local:
         yield
         return
-    path = environment.state() / "mlflow.lock"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with FileLock(path):
+    folder = environment.state()
+    lock = ProcessLock(folder / "mlflow.lock", str(folder), "setting up the tracking store at the same time")
+    lock.acquire(wait=True)
+    try:
         yield
+    finally:
+        lock.release()
 
 
 def _opened(database: Path, uri: str) -> tuple[str, ...]:

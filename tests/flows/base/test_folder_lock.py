@@ -9,6 +9,9 @@ from filelock import FileLock
 
 from aesi.errors import InputError
 from flows.base.folder_lock import LOCK, alone_in
+from flows.evaluation.outcome_files import FileOutcomes
+from flows.tracking.run_records import RunLock
+from flows.tracking.store import _alone
 
 HOLD = "import sys; from pathlib import Path; from flows.base.folder_lock import alone_in\n"
 HOLD += "with alone_in(Path(sys.argv[1])): print('held', flush=True); sys.stdin.read()"
@@ -32,18 +35,43 @@ def test_one_folder_does_not_wait_for_another(tmp_path):
         pass
 
 
-@pytest.mark.parametrize("error", [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")])
-def test_a_file_system_without_locks_let_two_in_without_a_word(tmp_path, monkeypatch, capsys, error):
+LACKING = [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")]
+
+
+@pytest.fixture(params=LACKING, ids=["unknown", "none left"])
+def no_locks(request, monkeypatch):
     def refuse(self, blocking=True):
-        raise error
+        raise request.param
 
     monkeypatch.setattr(FileLock, "acquire", refuse)
-    with alone_in(tmp_path / "out"), alone_in(tmp_path / "out"):
+    monkeypatch.setattr("flows.base.locks._told", set())
+
+
+def test_a_file_system_without_locks_let_two_in_without_a_word(tmp_path, no_locks, capsys):
+    with alone_in(tmp_path / "out"), alone_in(tmp_path / "other"), alone_in(tmp_path / "out"):
         pass
     said = capsys.readouterr().err.splitlines()
-    assert len(said) == 2
+    assert len(said) == 2  # each folder once
     assert "no locks" in said[0]
     assert "--out" in said[0]
+
+
+def test_a_workspace_without_locks_ended_every_run_with_a_bare_error(tmp_path, no_locks, capsys, monkeypatch):
+    monkeypatch.setenv("AESI_HOME", str(tmp_path))
+    outcomes = FileOutcomes(tmp_path / "candidates")
+    assert all(outcomes.claim(key) for key in ("aa", "bb"))
+    with RunLock("one") as lock:
+        assert not lock.held  # so that nobody closes a run that may be alive
+        assert lock.acquire()
+    with _alone(local=True):
+        pass
+    outcomes.close()
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 3
+    for line, doing in zip(
+        said, ("evaluating the same candidates", "working on the same run", "setting up"), strict=True
+    ):
+        assert f"no locks, so that nothing keeps a second process from {doing}" in line
 
 
 def test_a_folder_that_cannot_be_locked_for_another_reason_is_no_folder_without_locks(tmp_path, monkeypatch):
