@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
+from aesi.data.channels.implausible import USUAL_RESISTANCE_OHM_AH, step_resistance_ohm
 from aesi.data.read import read
 from aesi.data.reading import Reading
 from aesi.errors import DataError
@@ -70,8 +71,8 @@ def convert_file(
     return record
 
 
-def record_lines(record: Measurement) -> list[str]:
-    """What a record holds, a sentence each, for whoever checks a conversion."""
+def record_lines(record: Measurement, *, of_cell: bool = False) -> list[str]:
+    """What a record holds, a sentence each, for whoever checks a conversion.  of_cell : it is known to be of a cell."""
     step = np.diff(record.time_s)
     charge = record.current_a[1:] * step / SECONDS_PER_HOUR
     out, into = float(np.sum(charge[charge > 0])), float(np.sum(-charge[charge < 0]))
@@ -80,9 +81,24 @@ def record_lines(record: Measurement) -> list[str]:
         f"Current {_range(record.current_a, 'A')}, positive on discharge: {out:.4g} Ah discharged, {into:.4g} Ah "
         "charged.",
     ]
+    if not of_cell:
+        lines += _size_line(record)
     if record.temperature_degc is not None:
         lines.append(f"Temperature {_range(record.temperature_degc, 'degC')}.")
     return lines
+
+
+def _size_line(record: Measurement) -> list[str]:
+    """What cell the resistance at the steps of the current is of: nothing else in a record tells kA or a C-rate."""
+    columns = {"time_s": record.time_s, "current_a": record.current_a, "voltage_v": record.voltage_v}
+    resistance = step_resistance_ohm(columns)
+    if resistance is None:
+        return []
+    low, high = (each / resistance for each in USUAL_RESISTANCE_OHM_AH)
+    return [
+        f"Steps of the current show {1e3 * resistance:.3g} mohm, as cells of {low:.2g} to {high:.2g} Ah do; if it is "
+        "none of these, the current is in another unit than A (--unit current_a=...), or scaled; --cell FILE checks it."
+    ]
 
 
 def _range(values: Array, unit: str) -> str:

@@ -73,6 +73,6 @@ def convert(
         admit = partial(check_of_cell, cell)
     record = convert_file(file, out, reading, to, admit)
     options.say_notes(record.notes)
-    for line in record_lines(record):
+    for line in record_lines(record, of_cell=cell is not None):
         typer.echo(line, err=True)
     typer.echo(str(out))

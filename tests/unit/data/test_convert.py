@@ -50,3 +50,20 @@ def test_stamps_since_1970_are_still_told_apart(tmp_path):
     np.savetxt(path, table, delimiter=",", header="time_s,current_a,voltage_v", comments="", fmt="%.15g")
     convert_file(path, tmp_path / "out.csv")
     np.testing.assert_allclose(np.diff(read_measurement(tmp_path / "out.csv").time_s), 0.1, atol=1e-4)
+
+
+def test_a_current_in_kiloamperes_or_c_rates_was_written_without_a_word(tmp_path):
+    rng = np.random.default_rng(0)
+    time, current = np.arange(0.0, 600.0), np.repeat(rng.normal(1.0, 3.0, 60), 10)
+    volts = 3.9 - 0.02 * current - 0.05 * np.cumsum(current) / 3600.0
+
+    def told(scale):
+        path = tmp_path / "drive.csv"
+        table = np.column_stack([time, scale * current, volts])
+        np.savetxt(path, table, delimiter=",", header="time_s,current_a,voltage_v", comments="")
+        (line,) = (x for x in record_lines(convert_file(path, tmp_path / "o.csv")) if "Steps" in x)
+        return line
+
+    assert told(1.0).startswith("Steps of the current show 20 mohm, as cells of 1 to 45 Ah do; if it is none")
+    assert "show 2e+04 mohm, as cells of 0.001 to 0.045 Ah do" in told(1e-3)
+    assert "show 100 mohm, as cells of 0.2 to 9 Ah do" in told(0.2)

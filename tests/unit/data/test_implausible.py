@@ -86,3 +86,17 @@ def test_a_voltage_that_is_held_is_no_sensor_that_stands_still(tmp_path):
     current = np.where(TIME < 3600.0, pulses, -3.0 * np.exp(-(TIME - 3600.0) / 900.0))
     volts = np.where(TIME < 3600.0, voltage(pulses), 4.2)
     read_measurement(written(tmp_path, TIME, current, np.round(volts, 3)))
+
+
+def test_a_short_record_in_milliseconds_was_taken(tmp_path):
+    """It moves too little charge to be beyond any cell's, and yet too much for its resistance and its voltage."""
+    short = slice(0, 150)
+    read_measurement(written(tmp_path, TIME[short], DRIVE[short], voltage(DRIVE)[short]))
+    message = refusal(tmp_path, 1e3 * TIME[short], DRIVE[short], voltage(DRIVE)[short])
+    assert "Ah would have moved while the voltage slides by" in message
+    assert message.endswith("declare it: --unit time_s=ms.")
+
+
+def test_a_flat_potential_is_no_time_in_milliseconds(tmp_path):
+    flat = 3.3 - 0.004 * np.cumsum(DRIVE) * 4.0 / 3600.0 - 0.02 * DRIVE
+    read_measurement(written(tmp_path, TIME, DRIVE, flat))
