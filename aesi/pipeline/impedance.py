@@ -14,7 +14,7 @@ from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.simulation import model_with
-from aesi.pipeline.notes import without_energies
+from aesi.pipeline.notes import of_another_model, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.simulation import SayNotes, write_table
 from aesi.records import Spectrum
@@ -61,16 +61,21 @@ def impedance_file(
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:
         cold = without_energies(declared.cell, [temperature_degc])
-        say_notes([*declared.cell.unread, *cold, *_left_out(active)])
+        say_notes([*declared.cell.unread, *of_another_model(declared, model), *cold, *_left_out(active)])
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])
     return z
 
 
 def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:
-    """A sentence on the effects that act on a record or a reading alone."""
-    names = [one.id for one in effects if one.effect.on_model is None and one.effect.on_voltage is None]
-    return [f"{', '.join(names)}: of a record, not of the cell, and not in its impedance."] if names else []
+    """Sentences on the effects that act on a record or a reading alone, or on a temperature that is given."""
+    warm = [one.id for one in effects if one.effect.infers == "temperature"]
+    acting = (one for one in effects if one.id not in warm)
+    names = [one.id for one in acting if one.effect.on_model is None and one.effect.on_voltage is None]
+    said = [f"{', '.join(names)}: of a record, not of the cell, and not in its impedance."] if names else []
+    if warm:
+        said.append(f"{', '.join(warm)}: not in the impedance, which is at the temperature that is given.")
+    return said
 
 
 def _has_double_layer(cell: Cell, effects: Sequence[ActiveEffect]) -> bool:

@@ -8,7 +8,9 @@ import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
-from aesi.physics import ActiveEffect, Cell
+from aesi.physics import ActiveEffect, Cell, ModelName
+from aesi.physics.simulation import MODEL_WORDS, model_with
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 
 SEPARATOR = ": "
@@ -45,11 +47,15 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
     )
 
 
-def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
+def without_energies(
+    cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
+) -> tuple[str, ...]:
     """A sentence where properties of the cell do not answer to the temperatures that it is taken at.
 
-    temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares.
+    temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares, or as
+    `effects` change that.
     """
+    cell = model_with(cell, effects).cell
     reference_k, missing = cell.reference_temperature_k, _without_energy(cell)
     kelvin = (cell.initial_temperature_k if t is None else t + ZERO_CELSIUS_K for t in temperatures_degc)
     farthest = max((float(np.max(np.abs(each - reference_k))) for each in kelvin), default=0.0)
@@ -58,6 +64,18 @@ def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | Non
     return (
         f"the cell's file declares no activation energy for {', '.join(missing)}: taken as at "
         f"{reference_k - ZERO_CELSIUS_K:.4g} degC, which is up to {farthest:.0f} K off.",
+    )
+
+
+def of_another_model(declared: HybridModel, asked: ModelName | None) -> tuple[str, ...]:
+    """A sentence where a simulation takes another physics model than what is simulated was found or fitted with."""
+    cell, found = declared.cell, bool(declared.effects or declared.correction)
+    if asked is None or asked == declared.model or not (found or cell.fitted_with):
+        return ()
+    source = "what the saved model adds to its cell was found" if found else "the cell's file was fitted"
+    return (
+        f"{source} with {MODEL_WORDS[declared.model]}, and {MODEL_WORDS[asked]} is simulated, as asked: its values may "
+        "make up for what the two differ in; leave out --model to take the one that it belongs to.",
     )
 
 

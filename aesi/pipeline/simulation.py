@@ -21,7 +21,7 @@ from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_st
 from aesi.physics.belongs import check_belongs
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.start.open_circuit import GIVEN_SD
-from aesi.pipeline.notes import temperature_sentence, without_energies
+from aesi.pipeline.notes import of_another_model, temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -78,6 +78,7 @@ def simulate_file(
     declared = declared_model(cell).with_soh(asked.soh)
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
+    say(of_another_model(declared, model))
     lone = profile.voltage_v is None
     used = replace(
         declared,
@@ -157,7 +158,7 @@ def _placed(
             start.sentence,
             hold_sentence(record.name, model.hold, asked.hold is not None),
             temperature_sentence(model.cell, record, model.effects),
-            *without_energies(model.cell, [record.temperature_degc]),
+            *without_energies(model.cell, [record.temperature_degc], model.effects),
             *_with_effects(record, model.effects),
         ]
     )

@@ -106,7 +106,7 @@ class Case:
         left = () if given.correction is None else (without,)
         return (
             *given.cell.unread,
-            *without_energies(given.cell, (m.temperature_degc for m in self.records)),
+            *without_energies(given.cell, (m.temperature_degc for m in self.records), given.effects),
             *left,
             *(temperature_sentence(given.cell, m, given.effects) for m in untold),
         )

@@ -166,7 +166,7 @@ def _on_grid(
             *even.notes,
         ]
         records[name] = no_rows(even, start.soc)
-    notes += without_energies(cell, (m.temperature_degc for m, _ in sources.records.values()))
+    notes += without_energies(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)
     return records, notes
 
 

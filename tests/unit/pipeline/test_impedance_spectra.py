@@ -71,3 +71,11 @@ def test_a_spectrum_without_an_arc_was_written_without_a_word(tmp_path):
         )
     (note,) = said
     assert "double layers (--effect double_layer does)" in note
+
+
+def test_a_shift_of_the_temperature_was_left_out_of_an_impedance_without_a_word(tmp_path):
+    said = []
+    effects = activated([("ambient_temperature", {"shift_k": -20.0}), ("double_layer", {})])
+    cell = CELLS / "nmc_30ah.bpx.json"
+    impedance_file(cell, 0.5, "1:10:4", tmp_path / "z.csv", effects=effects, say_notes=said.extend)
+    assert "ambient_temperature: not in the impedance, which is at the temperature that is given." in said

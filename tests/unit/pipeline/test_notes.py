@@ -1,12 +1,14 @@
 """What several records have in common is said once."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.notes import temperature_sentence, together, without_energies
+from aesi.pipeline.notes import of_another_model, temperature_sentence, together, without_energies
+from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 
 NMC = Path(__file__).resolve().parents[3] / "experiments" / "cells" / "nmc_30ah.bpx.json"
@@ -47,3 +49,26 @@ def test_two_effects_that_change_the_temperature_were_one():
         "self_heating and ambient_temperature change it."
     )
     assert temperature_sentence(cell, record, both[:1]).endswith("and self_heating changes it.")
+
+
+def test_a_shift_of_the_temperature_was_no_temperature_that_energies_are_missing_for():
+    silent = Cell.from_bpx(NMC).with_electrolyte(diffusivity_ea_j_mol=0.0)
+    shifted = [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)]
+    (sentence,) = without_energies(silent, [None], shifted)
+    assert sentence.endswith("taken as at 25 degC, which is up to 20 K off.")
+    assert without_energies(silent, [np.full(3, 25.0)], shifted) == ()  # a measured temperature is as it is
+
+
+def test_a_model_that_was_found_with_the_single_particle_was_simulated_with_the_other_without_a_word():
+    cell = Cell.from_bpx(NMC)
+    found = HybridModel(cell, (CATALOGUE["series_resistance"].activate(),))
+    (sentence,) = of_another_model(found, "dfn")
+    assert sentence.startswith(
+        "what the saved model adds to its cell was found with the single particle (espm), and the porous electrode "
+        "(dfn) is simulated, as asked"
+    )
+    fitted = HybridModel(replace(cell, fitted_with="dfn"), model="dfn")
+    (sentence,) = of_another_model(fitted, "espm")
+    assert sentence.startswith("the cell's file was fitted with the porous electrode (dfn)")
+    for as_it_is in ((found, None), (found, "espm"), (HybridModel(cell), "dfn")):
+        assert of_another_model(*as_it_is) == ()
