@@ -35,8 +35,10 @@ class Parameter:
     `default` is the value at which an effect is typically seen; `neutral` is the value at which it vanishes
     (None where it has none). `log` asks for a search on a logarithmic scale. `expected` is the standard deviation
     of its distance from neutral (or from the default; of the logarithm where `log`) where small ones are likelier
-    than large ones, None where all within bounds are alike. `linear` says that the voltage is all but linear in it,
-    so that a fit need not take its slope anew at every step. `low_is_limit` says that the lower bound stands for
+    than large ones, None where all within bounds are alike. `even` says that the voltage moves with its square, as with
+    a standard deviation, which a fit then moves: from nought it could not move the parameter itself. `linear` says that
+    the voltage is all but linear in it, so that a fit need not take its slope anew at every step. `low_is_limit` says
+    that the lower bound stands for
     nought, which a logarithmic scale does not reach: to end there is a value like others. `spread` says by how much
     cell files are off in it, so that a hypothesis about something else may move it by that much. `counted` says how a
     value stands to what the cell file declares of the same: by itself, `added` to it, or a `share` of it. `shift_of`
@@ -48,6 +50,7 @@ class Parameter:
     bounds: tuple[float, float]
     source: str
     log: bool = False
+    even: bool = False
     neutral: float | None = None
     description: str = ""
     expected: float | None = None
@@ -64,6 +67,11 @@ class Parameter:
         if self.log and low <= 0:
             raise ParameterError(
                 f"a logarithmic scale needs a positive lower bound, not {low:g} {self.unit}."
+            )
+        if self.even and (self.log or low < 0):
+            raise ParameterError(
+                f"a fit moves the square of what is even: give linear bounds from nought on, not [{low:g}, {high:g}] "
+                f"{self.unit}{' on a logarithmic scale' if self.log else ''}."
             )
         self.check("default", self.default)
 

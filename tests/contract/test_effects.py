@@ -15,6 +15,8 @@ from aesi.errors import CellError, InputError, ParameterError, SimulationError
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.effect import Contribution, Effect, Record, Trace
 from aesi.physics.effects import CATALOGUE, active_effect, describe, find_effect, load_effect
+from aesi.tracer.case.free_parameter import of_effect
+from aesi.tracer.case.problem import STEP
 
 CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
 CELL = Cell.from_bpx(CELLS / "nmc_30ah.bpx.json")
@@ -114,6 +116,23 @@ def test_it_vanishes_at_its_neutral_values(effect, model):
         pytest.skip("has no point at which it vanishes")
     moved = run(effect.activate_only(), model=model).voltage_v - BASES[model].voltage_v
     assert np.abs(moved).max() < NEUTRAL_V
+
+
+@each
+def test_a_fit_can_move_it_from_where_it_vanishes(effect):
+    # A first small step has to move the voltage in proportion; a standard deviation of sizes does so by its square.
+    free = of_effect(effect.id, effect.parameters, CELL.nominal_capacity_ah)
+    moving = [f for f in free if f.amplitude and effect.refines != "discretisation"]
+    nowhere = {f.name: f.centre if f.amplitude else f.typical for f in free}
+    at_rest = run(effect.activate(**nowhere)).voltage_v
+    for f in moving:
+        side = 1.0 if f.bounds[1] > 0.0 else -1.0
+        small, large = (
+            np.linalg.norm(run(effect.activate(**{**nowhere, f.name: f.value(side * x)})).voltage_v - at_rest)
+            / x
+            for x in (STEP, 0.5)
+        )
+        assert small > 0.1 * large, f.name
 
 
 @each

@@ -133,7 +133,7 @@ def describe(effect: Effect) -> str:
     lines = [f"{effect.id} ({effect.kind})", effect.summary + ".", "", effect.equation, ""]
     lines += [effect.validity, f"Source: {effect.source}", "", "Parameters:"]
     for key, p in effect.parameters.items():
-        scale = ", logarithmic" if p.log else ""
+        scale = ", logarithmic" if p.log else ", fitted by its square" if p.even else ""
         vanishes = "" if p.neutral is None else f", vanishes at {p.neutral:g}"
         about = f": {p.description}" if p.description else ""
         lines.append(f"  {key} [{p.unit}] in [{p.bounds[0]:g}, {p.bounds[1]:g}]{scale}{vanishes}{about}")

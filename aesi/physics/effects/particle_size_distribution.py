@@ -27,6 +27,7 @@ PARAMETERS = {
         "dimensionless",
         (0.0, 0.8),
         RANGE,
+        even=True,
         neutral=0.0,
         description=f"relative spread of the radius, {side}",
     )

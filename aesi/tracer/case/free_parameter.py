@@ -1,6 +1,6 @@
 """A scalar that a fit may move, in the coordinate in which its prior is a standard normal.
 
-    x = (phi(value) - phi(centre)) / sd        phi the natural logarithm or the identity
+    x = (phi(value) - phi(centre)) / sd        phi the natural logarithm, the square or the identity
 
 The declared parameters of a cell (its own ones) have the spread that is declared beside them; those of an effect under
 test have a prior as wide as the effect allows; the initial state of charge of a record has its standard deviation.
@@ -32,7 +32,8 @@ class FreeParameter:
     """One scalar: who owns it, its bounds, and its normal prior.
 
     owner : id of an effect, or STATE_OF_CHARGE with the number of a record as the name.
-    low, high, centre : in `unit`.  sd : of the natural logarithm where `log`, else in `unit`.
+    low, high, centre : in `unit`.  sd : of the natural logarithm where `log`, of the square where `even`, else in
+    `unit`.
     own : True for what the declared model has anyway, False for what an effect under test adds.
     amplitude : False for parameters that only shape an effect (a rate, a time constant).
     typical : where the effect is usually seen.  low_is_limit : the lower bound stands for nought.
@@ -50,6 +51,7 @@ class FreeParameter:
     amplitude: bool = True
     typical: float = 0.0
     low_is_limit: bool = False
+    even: bool = False
 
     @property
     def key(self) -> tuple[str, str]:
@@ -60,11 +62,18 @@ class FreeParameter:
         """x of a value."""
         if self.log:
             return float(np.log(value / self.centre)) / self.sd
+        if self.even:
+            return (value**2 - self.centre**2) / self.sd
         return (value - self.centre) / self.sd
 
     def value(self, x: float) -> float:
         """Inverse of `coordinate`, held within the bounds against round-off."""
-        value = self.centre * float(np.exp(x * self.sd)) if self.log else self.centre + x * self.sd
+        if self.log:
+            value = self.centre * float(np.exp(x * self.sd))
+        elif self.even:
+            value = float(np.sqrt(max(self.centre**2 + x * self.sd, 0.0)))
+        else:
+            value = self.centre + x * self.sd
         return min(max(value, self.low), self.high)
 
     @property
@@ -93,7 +102,7 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
     inside = p.neutral is not None and low <= p.neutral <= high
     centre = float(p.neutral) if inside and p.neutral is not None else p.default
     log = p.log and centre > 0
-    scale = np.log if log else float
+    scale = np.log if log else np.square if p.even else float
     reach = max(scale(high) - scale(centre), scale(centre) - scale(low))
     return FreeParameter(
         owner=effect,
@@ -108,6 +117,7 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
         amplitude=p.neutral is not None,
         typical=p.default,
         low_is_limit=p.low_is_limit,
+        even=p.even,
     )
 
 

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aesi.errors import ParameterError
 from aesi.parameters import Parameter
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.free_parameter import (
@@ -21,6 +22,7 @@ from aesi.tracer.case.free_parameter import (
 
 FACTOR = Parameter(2.0, "1", bounds=(0.1, 10.0), source="test", log=True, neutral=1.0)
 OHM = Parameter(1e-3, "ohm", bounds=(0.0, 0.1), source="test", neutral=0.0)
+SPREAD = Parameter(0.3, "1", bounds=(0.0, 0.8), source="test", neutral=0.0, even=True)
 
 
 @given(st.floats(0.1, 10.0))
@@ -28,6 +30,21 @@ def test_a_value_comes_back_from_its_coordinate(value):
     for free in (*of_effect("effect", {"factor": FACTOR}, 5.0), own("effect", "factor", FACTOR, 0.2)):
         inside = min(max(value, free.low), free.high)
         assert free.value(free.coordinate(inside)) == pytest.approx(inside)
+
+
+@given(st.floats(0.0, 2.0))
+def test_what_is_even_moves_by_its_square(x):
+    (spread,) = of_effect("effect", {"sd": SPREAD}, 5.0)
+    assert spread.bounds == pytest.approx((0.0, 2.0))  # the end of a range is two deviations off
+    assert spread.value(x) ** 2 == pytest.approx(x / 2.0 * 0.8**2)
+    assert spread.coordinate(spread.value(x)) == pytest.approx(x)
+
+
+def test_what_is_even_has_no_negative_values():
+    with pytest.raises(ParameterError, match="bounds from nought"):
+        Parameter(0.3, "1", bounds=(-0.1, 0.8), source="test", even=True)
+    with pytest.raises(ParameterError, match="logarithmic"):
+        Parameter(0.3, "1", bounds=(0.1, 0.8), source="test", log=True, even=True)
 
 
 def test_an_own_parameter_stays_within_its_spread_and_its_range():
