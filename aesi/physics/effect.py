@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from aesi.errors import SimulationError
+from aesi.errors import ParameterError, SimulationError
 from aesi.numerics.typing import Array
 from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
@@ -108,7 +108,10 @@ class Effect:
 
         Raises ParameterError for an unknown name or a value out of bounds.
         """
-        return ActiveEffect(self, tuple(checked(self.parameters, values).items()))
+        try:
+            return ActiveEffect(self, tuple(checked(self.parameters, values).items()))
+        except ParameterError as error:
+            raise ParameterError(f"{self.id}: {error}") from None
 
     def activate_only(self, **values: float) -> ActiveEffect:
         """This effect with the given parameters, and the others at their neutral values, where they have one."""

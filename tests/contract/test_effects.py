@@ -162,7 +162,7 @@ def test_bounds_hold_defaults_and_neutral_values_and_are_enforced(effect):
             effect.activate(**{name: high + abs(high)})
         with pytest.raises(ParameterError, match=name):
             effect.activate(**{name: float("nan")})
-    with pytest.raises(ParameterError, match="unknown parameter"):
+    with pytest.raises(ParameterError, match=f"^{effect.id}: unknown parameter"):
         effect.activate(no_such_parameter=1.0)
 
 

@@ -53,6 +53,8 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     written = f"a model folder is written by `aesi run` or `aesi discover`{_below(folder)}"
     if folder.is_file():
         raise InputError(f"{folder} is a file, not the folder of a model; {written}")
+    if folder.is_dir() and not (folder / HEAD).exists():
+        raise InputError(f"the folder {folder} holds no {HEAD}, so it is no model; {written}")
     head = _read_json(folder / HEAD, written)
     schema = head.get("schema") if isinstance(head, dict) else None
     if schema != SCHEMA:

@@ -263,7 +263,7 @@ def test_the_temperature_that_a_prediction_is_made_at_is_said(model, data, tmp_p
 def test_a_folder_of_runs_is_asked_about_its_newest_model(model, tmp_path):
     written = model.save(tmp_path / "runs" / "a" / "model")
     for named in (tmp_path / "runs", tmp_path / "runs" / "a"):
-        with pytest.raises(InputError, match=f"does not exist; .*; did you mean {written}\\?"):
+        with pytest.raises(InputError, match=f"holds no model.json, .*; did you mean {written}\\?"):
             HybridModel.load(named)
     with pytest.raises(InputError, match=r"written by `aesi run` or `aesi discover`\.$"):
         HybridModel.load(tmp_path)
@@ -275,6 +275,14 @@ def test_a_file_given_for_a_model_is_told_as_one(tmp_path):
         InputError, match=r"cell.json is a file, not the folder of a model; a model folder is"
     ):
         HybridModel.load(tmp_path / "cell.json")
+
+
+def test_a_folder_that_is_no_model_was_told_without_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        InputError, match=r"the folder \. holds no model\.json, so it is no model; a model folder is"
+    ):
+        HybridModel.load(".")
 
 
 def test_a_file_in_the_place_of_a_model_is_not_written_over(model, tmp_path):

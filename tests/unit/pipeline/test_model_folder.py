@@ -48,5 +48,5 @@ def test_a_folder_that_was_half_written_over_is_no_model(tmp_path, monkeypatch):
     monkeypatch.setattr(np, "savez_compressed", killed)
     with pytest.raises(KeyboardInterrupt):
         write_model(tmp_path, {}, PARTS)
-    with pytest.raises(InputError, match=r"model\.json does not exist"):
+    with pytest.raises(InputError, match=r"holds no model\.json"):
         read_model(tmp_path)
