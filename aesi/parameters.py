@@ -38,11 +38,11 @@ class Parameter:
     than large ones, None where all within bounds are alike. `even` says that the voltage moves with its square, as with
     a standard deviation, which a fit then moves: from nought it could not move the parameter itself. `linear` says that
     the voltage is all but linear in it, so that a fit need not take its slope anew at every step. `low_is_limit` says
-    that the lower bound stands for
-    nought, which a logarithmic scale does not reach: to end there is a value like others. `spread` says by how much
-    cell files are off in it, so that a hypothesis about something else may move it by that much. `counted` says how a
-    value stands to what the cell file declares of the same: by itself, `added` to it, or a `share` of it. `shift_of`
-    names what it is a shift of, as a discovery writes that with its unit (`declared_degc`); empty where it is none.
+    that the lower bound stands for nought, which a logarithmic scale does not reach: to end there is a value like
+    others. `spread` says by how much cell files are off in it, so that a hypothesis about something else may move it by
+    that much. `counted` says how a value stands to what the cell file declares of the same: by itself, `added` to it,
+    or a `share` of it. `shift_of` names what it is a shift of, as a discovery writes that with its unit
+    (`declared_degc`); empty where it is none.
     """
 
     default: float

@@ -18,14 +18,13 @@ _told: set[str] = set()
 class ProcessLock:
     """A lock on a file, which is made; it stays behind, since two could hold one that is removed.
 
-    `lacking` : its file system has no locks, and nothing keeps others out. That is said, once a process: `where`, and
-    what it does not keep a second process from (`doing`).
+    Where its file system has no locks nothing keeps others out. That is said, once a process: `where`, and what it does
+    not keep a second process from (`doing`).
     """
 
     def __init__(self, path: Path, where: str, doing: str) -> None:
         self.path, self._where, self._doing = path, where, doing
         self._lock = FileLock(path, thread_local=False)
-        self.lacking = False
 
     @property
     def held(self) -> bool:
@@ -33,8 +32,8 @@ class ProcessLock:
         return self._lock.is_locked
 
     def acquire(self, *, wait: bool = False) -> bool:
-        """Whether nobody else has it, as far as the file system can tell: `held`, or `lacking`. Waits for its owner's
-        end if told to. Raises OSError where the file cannot be made."""
+        """Whether nobody else has it, as far as the file system can tell: `held`, unless it has no locks. Waits for its
+        owner's end if told to. Raises OSError where the file cannot be made."""
         self.path.parent.mkdir(parents=True, exist_ok=True)
         try:
             self._lock.acquire(blocking=wait)
@@ -43,7 +42,6 @@ class ProcessLock:
         except (NotImplementedError, OSError) as error:
             if isinstance(error, OSError) and error.errno not in NO_LOCKS:
                 raise
-            self.lacking = True
             self._tell()
         return True
 

@@ -33,6 +33,7 @@ MOST_CHARGE_RESISTANCE_AH_A = 20.0
 0.62 on the 34 measured and virtual records whose steps tell a resistance, and a thousand times that with time in ms. A
 potential that is flat all along, of a cell of 0.8 ohm Ah, makes 16."""
 FLAT_V = 0.05
+"""The slide that a flat potential is taken to have."""
 USUAL_RESISTANCE_OHM_AH = (0.02, 0.9)
 """Resistance at the steps of the current times the capacity of the cell: 0.024 to 0.85 on those records."""
 CLEAR_SLIDE_V = 0.15
@@ -99,36 +100,27 @@ def check_scale(columns: Columns, context: Context) -> None:
         )
     if resistance is not None:
         _check_slide(columns, context, moved, resistance)
-        _check_standstill(columns, context, moved, resistance)
     _check_pace(columns, context)
 
 
 def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance_ohm: float) -> None:
-    """Refuse a cell that would have emptied by a charge that is nothing for its resistance."""
-    slide, last = _slide_v(columns, resistance_ohm), len(columns["time_s"]) - 1
+    """Refuse a charge that is far too little for the slide of the voltage of a cell of that resistance, or so much that
+    it would have emptied it many times over."""
+    undropped = columns["voltage_v"] + resistance_ohm * columns["current_a"]
+    low, high = np.quantile(undropped, [0.02, 0.98])
+    slide, last = float(high - low), len(undropped) - 1
     if slide > CLEAR_SLIDE_V and moved_ah * resistance_ohm < LEAST_CHARGE_RESISTANCE_AH_A * slide:
         raise DataError(
             f"{context.at('time_s', last)}: the voltage slides by {slide:.2f} V while {1e3 * moved_ah:.3g} mAh move in "
             f"{columns['time_s'][last] - columns['time_s'][0]:.3g} s, of a cell that shows {resistance_ohm * 1e3:.3g} "
             "mohm at the steps of its current; the time is in another unit, declare it: --unit time_s=h, or min."
         )
-
-
-def _check_standstill(columns: Columns, context: Context, moved_ah: float, resistance_ohm: float) -> None:
-    """Refuse a charge that would empty a cell of that resistance many times over, and moves its voltage little."""
-    slide, last = _slide_v(columns, resistance_ohm), len(columns["time_s"]) - 1
     if moved_ah * resistance_ohm > MOST_CHARGE_RESISTANCE_AH_A * max(slide, FLAT_V):
         raise DataError(
             f"{context.at('time_s', last)}: {moved_ah:.4g} Ah would have moved while the voltage slides by {slide:.2f} "
             f"V, of a cell that shows {resistance_ohm * 1e3:.3g} mohm at the steps of its current; the time is in ms, "
             "declare it: --unit time_s=ms."
         )
-
-
-def _slide_v(columns: Columns, resistance_ohm: float) -> float:
-    """V by which the voltage goes up and down without its drop at the resistance."""
-    low, high = np.quantile(columns["voltage_v"] + resistance_ohm * columns["current_a"], [0.02, 0.98])
-    return float(high - low)
 
 
 def step_resistance_ohm(columns: Columns) -> float | None:
