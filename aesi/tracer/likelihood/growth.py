@@ -91,7 +91,7 @@ class EffectGrowth:
 
     size : one of the tried sizes, at which the effect's parameters are fitted.
     known : coordinates of the effect's parameters where an earlier descent ended.  near : where one with the other
-    model of the cell did, to start from; None: from the best of several starts.
+    model of the cell did, to start from; None: from the best of several starts.  anew : neither is there.
     """
 
     def __init__(
@@ -112,6 +112,7 @@ class EffectGrowth:
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         begin = [one for one in (known, near) if one is not None]
+        self.anew = not begin
         self.starts = begin[:1] or [np.clip(u, self.low, self.high) for u in starts(self.added)]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0

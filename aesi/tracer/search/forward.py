@@ -65,9 +65,9 @@ def searched(
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
     first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
-    if len(first) > FINALISTS and np.isfinite(
-        allowed_v
-    ):  # fewer are fitted in the time that looking would spare
+    # Fewer are fitted in the time that looking would spare. What was grown before was within reach, and where it ended
+    # spans less than where it began.
+    if len(first) > FINALISTS and np.isfinite(allowed_v) and all(growth.anew for growth in first):
         marks = list(side_by_side(EffectGrowth.marks, first))
         least_v = least_left_v(base, marks, problem.white_v)
         if least_v > REACH * allowed_v:

@@ -13,6 +13,7 @@ from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
+from aesi.tracer.search import forward
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
@@ -148,3 +149,21 @@ def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_righ
     assert paths[2].steps  # no more than are fitted at most: looking spares nothing
     assert paths[2].beyond_reach_v is None
     assert paths[1].beyond_reach_v == pytest.approx(5e-3 / np.sqrt(2.0), rel=0.2)
+
+
+def test_what_was_within_reach_is_within_reach_with_more_names(cell, few, make, monkeypatch):
+    many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "current_sensor_offset")}
+    data = make((CATALOGUE["series_resistance"].activate(resistance_ohm=ADDED_OHM),))
+    problem = inverse_problem(cell, [data], 0.9, effects=many)
+    archive = Archive(None, "")
+
+    def looked(most, archive):
+        return searched(problem, most, lambda *_: True, archive, allowed_v=0.6e-3)
+
+    once = looked(1, archive)
+    # By where effects ended, which is all that the archive holds, hardly anything is within reach.
+    monkeypatch.setattr(forward, "least_left_v", lambda *_: np.inf)
+    again = looked(2, archive)
+    assert once.chosen.hypothesis == again.chosen.hypothesis == ("series_resistance",)
+    assert again.beyond_reach_v is None
+    assert looked(2, Archive(None, "")).beyond_reach_v == np.inf
