@@ -19,13 +19,12 @@ class Spread:
 
     tight : of a careful parametrisation of this very cell, None where it leaves nothing open.
     loose : of one of a cell of the same make, or of one that was not checked, None where even that leaves nothing open.
-    source : where the two are from.  ohmic : True where they are ohm for a cell of one ampere-hour.
+    source : where the two are from.
     """
 
     tight: float | None
     loose: float | None
     source: str
-    ohmic: bool = False
 
 
 @dataclass(frozen=True)
@@ -35,14 +34,15 @@ class Parameter:
     `default` is the value at which an effect is typically seen; `neutral` is the value at which it vanishes
     (None where it has none). `log` asks for a search on a logarithmic scale. `expected` is the standard deviation
     of its distance from neutral (or from the default; of the logarithm where `log`) where small ones are likelier
-    than large ones, None where all within bounds are alike. `even` says that the voltage moves with its square, as with
-    a standard deviation, which a fit then moves: from nought it could not move the parameter itself. `linear` says that
-    the voltage is all but linear in it, so that a fit need not take its slope anew at every step. `low_is_limit` says
-    that the lower bound stands for nought, which a logarithmic scale does not reach: to end there is a value like
-    others. `spread` says by how much cell files are off in it, so that a hypothesis about something else may move it by
-    that much. `counted` says how a value stands to what the cell file declares of the same: by itself, `added` to it,
-    or a `share` of it. `shift_of` names what it is a shift of, as a discovery writes that with its unit
-    (`declared_degc`); empty where it is none.
+    than large ones, None where all within bounds are alike. It and `spread` go with the capacity to the power of
+    `capacity_power`, and are those of a cell of one ampere-hour: of a current 1, of a resistance -1. `even` says that
+    the voltage moves with its square, as with a standard deviation, which a fit then moves: from nought it could not
+    move the parameter itself. `linear` says that the voltage is all but linear in it, so that a fit need not take its
+    slope anew at every step. `low_is_limit` says that the lower bound stands for nought, which a logarithmic scale does
+    not reach: to end there is a value like others. `spread` says by how much cell files are off in it, so that a
+    hypothesis about something else may move it by that much. `counted` says how a value stands to what the cell file
+    declares of the same: by itself, `added` to it, or a `share` of it. `shift_of` names what it is a shift of, as a
+    discovery writes that with its unit (`declared_degc`); empty where it is none.
     """
 
     default: float
@@ -54,6 +54,7 @@ class Parameter:
     neutral: float | None = None
     description: str = ""
     expected: float | None = None
+    capacity_power: int = 0
     linear: bool = False
     low_is_limit: bool = False
     spread: Spread | None = None
@@ -72,6 +73,10 @@ class Parameter:
             raise ParameterError(
                 f"a fit moves the square of what is even: give linear bounds from nought on, not [{low:g}, {high:g}] "
                 f"{self.unit}{' on a logarithmic scale' if self.log else ''}."
+            )
+        if self.log and self.capacity_power:
+            raise ParameterError(
+                "the standard deviation of a logarithm is that of a cell of any size; leave capacity_power out."
             )
         self.check("default", self.default)
 

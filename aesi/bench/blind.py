@@ -30,17 +30,22 @@ LIMIT_S = 180.0
 
 
 def chosen(
-    cases: int | None = None, only: str | None = None, small: bool = False, seed: int = 0, every: int = 1
+    cases: int | None = None,
+    only: str | None = None,
+    small: bool = False,
+    seed: int = 0,
+    every: int = 1,
+    after: int = 0,
 ) -> list[CaseSpec]:
     """Cases of the plan, or of the small one that a test can afford.
 
     cases : the first so many (None: all).  only : substring of a recipe's name, or a kind of case.
-    every : take each n-th case.
+    every : take each n-th case.  after : without the first so many, which somebody may have looked at.
     """
     specs = small_plan(seed) if small else plan(seed, FULL)
     return [s for s in specs if only is None or only in (s.kind, *s.recipes) or only in "+".join(s.recipes)][
         ::every
-    ][:cases]
+    ][after:][:cases]
 
 
 def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[str, Any]:

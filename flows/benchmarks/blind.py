@@ -34,6 +34,7 @@ def run(
     small: bool = False,
     seed: int = 0,
     every: int = 1,
+    after: int = 0,
     limit_s: float | None = LIMIT_S,
     workers: int = 1,
     address: str | None = None,
@@ -41,11 +42,11 @@ def run(
 ) -> Iterator[dict[str, Any]]:
     """One dict a case as it is judged, and a last one with `summary`: true.
 
-    cells : folder of the declared cell files.  cases, only, small, seed, every : which cases, see `chosen`.
+    cells : folder of the declared cell files.  cases, only, small, seed, every, after : which cases, see `chosen`.
     limit_s : processor seconds a case.  workers : processes on this machine.  address : of a Dask scheduler, whose
     workers must see `cells`.  write : a page whose part between the two marks becomes the table.
     """
-    specs = chosen(cases, only, small, seed, every)
+    specs = chosen(cases, only, small, seed, every, after)
     judge = partial(judged, cells=cells, limit_s=limit_s)
     rows = []
     for row in tracked(Cases("blind", seed, specs, judge, summary, SHOWN), workers, address):

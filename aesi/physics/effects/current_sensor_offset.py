@@ -17,10 +17,12 @@ PARAMETERS = {
     "offset_a": Parameter(
         -0.05,
         "A",
-        bounds=(-1.0, 1.0),
+        bounds=(-10.0, 10.0),
         neutral=0.0,
-        source="zero-current error of a 100 A sensor, up to 1 %",
+        source="zero-current error of up to 1 % of a sensor's range, 1000 A at most; 1 % of 5C is expected",
         description="reading minus true current",
+        expected=0.05,
+        capacity_power=1,
     )
 }
 

@@ -20,18 +20,22 @@ PARAMETERS = {
     "per_throughput_ohm_ah": Parameter(
         1e-4,
         "ohm/(A*hour)",
-        bounds=(0.0, 1e-2),
+        bounds=(0.0, 0.1),
         neutral=0.0,
-        source="zero to a doubling of a 10 mohm cell within one ampere-hour",
+        source="zero to a doubling of a 100 mohm cell within one ampere-hour; half a doubling of 10 mohm at 3 Ah",
         description="growth per charge throughput, a",
+        expected=0.045,
+        capacity_power=-2,
     ),
     "per_root_time_ohm": Parameter(
         0.0,
         "ohm/hour**0.5",
-        bounds=(0.0, 1e-2),
+        bounds=(0.0, 0.1),
         neutral=0.0,
-        source="zero to a doubling of a 10 mohm cell within one hour",
+        source="zero to a doubling of a 100 mohm cell within one hour; half a doubling of 10 mohm at 3 Ah",
         description="growth per square root of time, b",
+        expected=0.015,
+        capacity_power=-1,
     ),
 }
 

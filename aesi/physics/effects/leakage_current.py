@@ -18,10 +18,12 @@ PARAMETERS = {
     "leakage_a": Parameter(
         0.05,
         "A",
-        bounds=(-1.0, 1.0),
+        bounds=(0.0, 10.0),
         neutral=0.0,
-        source="up to a soft short of 1 A; negative would be a source within the cell",
+        source="up to a short of 10 A, 20 h to empty are expected; negative would be a source within the cell",
         description="side current, discharging where positive",
+        expected=0.05,
+        capacity_power=1,
     )
 }
 

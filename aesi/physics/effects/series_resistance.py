@@ -21,7 +21,9 @@ PARAMETERS = {
         source="0.1 mohm (large pouch, welded tabs) to 100 mohm (small cylindrical cell in a clamp)",
         description="resistance added to what the cell file declares",
         counted="added",
-        spread=Spread(None, 0.02, "tabs, welds and clamps of small cells, Taheri et al. 2011", ohmic=True),
+        expected=0.02,
+        capacity_power=-1,
+        spread=Spread(None, 0.02, "tabs, welds and clamps of small cells, Taheri et al. 2011"),
     )
 }
 

@@ -124,14 +124,11 @@ def _of_effect(effect: str, name: str, p: Parameter, capacity_ah: float) -> Free
 def _expected(p: Parameter, capacity_ah: float) -> float | None:
     """Prior standard deviation of an effect's parameter about its neutral value, None where none is known.
 
-    For contacts, and for what every cell file declares, it is the scatter between files of cells of one make.
+    For what every cell file declares, it is the scatter between files of cells of one make.
     """
-    if p.spread is not None and p.spread.loose is not None and p.neutral is not None:
-        if p.spread.ohmic:
-            return p.spread.loose / capacity_ah
-        if p.spread.tight is not None and p.log:
-            return p.spread.loose
-    return p.expected
+    declared = p.log and p.neutral is not None and p.spread is not None and p.spread.tight is not None
+    sd = p.spread.loose if declared and p.spread is not None else p.expected
+    return None if sd is None else sd * capacity_ah**p.capacity_power
 
 
 def own(effect: str, name: str, p: Parameter, sd: float) -> FreeParameter:

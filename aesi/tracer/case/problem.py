@@ -134,7 +134,7 @@ class InverseProblem:
             return None
         if (self.trust == "exact" or measured_cell) and effect.kind == "parameter":
             sd *= EXACT_SHARE
-        return sd / self.cell.nominal_capacity_ah if p.spread.ohmic else sd
+        return sd * self.cell.nominal_capacity_ah**p.capacity_power
 
     def active(self, values: ValuesByOwner, good: bool = False) -> tuple[ActiveEffect, ...]:
         """The effects to simulate with.  One under test is among them at its neutral point too: some rewrite the cell

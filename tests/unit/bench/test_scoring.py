@@ -132,3 +132,8 @@ def test_a_case_that_the_laboratory_cannot_make_is_counted_and_stops_nothing(mon
     assert "maximum voltage" in row["error"]
     summary = blind.summary([row])
     assert (summary["cases"], summary["not_made"], summary["exact_cases"]) == (0, 1, 0)
+
+
+def test_cases_that_somebody_has_seen_are_left_out():
+    names = [spec.name for spec in blind.chosen(cases=5)]
+    assert [spec.name for spec in blind.chosen(cases=3, after=2)] == names[2:]

@@ -1,5 +1,7 @@
 """Scalars that fits move: their coordinates, bounds and starts, and what acts on a record beside good ones."""
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,6 +47,20 @@ def test_what_is_even_has_no_negative_values():
         Parameter(0.3, "1", bounds=(-0.1, 0.8), source="test", even=True)
     with pytest.raises(ParameterError, match="logarithmic"):
         Parameter(0.3, "1", bounds=(0.1, 0.8), source="test", log=True, even=True)
+
+
+def test_the_currents_and_resistances_of_a_larger_cell_are_expected_to_be_so():
+    amps = Parameter(
+        0.1, "A", bounds=(-10.0, 10.0), source="test", neutral=0.0, expected=0.05, capacity_power=1
+    )
+    growth = replace(OHM, expected=0.04, capacity_power=-2)
+    for capacity_ah in (1.0, 5.0):
+        (current,) = of_effect("effect", {"offset_a": amps}, capacity_ah)
+        (ohm,) = of_effect("effect", {"resistance_ohm": growth}, capacity_ah)
+        assert current.sd == pytest.approx(0.05 * capacity_ah)
+        assert ohm.sd == pytest.approx(0.04 / capacity_ah**2)
+    with pytest.raises(ParameterError, match="capacity_power"):
+        replace(FACTOR, capacity_power=1)
 
 
 def test_an_own_parameter_stays_within_its_spread_and_its_range():
