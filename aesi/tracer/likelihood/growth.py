@@ -91,7 +91,7 @@ class EffectGrowth:
 
     size : one of the tried sizes, at which the effect's parameters are fitted.
     known : coordinates of the effect's parameters where an earlier descent ended.  near : where one with the other
-    model of the cell did, to start from; None: from the best of several starts.  anew : neither is there.
+    model of the cell did, to start from; None: from the best of several starts.
     """
 
     def __init__(
@@ -112,7 +112,6 @@ class EffectGrowth:
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         begin = [one for one in (known, near) if one is not None]
-        self.anew = not begin
         self.starts = begin[:1] or [np.clip(u, self.low, self.high) for u in starts(self.added)]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
@@ -123,6 +122,10 @@ class EffectGrowth:
         self.q = np.linalg.qr(basis)[0]
         self._errors: dict[bytes, Array | None] = {}
         self._slopes: dict[bytes, Array] = {}
+
+    def from_own_starts(self) -> EffectGrowth:
+        """The same descent from the starts of the effect, wherever another one ended."""
+        return EffectGrowth(self.parent, self.effect, self.size)
 
     def error_v(self, u: Array) -> Array | None:
         """(n,) V, or None where the model fails."""
@@ -188,10 +191,11 @@ class EffectGrowth:
         }
 
     def marks(self) -> Array:
-        """(n, c) V: the slopes at each start, and what lies between the parent and it; none where it cannot be
-        simulated."""
+        """(n, c) V: the slopes at each start, and where the descent ended if it did, and what lies between the parent
+        and it; none where it cannot be simulated."""
         columns = [np.zeros((len(self.parent.fit.point.residual_v), 0))]
-        for u in self.starts:
+        end = [] if self.known is None else [self.known]
+        for u in {one.tobytes(): one for one in (*self.starts, *end)}.values():
             e = self.error_v(u)
             jacobian = None if e is None else self.jacobian(u, e)
             if e is not None and jacobian is not None:
@@ -200,7 +204,7 @@ class EffectGrowth:
 
     def ended(self) -> Grown | None:
         """Where a descent ends, within the bounds; None where the effect cannot be simulated."""
-        u = self._descended() if self.known is None else self.known
+        self.known = u = self._descended() if self.known is None else self.known
         if u is None:
             return None
         e = self.error_v(u)

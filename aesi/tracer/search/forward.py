@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
@@ -23,7 +22,7 @@ from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.grown import ended, growths_on
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
 from aesi.tracer.search.plausible import alike, most_plausible, plausibility
-from aesi.tracer.search.reach import REACH, least_left_v
+from aesi.tracer.search.reach import REACH, within_reach
 
 FINALISTS = 6
 """Effects that are fitted with the whole model: so many of the best. Growth is to first order in all that was there
@@ -65,11 +64,10 @@ def searched(
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
     first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
-    # Fewer are fitted in the time that looking would spare. What was grown before was within reach, and where it ended
-    # spans less than where it began.
-    if len(first) > FINALISTS and np.isfinite(allowed_v) and all(growth.anew for growth in first):
-        marks = list(side_by_side(EffectGrowth.marks, first))
-        least_v = least_left_v(base, marks, problem.white_v)
+    if len(first) > FINALISTS and np.isfinite(
+        allowed_v
+    ):  # fewer are fitted in the time that looking would spare
+        least_v, first = within_reach(problem, base, first, REACH * allowed_v, archive)
         if least_v > REACH * allowed_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
     for _ in range(max_effects):

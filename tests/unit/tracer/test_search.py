@@ -13,13 +13,16 @@ from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
-from aesi.tracer.search import forward
+from aesi.tracer.search import reach
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
+from aesi.tracer.search.grown import growths_on
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
+from aesi.tracer.search.reach import REACH, least_left_v
 
 ADDED_OHM = 2e-3
+ALLOWED_V = 0.6e-3
 SIZE = PRIORS["tight"].nearest(Size(2e-4))
 
 
@@ -136,12 +139,11 @@ def test_what_one_of_many_names_foretells_by_luck_is_no_step_where_it_makes_the_
 def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_right_one(cell, few, make):
     many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "current_sensor_offset")}
     assert len(many) > FINALISTS > len(few)
-    allowed_v = 0.6e-3
     right = make((CATALOGUE["series_resistance"].activate(resistance_ohm=ADDED_OHM),))
     strange = replace(right, voltage_v=right.voltage_v + 5e-3 * np.sin(right.time_s / 30.0))
     asked = ((right, many), (strange, many), (strange, few))
     problems = [inverse_problem(cell, [data], 0.9, effects=effects) for data, effects in asked]
-    paths = [searched(one, 1, lambda *_: True, Archive(None, ""), allowed_v=allowed_v) for one in problems]
+    paths = [searched(one, 1, lambda *_: True, Archive(None, ""), allowed_v=ALLOWED_V) for one in problems]
     assert paths[0].chosen.hypothesis == ("series_resistance",)
     assert paths[0].beyond_reach_v is None
     assert paths[1].chosen is paths[1].base
@@ -151,6 +153,18 @@ def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_righ
     assert paths[1].beyond_reach_v == pytest.approx(5e-3 / np.sqrt(2.0), rel=0.2)
 
 
+def test_what_moves_the_voltage_far_is_followed_before_it_is_called_out_of_reach(cell, few, make):
+    many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "clock_skew")}
+    data = make((CATALOGUE["clock_skew"].activate(lag_s=2.0),))
+    problem = inverse_problem(cell, [data], 0.9, effects=many)
+    path = searched(problem, 1, lambda *_: True, Archive(None, ""), allowed_v=ALLOWED_V)
+    growths = growths_on([Parent(problem, path.blocks, path.base)], {}, Archive(None, ""))
+    begun = least_left_v(path.base, [growth.marks() for growth in growths], problem.white_v)
+    assert begun > REACH * ALLOWED_V
+    assert path.beyond_reach_v is None
+    assert path.chosen.hypothesis == ("clock_skew",)
+
+
 def test_what_was_within_reach_is_within_reach_with_more_names(cell, few, make, monkeypatch):
     many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "current_sensor_offset")}
     data = make((CATALOGUE["series_resistance"].activate(resistance_ohm=ADDED_OHM),))
@@ -158,11 +172,10 @@ def test_what_was_within_reach_is_within_reach_with_more_names(cell, few, make, 
     archive = Archive(None, "")
 
     def looked(most, archive):
-        return searched(problem, most, lambda *_: True, archive, allowed_v=0.6e-3)
+        return searched(problem, most, lambda *_: True, archive, allowed_v=ALLOWED_V)
 
     once = looked(1, archive)
-    # By where effects ended, which is all that the archive holds, hardly anything is within reach.
-    monkeypatch.setattr(forward, "least_left_v", lambda *_: np.inf)
+    monkeypatch.setattr(reach, "least_left_v", lambda *_: np.inf)
     again = looked(2, archive)
     assert once.chosen.hypothesis == again.chosen.hypothesis == ("series_resistance",)
     assert again.beyond_reach_v is None
