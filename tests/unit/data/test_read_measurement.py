@@ -185,7 +185,16 @@ def test_a_gap_is_refused_with_both_ways_out(tmp_path):
 
 def test_a_part_that_is_the_whole_file_was_taken_without_a_word(tmp_path):
     notes = read_measurement(written(tmp_path, text()), stop_s=99_999).notes
-    assert any("--to-s 99999 leaves out nothing: its times run from 0 s to 199 s." in note for note in notes)
+    said = "Read up to 99999 s as asked, which leaves out nothing: its times run from 0 s to 199 s."
+    assert any(said in note for note in notes)
+
+
+def test_a_part_without_rows_named_an_option_that_nobody_had_given(tmp_path):
+    message = refusal(tmp_path, text(), start_s=300.0, stop_s=400.0)
+    assert message == (
+        "drive.csv: read from 300 s on up to 400 s as asked, it has no row, and a record needs two; its times run from "
+        "0 s to 199 s."
+    )
 
 
 def test_a_sparsely_logged_rest_is_no_gap_but_a_note(tmp_path):
