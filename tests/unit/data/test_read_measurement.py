@@ -197,6 +197,13 @@ def test_a_part_without_rows_named_an_option_that_nobody_had_given(tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    "end", [{"start_s": float("nan")}, {"stop_s": float("nan")}, {"stop_s": float("inf")}]
+)
+def test_a_time_that_is_none_was_taken_for_the_whole_record(tmp_path, end):
+    assert "give a time in seconds" in refusal(tmp_path, text(), **end)
+
+
 def test_a_sparsely_logged_rest_is_no_gap_but_a_note(tmp_path):
     time = np.concatenate([np.arange(50.0), [500.0], 500 + np.arange(1.0, 50)])
     current = np.concatenate([np.tile([5.0, -5.0], 20), np.zeros(20), np.tile([5.0, -5.0], 20)])
