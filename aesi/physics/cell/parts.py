@@ -95,9 +95,8 @@ class Electrolyte:
     diffusivity_ea_j_mol: float = 0.0
 
 
-LEAST_SOH, MOST_SOH = 0.2, 1.5
-"""Cells are followed to half of their capacity, seldom further: less than a fifth is a slip of the point, and the model
-a shell. A file may be of an aged cell; beyond the other end it is of another. Conventions."""
+MOST_SOH = 1.5
+"""A file may be of an aged cell; beyond this it is of another."""
 
 
 @dataclass(frozen=True)
@@ -197,9 +196,13 @@ class CellParameters:
     def with_soh(self, soh: float) -> Self:
         """The cell at a state of health: this share of its capacity left, see `with_material`.
 
-        Raises CellError, as `check_soh` does.
+        Raises CellError for a share that is not in (0, `MOST_SOH`].
         """
-        check_soh(soh)
+        if not 0.0 < soh <= MOST_SOH:
+            raise CellError(
+                f"a state of health of {soh:g}: it is the share of the cell file's capacity that the cell had, above 0 "
+                f"and at most {MOST_SOH:g}; 97 % is 0.97."
+            )
         return self.with_material(soh)
 
     def with_material(self, share: float) -> Self:
@@ -208,15 +211,6 @@ class CellParameters:
         n, p = self.negative, self.positive
         return self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share).with_positive(
             c_max_mol_m3=p.c_max_mol_m3 * share
-        )
-
-
-def check_soh(soh: float) -> None:
-    """Raises CellError for a state of health that is no share in [`LEAST_SOH`, `MOST_SOH`]."""
-    if not LEAST_SOH <= soh <= MOST_SOH:
-        raise CellError(
-            f"a state of health of {soh:g}: it is the share of the cell file's capacity that the cell had, from "
-            f"{LEAST_SOH:g} to {MOST_SOH:g}; 97 % is 0.97."
         )
 
 
