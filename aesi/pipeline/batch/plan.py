@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TextIO
 
-from aesi.errors import InputError
+from aesi.errors import CellError, InputError
+from aesi.physics.cell import checked_soh
 
 CELL_FILES = ("*.bpx.json", "*.json")
 RECORDS = (".csv", ".gz", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax", ".txt")
@@ -56,6 +57,8 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
     cell : the BPX file (or model folder) of every job that names none.  soh : of every job that names none.
     Raises InputError, one sentence, for what is missing.
     """
+    if soh is not None:
+        checked_soh(soh)
     if not source.exists():
         raise InputError(f"There is no folder or table {source}.")
     jobs = _of_folder(source, cell) if source.is_dir() else _of_table(source, cell)
@@ -160,6 +163,13 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
             )
         return value
 
+    def health(column: str) -> float | None:
+        value = number(column)
+        try:
+            return None if value is None else checked_soh(value)
+        except CellError as error:
+            raise InputError(f"{table}, line {line}: {column}: {error}") from None
+
     own = files("cell")
     if not own and cell is None:
         raise InputError(
@@ -180,5 +190,5 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
         share("soc0"),
         specimen,
         number("at"),
-        number("soh"),
+        health("soh"),
     )
