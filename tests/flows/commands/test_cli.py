@@ -140,36 +140,40 @@ def test_a_model_that_is_read_was_written_over(call, cell, tmp_path, command, ou
         ("simulate", "folder", "is a folder; name the file to write"),
         ("calibrate", "folder", "is a folder; name the file to write"),
         ("discover", "file", "is a file; name a folder"),
-        ("discover", "file/below", "is a file, not a folder"),
+        ("discover", "file/below", "file: Not a directory); name another place"),
+        ("simulate", "closed/run.csv", "closed: Permission denied); name another place"),
+        ("calibrate", "closed/new/cell.json", "closed: Permission denied); name another place"),
+        ("discover", "closed", "closed: Permission denied); name another place"),
+        ("calibrate", "there.json", "there.json is there and may not be written over"),
     ],
 )
 def test_what_cannot_be_written_is_told_before_anything_is_computed(
-    call, cell, current, tmp_path, command, made, words
+    call, cell, current, tmp_path, monkeypatch, command, made, words
 ):
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "file").write_text("kept")
+    for name in ("folder", "closed"):
+        (tmp_path / name).mkdir()
+    for name in ("file", "there.json"):
+        (tmp_path / name).write_text("kept")
+    opened, closed = os.open, tmp_path / "closed"
+
+    def refusing(path, *how, **more):
+        if (
+            closed in Path(path).parents
+        ):  # whatever its mode says: a superuser and a server's disk do not go by it
+            raise PermissionError(13, "Permission denied", str(path))
+        return opened(path, *how, **more)
+
+    monkeypatch.setattr(os, "open", refusing)
+    there = tmp_path / "there.json"
+    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and Path(path) == there))
+    before = sorted(tmp_path.rglob("*"))
     read = "--current" if command == "simulate" else "--data"
     code, _, err = call(command, "--cell", cell, read, current, "--out", tmp_path / made)
     assert code == 2
     assert words in err
     assert err.startswith("aesi: ")  # not even the line that it is reading
-    assert (tmp_path / "file").read_text() == "kept"
-
-
-@pytest.mark.parametrize("made", ["closed/out.json", "closed", "there.json"])
-def test_a_place_that_may_not_be_written_to_is_told_before_anything_is_computed(
-    call, cell, current, tmp_path, monkeypatch, made
-):
-    (tmp_path / "closed").mkdir()
-    (tmp_path / "there.json").write_text("kept")
-    closed = {tmp_path / "closed", tmp_path / "there.json"}
-    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and Path(path) in closed))
-    command = "discover" if made == "closed" else "calibrate"
-    code, _, err = call(command, "--cell", cell, "--data", current, "--out", tmp_path / made)
-    assert code == 2
-    assert "may not be written" in err
-    assert err.startswith("aesi: ")
-    assert (tmp_path / "there.json").read_text() == "kept"
+    assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "file").read_text() == there.read_text() == "kept"
 
 
 def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path):
