@@ -1,5 +1,6 @@
 """The command line: exit codes, one sentence an error, and what each command leaves."""
 
+import errno
 import json
 import os
 import subprocess
@@ -176,9 +177,10 @@ def test_what_cannot_be_written_is_told_before_anything_is_computed(
     assert (tmp_path / "file").read_text() == there.read_text() == "kept"
 
 
-def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path):
+@pytest.mark.parametrize("why", [errno.EACCES, errno.EPERM, errno.EROFS])
+def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path, why):
     def refused(*_):
-        raise PermissionError(13, "Permission denied", str(tmp_path / ".aesi"))
+        raise OSError(why, os.strerror(why), str(tmp_path / ".aesi"))
 
     monkeypatch.setenv("AESI_HOME", str(tmp_path))
     monkeypatch.setattr("aesi.physics.effects.known_effects", refused)
