@@ -183,6 +183,12 @@ def test_a_gap_is_refused_with_both_ways_out(tmp_path):
     assert len(read_measurement(written(tmp_path, content), start_s=149)) == N - 149
 
 
+def test_the_time_of_a_step_was_proposed_beside_that_of_the_test(tmp_path):
+    table = text(header="Time,I[A],U[V]").splitlines()
+    total = [f"{row},{cell}" for row, cell in zip(table, ["Total Time (h)", *TIME / 3600], strict=True)]
+    assert '--column time_s="Total Time (h)" --unit time_s=h' in refusal(tmp_path, "\n".join(total))
+
+
 def test_a_part_that_is_the_whole_file_was_taken_without_a_word(tmp_path):
     notes = read_measurement(written(tmp_path, text()), stop_s=99_999).notes
     said = "Read up to 99999 s as asked, which leaves out nothing: its times run from 0 s to 199 s."
