@@ -57,6 +57,14 @@ def check_folder(out: Path, inputs: Iterable[Path] = ()) -> None:
         check_writable(out / MODEL)
 
 
+def check_beside(out: Path, source: Path) -> None:
+    """Raises InputError where `out` is the folder `source` or lies in it: what is written would be read next time."""
+    if source.is_dir() and out.resolve().is_relative_to(source.resolve()):
+        raise InputError(
+            f"--out {out} lies in {source}, whose subfolders are read as cells; name a folder beside it."
+        )
+
+
 def _lies_in(file: Path, place: Path) -> bool:
     """Is a file or folder that is there the place, or in it?"""
     return place.exists() and file.resolve().is_relative_to(place.resolve())

@@ -61,6 +61,8 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
         checked_soh(soh)
     if not source.exists():
         raise InputError(f"There is no folder or table {source}.")
+    if cell is not None and not cell.exists():
+        raise InputError(f"There is no cell file {cell}, which is to be that of every job that names none.")
     jobs = _of_folder(source, cell) if source.is_dir() else _of_table(source, cell)
     names = [job.name for job in jobs]
     twice = next((name for name in names if names.count(name) > 1), None)

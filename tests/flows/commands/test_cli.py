@@ -177,6 +177,18 @@ def test_what_cannot_be_written_is_told_before_anything_is_computed(
     assert (tmp_path / "file").read_text() == there.read_text() == "kept"
 
 
+@pytest.mark.parametrize("out", ["cells", "cells/found"])
+def test_results_of_a_batch_were_read_as_a_cell_the_next_time(call, tmp_path, out):
+    (tmp_path / "cells" / "a").mkdir(parents=True)
+    code, _, err = call("batch", "cells", "--cell", LG_M50, "--out", out)
+    assert code == 2
+    assert (
+        err
+        == f"aesi: --out {out} lies in cells, whose subfolders are read as cells; name a folder beside it.\n"
+    )
+    assert not (tmp_path / "cells" / "found").exists()
+
+
 @pytest.mark.parametrize("why", [errno.EACCES, errno.EPERM, errno.EROFS])
 def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path, why):
     def refused(*_):

@@ -88,6 +88,12 @@ def test_a_table_that_cannot_be_used_is_one_sentence(tmp_path, content, words):
         read_plan(table, CELL)
 
 
+def test_a_cell_file_that_is_not_there_is_told_once_not_job_by_job(tmp_path):
+    touched(tmp_path / "a" / "1.csv")
+    with pytest.raises(InputError, match=r"There is no cell file nowhere\.json"):
+        read_plan(tmp_path, Path("nowhere.json"))
+
+
 def test_a_job_that_cannot_be_done_is_a_row_with_its_reason(tmp_path):
     row = run_job(Job("bad", CELL, (touched(tmp_path / "bad.csv"),)), tmp_path / "out", Settings())
     assert row["status"] == "failed"
