@@ -27,7 +27,7 @@ COLUMNS = ("name", "data", "cell", "test", "soc0", "soh", "specimen", "at")
 class Job:
     """One cell and its records.
 
-    specimen, at : which physical cell a check-up is of, and when; empty and None where there is one alone.
+    specimen, at : which physical cell a check-up is of, and when; empty and None where it is none.
     soh : share of the cell file's capacity that the cell had in its discovery; None for all of it.
     """
 
@@ -68,6 +68,12 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise InputError(f"{source}: two rows are named {twice!r}; names tell the folders of results apart.")
+    visits = [(job.specimen, job.at) for job in jobs if job.specimen]
+    again = next((visit for visit in visits if visits.count(visit) > 1), None)
+    if again is not None:
+        raise InputError(
+            f"{source}: two check-ups of {again[0]!r} are at {again[1]:g}; several files of one are separated by ;"
+        )
     outside = next((name for name in names if Path(name).name != name or name.startswith(".")), None)
     if outside is not None:
         raise InputError(
@@ -183,7 +189,12 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
     missing = [path for path in (*own, *data, *files("test")) if not path.exists()]
     if missing:
         raise InputError(f"{table}, line {line}: there is no file {missing[0]}.")
-    specimen = (row.get("specimen") or "").strip()
+    specimen, at = (row.get("specimen") or "").strip(), number("at")
+    if bool(specimen) != (at is not None):
+        raise InputError(
+            f"{table}, line {line}: a check-up has a specimen and an at, and {name!r} has one of the two; give both, "
+            "or neither."
+        )
     return Job(
         name,
         own[0] if own else cell or Path(),
@@ -191,6 +202,6 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
         files("test"),
         share("soc0"),
         specimen,
-        number("at"),
+        at,
         health("soh"),
     )

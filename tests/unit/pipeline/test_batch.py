@@ -75,6 +75,12 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
         ("name,data,at\na,s.csv,old\n", "is no number"),
         ("name,data,soc0\na,s.csv,90\n", "line 2: soc0 = 90: a state of charge is a share"),
         ("name,data,soh\na,s.csv,80\n", "line 2: soh: a state of health of 80: it is the share"),
+        ("name,data,specimen,at\na,s.csv,one,\n", "line 2: a check-up has a specimen and an at"),
+        ("name,data,at\na,s.csv,3\n", "line 2: a check-up has a specimen and an at"),
+        (
+            "name,data,specimen,at\na,s.csv,one,3\nb,s.csv,one,3.0\n",
+            "two check-ups of 'one' are at 3; several",
+        ),
         ("name,data\n,s.csv\n", "have to be given"),
         ("name,data\n../a,s.csv\n", "without slashes"),
         ("name,data\n..,s.csv\n", "starts with no dot"),
