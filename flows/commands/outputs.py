@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,36 +15,42 @@ MODEL = "model"
 OTHER_FORMATS = (".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5")
 
 
-def check_file(out: Path, inputs: Iterable[Path] = ()) -> None:
-    """Raises InputError where `out` cannot be a file to write, or is one of the files that are read.
+def check_file(out: Path, inputs: Sequence[Path] = (), written: Sequence[Path] = ()) -> None:
+    """Raises InputError where `out` cannot be a file to write, or what is written is one of the files that are read.
 
-    inputs : files, and folders of saved models, whose files are read.
+    inputs : files, and folders of saved models, whose files are read.  written : the files, where there are more.
     """
     with _refused(out):
         if out.is_dir():
             raise InputError(f"--out {out} is a folder; name the file to write.")
-        if out.exists() and any(_lies_in(out, given) for given in inputs):
-            raise InputError(f"--out {out} is a file that is read, and would be lost; give another name.")
+        lost = [
+            file for file in {out, *written} if file.exists() and any(_lies_in(file, one) for one in inputs)
+        ]
+        if lost:
+            beside = "" if out in lost else f": {lost[0]}, which is written beside it,"
+            raise InputError(
+                f"--out {out}{beside} is a file that is read, and would be lost; give another name."
+            )
         if out.exists() and not os.access(out, os.W_OK):
             raise InputError(f"--out {out} is there and may not be written over; give another name.")
         check_writable(out)
 
 
-def check_table(out: Path, inputs: Iterable[Path] = ()) -> None:
+def check_table(out: Path, inputs: Sequence[Path] = ()) -> None:
     """As `check_file`, of a CSV.  Raises InputError also where the name promises another format."""
     check_file(out, inputs)
     if out.suffix.lower() in OTHER_FORMATS:
         raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv.")
 
 
-def check_json(out: Path, inputs: Iterable[Path] = ()) -> None:
+def check_json(out: Path, inputs: Sequence[Path] = ()) -> None:
     """As `check_file`, of a cell's file.  Raises InputError also where the name promises another format."""
     check_file(out, inputs)
     if out.suffix.lower() != ".json":
         raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
 
 
-def check_folder(out: Path, inputs: Iterable[Path] = ()) -> None:
+def check_folder(out: Path, inputs: Sequence[Path] = ()) -> None:
     """Raises InputError where `out` cannot be a folder to write to, or the model in it is one that is read; one that is
     there is kept, and its files may be replaced."""
     with _refused(out):

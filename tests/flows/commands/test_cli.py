@@ -117,6 +117,16 @@ def test_a_file_that_is_read_is_never_written_over(call, cell, current, tmp_path
     assert mine[out].read_bytes() == before
 
 
+def test_the_file_beside_an_export_is_never_the_one_that_is_read(call, cell, tmp_path):
+    mine = tmp_path / "mine.bpx.json"
+    mine.write_bytes(Path(cell).read_bytes())
+    code, _, err = call("export", "--cell", mine, "--to", "pybamm", "--out", tmp_path / "mine.py")
+    assert code == 2
+    assert "mine.bpx.json, which is written beside it, is a file that is read, and would be lost" in err
+    assert mine.read_bytes() == Path(cell).read_bytes()
+    assert not (tmp_path / "mine.py").exists()
+
+
 @pytest.mark.parametrize(
     ("command", "out"),
     [
