@@ -98,11 +98,15 @@ def repeated(arguments: list[str]) -> list[str]:
     return result
 
 
+CLOSED = (errno.EACCES, errno.EPERM, errno.EROFS)
+"""What a system says of a place that may not be written to."""
+
+
 def _os_sentence(error: OSError) -> str:
     """What the system refused; of the workspace, where else it can be."""
     place = error.filename or "a file"
     words = f"{place}: {error.strerror or error}"
-    if str(place).startswith(str(environment.workspace())) and error.errno in (errno.EACCES, errno.EROFS):
+    if str(place).startswith(str(environment.workspace())) and error.errno in CLOSED:
         words += (
             "; runs and their tracking are kept in the current folder, or in the one that AESI_HOME names"
         )

@@ -144,7 +144,7 @@ class Model:
 
     def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
         """The cell with shares of its active material and of its silicon left."""
-        return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_soh(material)
+        return replace(cell, negative=with_silicon(cell.negative, self.edge, silicon)).with_material(material)
 
     def run(self, index: int, cell: Cell, x: Array, more: float = 1.0) -> Array:
         """Rows of a record's simulation: voltage, surface stoichiometries, ... (see `run_plain`).

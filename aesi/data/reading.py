@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -45,6 +46,11 @@ class Reading:
         _check_choice("duplicates", self.duplicates, get_args(Duplicates))
         for name in ("cycle", "step"):
             bounds(name, getattr(self, name))
+        for end, time in (("from", self.start_s), ("up to", self.stop_s)):
+            if time is not None and not isfinite(time):
+                raise DataError(
+                    f"a record cannot be read {end} {time:g} s; give a time in seconds, or leave it out."
+                )
 
     @property
     def selectors(self) -> tuple[str, ...]:

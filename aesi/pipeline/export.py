@@ -38,14 +38,23 @@ class _Pybamm:
     values: dict[str, float] = field(default_factory=dict)
 
 
+def files_written(out: Path, to: Target) -> tuple[Path, ...]:
+    """What `export` writes: `out`, and for PyBaMM the BPX file that its script reads.
+
+    Raises InputError where `out` has the wrong suffix.
+    """
+    if out.suffix != SUFFIX[to]:
+        raise InputError(f"{out} has to end in {SUFFIX[to]} for --to {to}.")
+    return (out,) if to == "bpx" else (out, out.with_suffix(".bpx.json"))
+
+
 def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     """Write a BPX file, or a Python script for PyBaMM with its BPX file beside it.
 
     model : a BPX file, or a folder of a saved model, whose effects are written as far as the target holds them.
     Raises InputError where `out` has the wrong suffix or cannot be written.
     """
-    if out.suffix != SUFFIX[to]:
-        raise InputError(f"{out} has to end in {SUFFIX[to]} for --to {to}.")
+    *script, bpx = files_written(out, to)
     declared = declared_model(model)
     found = folded(declared.cell, declared.effects)
     held = [*declared.cell.unread, *(f"{_said(effect)}: written into the cell." for effect in found.held)]
@@ -64,14 +73,13 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
                 f"{found.cell.contact_resistance_ohm:.4g} ohm of contacts: in the section User-defined, which other "
                 "tools do not read; --to pybamm hands it over."
             )
-        return Exported((_write(out, _bpx(found.cell)),), tuple(held), tuple(left))
+        return Exported((_write(bpx, _bpx(found.cell)),), tuple(held), tuple(left))
     left += _beyond_bpx(found.cell)
     more, unknown = _for_pybamm(found.cell, found.left)
     held += [f"{_said(effect)}: as an option of the model." for effect in found.left if effect not in unknown]
     left += [f"{_said(effect)}: PyBaMM's model from BPX has no counterpart." for effect in unknown]
-    beside = out.with_suffix(".bpx.json")
-    written = (_write(out, _script(beside.name, more)), _write(beside, _bpx(found.cell)))
-    return Exported(written, tuple(held), tuple(left))
+    scripts = [_write(path, _script(bpx.name, more)) for path in script]
+    return Exported((*scripts, _write(bpx, _bpx(found.cell))), tuple(held), tuple(left))
 
 
 def _beyond_bpx(cell: Cell) -> list[str]:

@@ -100,7 +100,12 @@ def read_frequencies(text: str) -> Array:
     table = open_table(text)
     if "frequency_hz" not in table.header:
         raise DataError(f"{table.path.name} has no column frequency_hz; it has {', '.join(table.header)}.")
-    return table.read((list(table.header).index("frequency_hz"),))[0]
+    hz = table.read((list(table.header).index("frequency_hz"),))[0]
+    bad = np.flatnonzero(~(np.isfinite(hz) & (hz > 0.0)))
+    if bad.size or not hz.size:
+        what = f"row {bad[0] + 1}: frequency_hz is {hz[bad[0]]:g}" if bad.size else "no row below its header"
+        raise DataError(f"{table.path.name}, {what}; give positive numbers in Hz.")
+    return hz
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,6 +41,7 @@ def batch(
 ) -> None:
     """One discovery a cell, a summary of all; check-ups of one specimen as a trend. Goes on where it was stopped."""
     outputs.check_folder(out)
+    outputs.check_beside(out, source)
     if address is not None and runner != "dask":
         raise InputError(
             f"--address {address} names a Dask scheduler; give --runner dask beside it, or leave it out."

@@ -275,9 +275,10 @@ def export(
     out: Annotated[Path, typer.Option(help="File to write: .json for bpx, .py for pybamm.")],
 ) -> None:
     """A cell, and what was found about it, for other tools; says what they cannot hold."""
-    outputs.check_file(out, [cell])
     from aesi.pipeline.export import export as write
+    from aesi.pipeline.export import files_written
 
+    outputs.check_file(out, [cell], files_written(out, to))
     done = write(cell, out, to)
     for sentence in done.held:
         typer.echo(sentence, err=True)

@@ -76,7 +76,7 @@ def tables(
     from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.store import Store
 
-    deliver_leftovers(Store(uri or tracked_as(experiment)[1]), Console().say)
+    deliver_leftovers(Store.to_read(uri or tracked_as(experiment)[1]), Console().say)
     typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
 
 

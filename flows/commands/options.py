@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable
 from datetime import date
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -213,7 +214,7 @@ def measurements(
 
 def by_file(option: str, pairs: list[str] | None, paths: list[Path]) -> dict[str, float]:
     """`FILE=NUMBER` pairs as numbers by record of the files `paths`."""
-    return _by_file(option, pairs, paths, float, "NUMBER")
+    return _by_file(option, pairs, paths, _finite, "NUMBER")
 
 
 def dates(pairs: list[str] | None, paths: list[Path]) -> dict[str, date]:
@@ -227,6 +228,14 @@ def day(option: str, text: str | None) -> date | None:
         return None if text is None else date.fromisoformat(text)
     except ValueError:
         raise InputError(f"{option} {text}: has to read YYYY-MM-DD.") from None
+
+
+def _finite(text: str) -> float:
+    """Raises ValueError for a text that is no number, or no finite one."""
+    value = float(text)
+    if not isfinite(value):
+        raise ValueError(text)
+    return value
 
 
 def _by_file(

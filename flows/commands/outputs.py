@@ -3,54 +3,72 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from aesi.errors import InputError
+from aesi.numerics.files.whole import check_writable
 
 MODEL = "model"
 """The folder of the model within a folder of results."""
 OTHER_FORMATS = (".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5")
 
 
-def check_file(out: Path, inputs: Iterable[Path] = ()) -> None:
-    """Raises InputError where `out` cannot be a file to write, or is one of the files that are read.
+def check_file(out: Path, inputs: Sequence[Path] = (), written: Sequence[Path] = ()) -> None:
+    """Raises InputError where `out` cannot be a file to write, or what is written is one of the files that are read.
 
-    inputs : files, and folders of saved models, whose files are read.
+    inputs : files, and folders of saved models, whose files are read.  written : the files, where there are more.
     """
-    if out.is_dir():
-        raise InputError(f"--out {out} is a folder; name the file to write.")
-    if out.exists() and any(_lies_in(out, given) for given in inputs):
-        raise InputError(f"--out {out} is a file that is read, and would be lost; give another name.")
-    if out.exists() and not os.access(out, os.W_OK):
-        raise InputError(f"--out {out} is there and may not be written over; give another name.")
-    _check_place(out.parent)
+    with _refused(out):
+        if out.is_dir():
+            raise InputError(f"--out {out} is a folder; name the file to write.")
+        lost = [
+            file for file in {out, *written} if file.exists() and any(_lies_in(file, one) for one in inputs)
+        ]
+        if lost:
+            beside = "" if out in lost else f": {lost[0]}, which is written beside it,"
+            raise InputError(
+                f"--out {out}{beside} is a file that is read, and would be lost; give another name."
+            )
+        if out.exists() and not os.access(out, os.W_OK):
+            raise InputError(f"--out {out} is there and may not be written over; give another name.")
+        check_writable(out)
 
 
-def check_table(out: Path, inputs: Iterable[Path] = ()) -> None:
+def check_table(out: Path, inputs: Sequence[Path] = ()) -> None:
     """As `check_file`, of a CSV.  Raises InputError also where the name promises another format."""
     check_file(out, inputs)
     if out.suffix.lower() in OTHER_FORMATS:
         raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv.")
 
 
-def check_json(out: Path, inputs: Iterable[Path] = ()) -> None:
+def check_json(out: Path, inputs: Sequence[Path] = ()) -> None:
     """As `check_file`, of a cell's file.  Raises InputError also where the name promises another format."""
     check_file(out, inputs)
     if out.suffix.lower() != ".json":
         raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
 
 
-def check_folder(out: Path, inputs: Iterable[Path] = ()) -> None:
+def check_folder(out: Path, inputs: Sequence[Path] = ()) -> None:
     """Raises InputError where `out` cannot be a folder to write to, or the model in it is one that is read; one that is
     there is kept, and its files may be replaced."""
-    if out.exists() and not out.is_dir():
-        raise InputError(f"--out {out} is a file; name a folder.")
-    if any(_lies_in(given, out / MODEL) for given in inputs):
+    with _refused(out):
+        if out.exists() and not out.is_dir():
+            raise InputError(f"--out {out} is a file; name a folder.")
+        if any(_lies_in(given, out / MODEL) for given in inputs):
+            raise InputError(
+                f"--out {out}: the model in it is the one that is read, and would be lost; name another folder."
+            )
+        check_writable(out / MODEL)
+
+
+def check_beside(out: Path, source: Path) -> None:
+    """Raises InputError where `out` is the folder `source` or lies in it: what is written would be read next time."""
+    if source.is_dir() and out.resolve().is_relative_to(source.resolve()):
         raise InputError(
-            f"--out {out}: the model in it is the one that is read, and would be lost; name another folder."
+            f"--out {out} lies in {source}, whose subfolders are read as cells; name a folder beside it."
         )
-    _check_place(out)
 
 
 def _lies_in(file: Path, place: Path) -> bool:
@@ -58,12 +76,12 @@ def _lies_in(file: Path, place: Path) -> bool:
     return place.exists() and file.resolve().is_relative_to(place.resolve())
 
 
-def _check_place(folder: Path) -> None:
-    """The folder, or the first above it that is there, is one that may be written to."""
-    for place in (folder, *folder.parents):
-        if place.exists():
-            if not place.is_dir():
-                raise InputError(f"--out: {place} is a file, not a folder; name another place.")
-            if not os.access(place, os.W_OK | os.X_OK):
-                raise InputError(f"--out: the folder {place} may not be written to; name another place.")
-            return
+@contextmanager
+def _refused(out: Path) -> Iterator[None]:
+    """What the system refuses, as a sentence about the option."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"--out {out} cannot be written ({error.filename}: {error.strerror}); name another place."
+        ) from None

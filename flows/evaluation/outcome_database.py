@@ -22,8 +22,7 @@ class DatabaseOutcomes:
         import sqlalchemy as sa
 
         self._sa = sa
-        options: dict[str, Any] = {"connect_args": {"timeout": 60}} if url.startswith("sqlite") else {}
-        self._engine = self._connect(url, options)
+        self._engine = engine_of(url)
         self._table = sa.Table(
             "aesi_outcomes",
             sa.MetaData(),
@@ -125,16 +124,6 @@ class DatabaseOutcomes:
             )
         return time.time()
 
-    def _connect(self, url: str, options: dict[str, Any]) -> Any:
-        for scheme in ("postgresql://", "postgres://"):
-            if url.startswith(scheme):  # the driver that the `cluster` extra installs
-                url = f"postgresql+psycopg2://{url.removeprefix(scheme)}"
-        try:
-            return self._sa.create_engine(url, pool_pre_ping=True, **options)
-        except (ImportError, self._sa.exc.ArgumentError) as error:
-            advice = "; pip install psycopg2-binary" if isinstance(error, ImportError) else ""
-            raise InputError(f"runner.storage is no database that can be used: {error}{advice}.") from None
-
     def _create(self) -> None:
         try:
             self._table.create(self._engine, checkfirst=True)
@@ -148,3 +137,21 @@ class DatabaseOutcomes:
                 where = self._engine.url.render_as_string(hide_password=True)
                 reason = str(error.__cause__ or error).strip().splitlines()[0]
                 raise InputError(f"runner.storage {where} cannot be used: {reason}.") from None
+
+
+def engine_of(url: str) -> Any:
+    """SQLAlchemy's engine for a database; nothing is connected to yet.
+
+    Raises InputError for what is no address, or one whose driver is not installed.
+    """
+    import sqlalchemy as sa
+
+    for scheme in ("postgresql://", "postgres://"):
+        if url.startswith(scheme):  # the driver that the `cluster` extra installs
+            url = f"postgresql+psycopg2://{url.removeprefix(scheme)}"
+    options: dict[str, Any] = {"connect_args": {"timeout": 60}} if url.startswith("sqlite") else {}
+    try:
+        return sa.create_engine(url, pool_pre_ping=True, **options)
+    except (ImportError, sa.exc.ArgumentError) as error:
+        advice = "; pip install psycopg2-binary" if isinstance(error, ImportError) else ""
+        raise InputError(f"runner.storage is no database that can be used: {error}{advice}.") from None

@@ -79,7 +79,7 @@ def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
     Raises InputError where the run is no candidate, had failed, or lacks what it was made from, or where another
     version wrote that.
     """
-    store = Store(uri)
+    store = Store.to_read(uri)
     run = _candidate(store, run_id)
     parent = store.run(run.data.tags[PARENT])
     with _as_written(parent):

@@ -22,7 +22,7 @@ def compare(wanted: Sequence[str], out: Path, uri: str | None = None) -> list[Co
     wanted : run ids or their beginnings, or names of experiments for all of their finished runs.
     Raises InputError where a name stands for nothing that is tracked, or fewer than two runs are left.
     """
-    store = Store(uri)
+    store = Store.to_read(uri)
     runs = [_compared(store, name, run) for name, run in _chosen(store, wanted)]
     if len(runs) < 2:
         raise InputError(

@@ -34,7 +34,7 @@ def tables_of(
     Raises InputError where nothing of that name was tracked.
     """
     name, place = tracked_as(experiment)
-    store = Store(uri or place)
+    store = Store.to_read(uri or place)
     runs = _chosen(store, name, run_ids)
     summaries = [_summary(store, run) for run in runs]
     rows = merged([summary["models"] for summary in summaries])

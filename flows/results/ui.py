@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import socket
 import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from aesi.errors import InputError
 from flows.base import environment
+from flows.base.console import first_line
 from flows.tracking.store import Store, default_uri, without_login
 from flows.tracking.view import VIEW, view_of
+
+if TYPE_CHECKING:
+    from optuna.storages import BaseStorage
 
 TRAINING = "#/experiments?workflowType=machine_learning"
 """MLflow opens on what it has for language models, where runs are hard to find."""
@@ -23,13 +30,13 @@ QUIETLY = {
 
 def serve(port: int, host: str, uri: str | None) -> None:
     """Serve until interrupted. A store that is a server already has its UI there: its address is printed."""
-    uri = uri or default_uri()
+    named, uri = uri is not None, uri or default_uri()
     if uri.startswith(("http://", "https://")):
         print(f"The runs are at {without_login(uri)}")
         return
-    if not _free(host, port):
-        raise InputError(f"port {port} on {host} is taken; give another with --port.")
-    store = Store(uri)  # makes or migrates the tables, so that an empty workspace shows an empty UI
+    _check_free(host, port)
+    # Of the workspace the tables are made, so that its first run can be watched; of a named store they are there.
+    store = Store.to_read(uri) if named else Store(uri)
     command = [
         sys.executable,
         "-m",
@@ -70,16 +77,34 @@ def serve_studies(port: int, host: str, url: str | None) -> None:
         raise InputError(
             f"no search has been run in this workspace ({journal()} is not there); `aesi run` makes one."
         )
-    if not _free(host, port):
-        raise InputError(f"port {port} on {host} is taken; give another with --port.")
+    _check_free(host, port)
+    storage = _there(url) if url else study_storage()
     print(f"Optuna's dashboard shows the searches at http://{host}:{port}/ (Ctrl-C ends it)", flush=True)
-    run_server(study_storage(url), host=host, port=port)
+    run_server(storage, host=host, port=port)
+
+
+def _there(url: str) -> BaseStorage:
+    """Optuna's storage in a database that is there.  Raises InputError, which names it without its login."""
+    from sqlalchemy.engine import make_url
+
+    from flows.search.published_study import study_storage
+
+    try:
+        place = make_url(url)
+        file = place.database if place.get_backend_name() == "sqlite" else None
+        if file and not Path(file).is_file():  # SQLite would make one
+            raise FileNotFoundError(f"there is no file {file}")
+        return study_storage(url)
+    except Exception as error:
+        raise InputError(
+            f"--storage {without_login(url)} cannot be shown ({first_line(error)}); give the address that "
+            "runner.storage of the experiment's file has."
+        ) from None
 
 
 def serve_flows(port: int, host: str) -> None:
     """Prefect's server on the flow runs of the workspace, until interrupted."""
-    if not _free(host, port):
-        raise InputError(f"port {port} on {host} is taken; give another with --port.")
+    _check_free(host, port)
     environment.prepare_process()
     environment.make_prefect_home()
     print(f"Prefect shows the flow runs at http://{host}:{port}/runs (Ctrl-C ends it)", flush=True)
@@ -88,11 +113,17 @@ def serve_flows(port: int, host: str) -> None:
     os.execve(sys.executable, command, os.environ | api)
 
 
-def _free(host: str, port: int) -> bool:
-    with socket.socket() as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except OSError:
-            return False
-    return True
+def _check_free(host: str, port: int) -> None:
+    """Raises InputError where nothing can listen there, with the reason."""
+    try:
+        ((family, kind, _, _, address), *_) = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+        with socket.socket(family, kind) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(address)
+    except (OSError, UnicodeError) as error:
+        if isinstance(error, OSError) and error.errno == errno.EADDRINUSE:
+            raise InputError(f"port {port} on {host} is taken; give another with --port.") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(
+            f"nothing can be served at {host}, port {port} ({reason}); give another --host or --port."
+        ) from None

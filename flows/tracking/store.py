@@ -19,11 +19,13 @@ from pathlib import Path
 from typing import Any
 
 from aesi.errors import AesiError, InputError
+from aesi.numerics.files.whole import check_writable
 from flows.base import environment
 from flows.base.locks import ProcessLock
 from flows.tracking.relocation import artifact_folder, follow
 from flows.tracking.whole_run import read_runs
 
+SQLITE = "sqlite:///"
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
 KIND = "aesi.kind"
@@ -47,7 +49,7 @@ class StoreAway(AesiError):
 
 def default_uri() -> str:
     """MLFLOW_TRACKING_URI, or the SQLite file in the workspace."""
-    return os.environ.get("MLFLOW_TRACKING_URI") or f"sqlite:///{environment.workspace() / 'mlflow.db'}"
+    return os.environ.get("MLFLOW_TRACKING_URI") or f"{SQLITE}{environment.workspace() / 'mlflow.db'}"
 
 
 class Store:
@@ -60,7 +62,7 @@ class Store:
         # A database that fails reaches the caller as an exception, and need not be told twice, with a traceback.
         logging.getLogger("mlflow.store.db.utils").setLevel(logging.CRITICAL)
         self.uri = uri or default_uri()
-        self.local = self.uri.startswith("sqlite:///")
+        self.local = self.uri.startswith(SQLITE)
         self._places: dict[str, str] = {}
         self.notes: tuple[str, ...] = ()
         if self.uri.startswith(("http://", "https://")):
@@ -75,6 +77,30 @@ class Store:
                 self.client.search_experiments(max_results=1)
             except Exception as error:
                 raise _unusable(self.uri, error) from None
+
+    @classmethod
+    def to_read(cls, uri: str | None = None) -> Store:
+        """The store that is there; none is made where it is not.
+
+        Raises InputError for a SQLite file that is not there, or lies where nothing may be written.
+        """
+        uri = uri or default_uri()
+        if not uri.startswith(SQLITE):
+            return cls(uri)
+        database = _database(uri)
+        if not database.is_file():
+            raise InputError(
+                f"nothing is tracked in {database}: there is no such file; runs are tracked in the current folder, or "
+                "in the one that AESI_HOME names."
+            )
+        try:
+            check_writable(database)
+        except OSError as error:
+            raise InputError(
+                f"{database} cannot be read where it is: SQLite keeps a log beside it ({error.filename}: "
+                f"{error.strerror}); copy it with its artifacts, and name the copy."
+            ) from None
+        return cls(uri)
 
     def experiment(self, name: str) -> str:
         """Id of the experiment of that name, made if it is not there."""
@@ -100,7 +126,7 @@ class Store:
 
     @property
     def _path(self) -> Path:
-        return Path(self.uri.removeprefix("sqlite:///")).expanduser().resolve()
+        return _database(self.uri)
 
     def run(self, run_id: str) -> Any:
         """A run by its id; one that is a whole job also by its beginning. Raises InputError where there is none."""
@@ -204,6 +230,11 @@ class Store:
         return True
 
 
+def _database(uri: str) -> Path:
+    """The file of a SQLite store."""
+    return Path(uri.removeprefix(SQLITE)).expanduser().resolve()
+
+
 def now_ms() -> int:
     """Milliseconds since the epoch, as MLflow counts."""
     return int(time.time() * 1000)
@@ -263,7 +294,9 @@ def _unusable(uri: str, error: Exception) -> StoreAway:
     elif "is full" in reason:
         advice = "free some space, then start again"
     else:
-        advice = "check the address, or move the file away to start a new one"
+        advice = (
+            "check the address (sqlite:///FILE or http://HOST:PORT), or move the file away to start a new one"
+        )
     return StoreAway(f"the tracking store {without_login(uri)} cannot be used ({reason}); {advice}.")
 
 

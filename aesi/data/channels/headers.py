@@ -22,6 +22,8 @@ UNLIKELY = {
     "temperature_degc": r"time|/dt|set\b|limit|circuit|ambient|chamber|env",
     "state": r"time|of charge|soc",
 }
+WHOLE_TIME = r"total|test|cumul|elapsed"
+"""Of the names of a time: beside one of these a bare 'Time' begins anew with each step."""
 UNIT = re.compile(
     r"[\[(<]\s*([^\])>]+?)\s*[\])>]\s*$|[/#]\s*([^/#\[\](){}]+?)\s*$|[_ ]\s*([^/_ \[\](){}]+)\s*$"
 )
@@ -60,8 +62,9 @@ def of_column(quantity: str, name: str) -> str:
     return f'--column {quantity}="{name}"{declared}'
 
 
-def _doubt(quantity: str, name: str) -> tuple[bool, int]:
-    unit = unit_of(quantity, name)
-    return bool(re.search(UNLIKELY[quantity], plain(name))), 0 if unit == units.SI.get(
-        quantity
-    ) else 1 if unit else 2
+def _doubt(quantity: str, name: str) -> tuple[bool, bool, int]:
+    """Sorts the likeliest column first."""
+    text, unit = plain(name), unit_of(quantity, name)
+    unlikely = bool(re.search(UNLIKELY[quantity], text))
+    of_step = quantity == "time_s" and not re.search(WHOLE_TIME, text)
+    return unlikely, of_step, 0 if unit == units.SI.get(quantity) else 1 if unit else 2

@@ -144,12 +144,6 @@ def _of_number(
     return keep_rows(data, context, keep)
 
 
-def _asked(reading: Reading) -> list[str]:
-    """The options that cut a record in time, as they are typed."""
-    ends = {"--from-s": reading.start_s, "--to-s": reading.stop_s}
-    return [f"{option} {value:g}" for option, value in ends.items() if value is not None]
-
-
 def _window(data: Columns, context: Context, reading: Reading, notes: list[str]) -> tuple[Columns, Context]:
     if reading.start_s is None and reading.stop_s is None:
         return data, context
@@ -157,20 +151,21 @@ def _window(data: Columns, context: Context, reading: Reading, notes: list[str])
     high = np.inf if reading.stop_s is None else reading.stop_s
     time = data["time_s"]
     keep = np.flatnonzero(~((time < low) | (time > high)))  # a row without a time is not asked away
+    # The times, not an option: options of several names ask for them, and experiment files and Python do.
+    asked = " ".join(
+        [f"from {low:.10g} s on"] * (reading.start_s is not None)
+        + [f"up to {high:.10g} s"] * (reading.stop_s is not None)
+    )
+    there = f"its times run from {np.nanmin(time):.10g} s to {np.nanmax(time):.10g} s."
     if len(keep) < 2:
+        had = "1 row" if len(keep) == 1 else "no row"
         raise DataError(
-            f"{context.file}: {' '.join(_asked(reading))} leaves {len(keep)} of its rows, and a record needs two; its "
-            f"times run from {np.nanmin(time):g} s to {np.nanmax(time):g} s."
+            f"{context.file}: read {asked} as asked, it has {had}, and a record needs two; {there}"
         )
     if len(keep) == len(time):
-        notes.append(
-            f"{' '.join(_asked(reading))} leaves out nothing: its times run from {np.nanmin(time):g} s to "
-            f"{np.nanmax(time):g} s."
-        )
+        notes.append(f"Read {asked} as asked, which leaves out nothing: {there}")
     else:
-        ends = [f"before {low:g} s"] * (reading.start_s is not None)
-        ends += [f"after {high:g} s"] * (reading.stop_s is not None)
-        notes.append(f"{_rows(len(time) - len(keep))} left out as asked, {' and '.join(ends)}.")
+        notes.append(f"{_rows(len(time) - len(keep))} left out: read {asked} as asked.")
     return keep_rows(data, context, keep)
 
 

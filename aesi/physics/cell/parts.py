@@ -95,8 +95,9 @@ class Electrolyte:
     diffusivity_ea_j_mol: float = 0.0
 
 
-MOST_SOH = 1.5
-"""A file may be of an aged cell; beyond this it is of another."""
+LEAST_SOH, MOST_SOH = 0.2, 1.5
+"""Cells are followed to half of their capacity, seldom further: less than a fifth is a slip of the point, and the model
+a shell. A file may be of an aged cell; beyond the other end it is of another. Conventions."""
 
 
 @dataclass(frozen=True)
@@ -194,20 +195,29 @@ class CellParameters:
         return replace(self, electrolyte=replace(self.electrolyte, **changes))
 
     def with_soh(self, soh: float) -> Self:
-        """The cell at a state of health: this share of its capacity left.
+        """The cell at a state of health: this share of its capacity left, see `with_material`.
 
-        Both electrodes lost active material alike, full of its lithium: the stoichiometries of full and empty stay.
-        Raises CellError for a share that is not in (0, `MOST_SOH`].
+        Raises CellError, as `checked_soh` does.
         """
-        if not 0.0 < soh <= MOST_SOH:
-            raise CellError(
-                f"a state of health of {soh:g}: it is the share of the cell file's capacity that the cell had, above 0 "
-                f"and at most {MOST_SOH:g}; 97 % is 0.97."
-            )
+        return self.with_material(checked_soh(soh))
+
+    def with_material(self, share: float) -> Self:
+        """The cell with this share of its active material and of the lithium in it, in both electrodes alike: the
+        stoichiometries of full and empty stay."""
         n, p = self.negative, self.positive
-        return self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * soh).with_positive(
-            c_max_mol_m3=p.c_max_mol_m3 * soh
+        return self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share).with_positive(
+            c_max_mol_m3=p.c_max_mol_m3 * share
         )
+
+
+def checked_soh(soh: float) -> float:
+    """The state of health, a share.  Raises CellError where it is outside [`LEAST_SOH`, `MOST_SOH`]."""
+    if not LEAST_SOH <= soh <= MOST_SOH:
+        raise CellError(
+            f"a state of health of {soh:g}: it is the share of the cell file's capacity that the cell had, from "
+            f"{LEAST_SOH:g} to {MOST_SOH:g}; 97 % is 0.97."
+        )
+    return soh
 
 
 def require_positive(what: str, **values: float) -> None:

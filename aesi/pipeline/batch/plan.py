@@ -15,7 +15,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TextIO
 
-from aesi.errors import InputError
+from aesi.errors import CellError, InputError
+from aesi.physics.cell import checked_soh
 
 CELL_FILES = ("*.bpx.json", "*.json")
 RECORDS = (".csv", ".gz", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax", ".txt")
@@ -26,7 +27,7 @@ COLUMNS = ("name", "data", "cell", "test", "soc0", "soh", "specimen", "at")
 class Job:
     """One cell and its records.
 
-    specimen, at : which physical cell a check-up is of, and when; empty and None where there is one alone.
+    specimen, at : which physical cell a check-up is of, and when; empty and None where it is none.
     soh : share of the cell file's capacity that the cell had in its discovery; None for all of it.
     """
 
@@ -56,13 +57,23 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
     cell : the BPX file (or model folder) of every job that names none.  soh : of every job that names none.
     Raises InputError, one sentence, for what is missing.
     """
+    if soh is not None:
+        checked_soh(soh)
     if not source.exists():
         raise InputError(f"There is no folder or table {source}.")
+    if cell is not None and not cell.exists():
+        raise InputError(f"There is no cell file {cell}, which is to be that of every job that names none.")
     jobs = _of_folder(source, cell) if source.is_dir() else _of_table(source, cell)
     names = [job.name for job in jobs]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise InputError(f"{source}: two rows are named {twice!r}; names tell the folders of results apart.")
+    visits = [(job.specimen, job.at) for job in jobs if job.specimen]
+    again = next((visit for visit in visits if visits.count(visit) > 1), None)
+    if again is not None:
+        raise InputError(
+            f"{source}: two check-ups of {again[0]!r} are at {again[1]:g}; several files of one are separated by ;"
+        )
     outside = next((name for name in names if Path(name).name != name or name.startswith(".")), None)
     if outside is not None:
         raise InputError(
@@ -160,6 +171,13 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
             )
         return value
 
+    def health(column: str) -> float | None:
+        value = number(column)
+        try:
+            return None if value is None else checked_soh(value)
+        except CellError as error:
+            raise InputError(f"{table}, line {line}: {column}: {error}") from None
+
     own = files("cell")
     if not own and cell is None:
         raise InputError(
@@ -171,7 +189,12 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
     missing = [path for path in (*own, *data, *files("test")) if not path.exists()]
     if missing:
         raise InputError(f"{table}, line {line}: there is no file {missing[0]}.")
-    specimen = (row.get("specimen") or "").strip()
+    specimen, at = (row.get("specimen") or "").strip(), number("at")
+    if bool(specimen) != (at is not None):
+        raise InputError(
+            f"{table}, line {line}: a check-up has a specimen and an at, and {name!r} has one of the two; give both, "
+            "or neither."
+        )
     return Job(
         name,
         own[0] if own else cell or Path(),
@@ -179,6 +202,6 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
         files("test"),
         share("soc0"),
         specimen,
-        number("at"),
-        number("soh"),
+        at,
+        health("soh"),
     )

@@ -46,6 +46,7 @@ class Case:
     only, without : ids of the effects that are tried, or are not; all where neither names one.
     model : "espm" or "dfn" for every hypothesis; None: that of a saved porous electrode, else what the data ask for.
     holdout : last share of each record that is kept back where there are no tests; None takes `HOLDOUT`.
+    max_effects : most that are added; it is said where this is less than usual.
     soh : share of the cell's capacity that it had then; None takes all of it.
     good : records of the same cell that are known to be good.
     """
@@ -88,8 +89,12 @@ class Case:
             ", ".join(name.strip() for names in given for name in names.split(","))
             for given in (self.only, self.without)
         )
+        few = "1 effect is" if self.max_effects == 1 else f"{self.max_effects} effects are"
         said = {
             "no effect is tried (at most 0 are added), so that none can be found.": self.max_effects == 0,
+            f"at most {few} added, as asked; what more effects explain together is not looked for.": (
+                0 < self.max_effects < Case.max_effects
+            ),
             f"tried alone: {only}; nothing is said about other effects.": bool(only and self.max_effects),
             f"not tried: {without}.": bool(without and self.max_effects),
             f"test records are given, so that the holdout of {self.holdout or 0.0:g} is not used: all rows of the data "

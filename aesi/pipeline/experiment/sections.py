@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator, model_validator
 
 from aesi.data.reading import Reading
 from aesi.physics import ModelName
+from aesi.physics.cell import checked_soh
 from aesi.records import Hold
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -151,7 +152,7 @@ class CellConfig(Section):
 
     bpx: str = "catalogue"
     soc0: Annotated[float, Field(ge=0, le=1)] | None = None
-    soh: Positive | None = None
+    soh: Annotated[float, AfterValidator(checked_soh)] | None = None
     model: ModelName | None = None
     effects: dict[str, dict[str, float]] = {}
     effect_files: tuple[str, ...] = ()

@@ -30,6 +30,11 @@ COLUMNS = {
     "seconds": "fit and evaluation, s",
 }
 """MLflow's name of a metric -> heading; a column is shown where a run has it, in mV where it is tracked in V."""
+MSER = "MSER: by how much it lowers the mean squared error of the declared model, and of that model recalibrated."
+RANGES = (
+    "Ranges below a figure: 90 % over resampled blocks of 60 s of the test records; they say how much the test itself "
+    "scatters, not how much another seed would."
+)
 MOST_COLUMNS = 40
 """Of runs side by side; more are summed up in one column."""
 
@@ -135,21 +140,23 @@ def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
 
 def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
     names = [name for name in COLUMNS if any(name in run.metrics for run in runs)]
-    return PageTable(
-        "metrics",
-        "What came of it",
-        "Of each run's chosen model, on its test records. MSER: by how much it lowers the mean squared error of the "
-        "declared model, and of the declared model recalibrated. A click on a heading sorts.",
-        ("run", "model", *(COLUMNS[name] for name in names)),
-        tuple(
-            (
-                ComparedCell(run.label),
-                ComparedCell(run.chosen or ABSENT),
-                *(_figure(run, n) for n in names),
-            )
-            for run in runs
-        ),
+    chosen = ("model",) if any(run.chosen for run in runs) else ()
+    rows = tuple(
+        (
+            ComparedCell(run.label),
+            *(ComparedCell(run.chosen or ABSENT) for _ in chosen),
+            *(_figure(run, name) for name in names),
+        )
+        for run in runs
     )
+    captions = ["On test records, of the model that a run chose." if chosen else "On test records."]
+    if any("_mser_" in name for name in names):
+        captions.append(MSER)
+    if any(cell.range for row in rows for cell in row):
+        captions.append(RANGES)
+    captions.append("A click on a heading sorts.")
+    header = ("run", *chosen, *(COLUMNS[name] for name in names))
+    return PageTable("metrics", "What came of it", " ".join(captions), header, rows)
 
 
 def _figure(run: ComparedRun, name: str) -> ComparedCell:

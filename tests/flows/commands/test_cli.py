@@ -1,5 +1,6 @@
 """The command line: exit codes, one sentence an error, and what each command leaves."""
 
+import errno
 import json
 import os
 import subprocess
@@ -116,6 +117,16 @@ def test_a_file_that_is_read_is_never_written_over(call, cell, current, tmp_path
     assert mine[out].read_bytes() == before
 
 
+def test_the_file_beside_an_export_is_never_the_one_that_is_read(call, cell, tmp_path):
+    mine = tmp_path / "mine.bpx.json"
+    mine.write_bytes(Path(cell).read_bytes())
+    code, _, err = call("export", "--cell", mine, "--to", "pybamm", "--out", tmp_path / "mine.py")
+    assert code == 2
+    assert "mine.bpx.json, which is written beside it, is a file that is read, and would be lost" in err
+    assert mine.read_bytes() == Path(cell).read_bytes()
+    assert not (tmp_path / "mine.py").exists()
+
+
 @pytest.mark.parametrize(
     ("command", "out"),
     [
@@ -140,41 +151,58 @@ def test_a_model_that_is_read_was_written_over(call, cell, tmp_path, command, ou
         ("simulate", "folder", "is a folder; name the file to write"),
         ("calibrate", "folder", "is a folder; name the file to write"),
         ("discover", "file", "is a file; name a folder"),
-        ("discover", "file/below", "is a file, not a folder"),
+        ("discover", "file/below", "file: Not a directory); name another place"),
+        ("simulate", "closed/run.csv", "closed: Permission denied); name another place"),
+        ("calibrate", "closed/new/cell.json", "closed: Permission denied); name another place"),
+        ("discover", "closed", "closed: Permission denied); name another place"),
+        ("calibrate", "there.json", "there.json is there and may not be written over"),
     ],
 )
 def test_what_cannot_be_written_is_told_before_anything_is_computed(
-    call, cell, current, tmp_path, command, made, words
+    call, cell, current, tmp_path, monkeypatch, command, made, words
 ):
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "file").write_text("kept")
+    for name in ("folder", "closed"):
+        (tmp_path / name).mkdir()
+    for name in ("file", "there.json"):
+        (tmp_path / name).write_text("kept")
+    opened, closed = os.open, tmp_path / "closed"
+
+    def refusing(path, *how, **more):
+        if (
+            closed in Path(path).parents
+        ):  # whatever its mode says: a superuser and a server's disk do not go by it
+            raise PermissionError(13, "Permission denied", str(path))
+        return opened(path, *how, **more)
+
+    monkeypatch.setattr(os, "open", refusing)
+    there = tmp_path / "there.json"
+    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and Path(path) == there))
+    before = sorted(tmp_path.rglob("*"))
     read = "--current" if command == "simulate" else "--data"
     code, _, err = call(command, "--cell", cell, read, current, "--out", tmp_path / made)
     assert code == 2
     assert words in err
     assert err.startswith("aesi: ")  # not even the line that it is reading
-    assert (tmp_path / "file").read_text() == "kept"
+    assert sorted(tmp_path.rglob("*")) == before
+    assert (tmp_path / "file").read_text() == there.read_text() == "kept"
 
 
-@pytest.mark.parametrize("made", ["closed/out.json", "closed", "there.json"])
-def test_a_place_that_may_not_be_written_to_is_told_before_anything_is_computed(
-    call, cell, current, tmp_path, monkeypatch, made
-):
-    (tmp_path / "closed").mkdir()
-    (tmp_path / "there.json").write_text("kept")
-    closed = {tmp_path / "closed", tmp_path / "there.json"}
-    monkeypatch.setattr(os, "access", lambda path, mode: not (mode & os.W_OK and Path(path) in closed))
-    command = "discover" if made == "closed" else "calibrate"
-    code, _, err = call(command, "--cell", cell, "--data", current, "--out", tmp_path / made)
+@pytest.mark.parametrize("out", ["cells", "cells/found"])
+def test_results_of_a_batch_were_read_as_a_cell_the_next_time(call, tmp_path, out):
+    (tmp_path / "cells" / "a").mkdir(parents=True)
+    code, _, err = call("batch", "cells", "--cell", LG_M50, "--out", out)
     assert code == 2
-    assert "may not be written" in err
-    assert err.startswith("aesi: ")
-    assert (tmp_path / "there.json").read_text() == "kept"
+    assert (
+        err
+        == f"aesi: --out {out} lies in cells, whose subfolders are read as cells; name a folder beside it.\n"
+    )
+    assert not (tmp_path / "cells" / "found").exists()
 
 
-def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path):
+@pytest.mark.parametrize("why", [errno.EACCES, errno.EPERM, errno.EROFS])
+def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path, why):
     def refused(*_):
-        raise PermissionError(13, "Permission denied", str(tmp_path / ".aesi"))
+        raise OSError(why, os.strerror(why), str(tmp_path / ".aesi"))
 
     monkeypatch.setenv("AESI_HOME", str(tmp_path))
     monkeypatch.setattr("aesi.physics.effects.known_effects", refused)

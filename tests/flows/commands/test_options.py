@@ -52,6 +52,7 @@ def test_a_file_is_meant_by_its_path_its_name_or_its_record_s(files, said):
         ),
         (["W8_0.5C=10", "W8_0.5C.csv=20"], "is there twice for W8_0.5C"),
         (["W8_0.5C"], "has to read FILE=NUMBER"),
+        (["W8_0.5C=nan"], "--temperature W8_0.5C=nan: has to read FILE=NUMBER"),
     ],
 )
 def test_a_file_that_is_not_clear_is_asked_about(files, pairs, words):

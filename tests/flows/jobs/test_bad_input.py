@@ -38,6 +38,17 @@ def test_an_invalid_data_file_leaves_no_failed_run(tracked):
     assert records("refused") == []
 
 
+def test_an_address_that_is_none_is_refused_before_the_data_are_read(workspace):
+    from flows.jobs.start import start
+
+    path = workspace / "refused.yaml"
+    path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
+    for name in ("bad", "good"):
+        (workspace / f"{name}.csv").write_text("never read")
+    with pytest.raises(InputError, match=r"runner\.storage is no database that can be used"):
+        start(path, ["runner.storage=blah"], use_prefect=False)
+
+
 def test_data_too_few_for_the_library_leave_no_folder_nor_a_word_of_a_run(tracked, capsys):
     from flows.jobs.start import start
 

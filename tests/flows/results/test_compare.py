@@ -23,6 +23,7 @@ def run_of(number, **settings):
         settings={"seed": str(number), "data.dt_s": "1.0", **settings},
         metrics={
             "free_run/test_rmse_mv": 2.0 + number,
+            "free_run/test_mser_pct": 50.0,
             "one_step/test_rmse_mv": 0.5,
             "intervals/coverage_pct": 90.5,
         },
@@ -79,6 +80,19 @@ def test_a_discovery_shows_its_verdict_and_parameters(tmp_path):
     html = write_comparison(tmp_path / "page.html", runs).read_text()
     assert "series_resistance.resistance_ohm" in html
     assert "0.0014 to 0.0016" in html
+
+
+def test_the_page_explains_what_is_on_it(tmp_path):
+    found = {"verdict": "unknown", "effects": [], "candidates": []}
+    metrics = {"before/test_rmse_mv": 25.6, "after/test_rmse_mv": 6.2}
+    runs = [
+        ComparedRun(f"{k:032x}", "trace", "discover", "now", {}, metrics, discovery=found) for k in (1, 2)
+    ]
+    html = write_comparison(tmp_path / "page.html", runs).read_text()
+    assert "with the finding, test, mV" in html
+    for word in ("MSER", "Ranges below", '<th scope="col">model</th>'):
+        assert word not in html
+        assert word in write_comparison(tmp_path / "runs.html", [run_of(1), run_of(2)]).read_text()
 
 
 def test_tracked_runs_are_found_by_the_beginning_of_their_id(finished, tmp_path):

@@ -71,6 +71,15 @@ def test_records_without_a_date_differ_from_the_file_alone():
     assert ageing.sentences == ()
 
 
+def test_a_record_of_years_before_the_file_s_state_ended_the_fit(start, records):
+    dates = {"at_25": date(2015, 3, 11), "at_0": DAYS["june"]}
+    model = problem(start, records, Conditions(dates=dates))[0]
+    x = np.zeros(model.layout.size)
+    x[model.layout.ages] = model.high[model.layout.ages]
+    assert model.material(0, x) > 2.0  # it had lost half since, at the end of the box
+    assert np.isfinite(model.residual(x)).all()
+
+
 def test_a_date_of_no_record_is_refused():
     with pytest.raises(DataError, match="there is no such record"):
         of(["march"], {"elsewhere": DAYS["march"]})

@@ -183,9 +183,31 @@ def test_a_gap_is_refused_with_both_ways_out(tmp_path):
     assert len(read_measurement(written(tmp_path, content), start_s=149)) == N - 149
 
 
+def test_the_time_of_a_step_was_proposed_beside_that_of_the_test(tmp_path):
+    table = text(header="Time,I[A],U[V]").splitlines()
+    total = [f"{row},{cell}" for row, cell in zip(table, ["Total Time (h)", *TIME / 3600], strict=True)]
+    assert '--column time_s="Total Time (h)" --unit time_s=h' in refusal(tmp_path, "\n".join(total))
+
+
 def test_a_part_that_is_the_whole_file_was_taken_without_a_word(tmp_path):
     notes = read_measurement(written(tmp_path, text()), stop_s=99_999).notes
-    assert any("--to-s 99999 leaves out nothing: its times run from 0 s to 199 s." in note for note in notes)
+    said = "Read up to 99999 s as asked, which leaves out nothing: its times run from 0 s to 199 s."
+    assert any(said in note for note in notes)
+
+
+def test_a_part_without_rows_named_an_option_that_nobody_had_given(tmp_path):
+    message = refusal(tmp_path, text(), start_s=300.0, stop_s=400.0)
+    assert message == (
+        "drive.csv: read from 300 s on up to 400 s as asked, it has no row, and a record needs two; its times run from "
+        "0 s to 199 s."
+    )
+
+
+@pytest.mark.parametrize(
+    "end", [{"start_s": float("nan")}, {"stop_s": float("nan")}, {"stop_s": float("inf")}]
+)
+def test_a_time_that_is_none_was_taken_for_the_whole_record(tmp_path, end):
+    assert "give a time in seconds" in refusal(tmp_path, text(), **end)
 
 
 def test_a_sparsely_logged_rest_is_no_gap_but_a_note(tmp_path):

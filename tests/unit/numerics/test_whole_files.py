@@ -1,12 +1,14 @@
 """A file is there whole or not at all, for everybody who may read it."""
 
 import os
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
-from aesi.numerics.files.whole import READ_BY_OWNER, write_whole
+from aesi.numerics.files.whole import READ_BY_OWNER, check_writable, write_whole
 
 
 def test_text_and_bytes_are_written_into_a_folder_that_is_made(tmp_path):
@@ -61,3 +63,29 @@ def test_a_pipe_is_written_to_and_stays_one(tmp_path):
     reader.join(10)
     assert read == ["rows"]
     assert pipe.is_fifo()
+
+
+@pytest.mark.skipif(not Path("/dev/stdout").exists(), reason="this system has no /dev/stdout")
+def test_a_pipe_behind_dev_stdout_had_no_name_to_write_to():
+    code = "from pathlib import Path; from aesi.numerics.files.whole import write_whole; "
+    command = [sys.executable, "-c", code + "write_whole(Path('/dev/stdout'), 'a')"]
+    root = Path(__file__).resolve().parents[3]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, timeout=60, check=False)
+    assert done.stdout == "a", done.stderr
+
+
+def test_a_place_is_tried_and_left_as_it_was(tmp_path):
+    check_writable(tmp_path / "new" / "below" / "x.csv")
+    assert list(tmp_path.iterdir()) == []
+    (tmp_path / "file").write_text("")
+    with pytest.raises(NotADirectoryError) as refused:
+        check_writable(tmp_path / "file" / "below" / "x.csv")
+    assert refused.value.filename == str(tmp_path / "file")
+
+
+def test_a_link_into_a_folder_that_is_not_there_cannot_be_written_to(tmp_path):
+    link = tmp_path / "link.csv"
+    link.symlink_to(tmp_path / "away" / "there.csv")
+    for write in (check_writable, lambda path: write_whole(path, "x")):
+        with pytest.raises(FileNotFoundError):
+            write(link)

@@ -348,7 +348,7 @@ def test_a_state_of_health_takes_capacity_and_leaves_the_rest_voltages(lg_m50):
     assert lg_m50.with_soh(1.0) == lg_m50
 
 
-@pytest.mark.parametrize("soh", [0.0, -0.1, 97.0, float("nan")])
+@pytest.mark.parametrize("soh", [0.0, -0.1, 0.001, 97.0, float("nan")])
 def test_a_state_of_health_that_is_no_share_is_refused(lg_m50, soh):
     with pytest.raises(CellError, match="share of the cell file"):
         lg_m50.with_soh(soh)

@@ -61,6 +61,8 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
     assert (old.soh, new.soh) == (0.8, 0.95)
     assert old.key("") != read_plan(table, CELL, 0.95)[1].key("")
     assert [job.soh for job in read_plan(table, CELL)] == [0.8, None]
+    with pytest.raises(InputError, match="a state of health of 95"):
+        read_plan(table, CELL, 95.0)  # at once, not cell by cell
 
 
 @pytest.mark.parametrize(
@@ -72,6 +74,13 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
         ("name,data\na,s.csv\na,s.csv\n", "named 'a'"),
         ("name,data,at\na,s.csv,old\n", "is no number"),
         ("name,data,soc0\na,s.csv,90\n", "line 2: soc0 = 90: a state of charge is a share"),
+        ("name,data,soh\na,s.csv,80\n", "line 2: soh: a state of health of 80: it is the share"),
+        ("name,data,specimen,at\na,s.csv,one,\n", "line 2: a check-up has a specimen and an at"),
+        ("name,data,at\na,s.csv,3\n", "line 2: a check-up has a specimen and an at"),
+        (
+            "name,data,specimen,at\na,s.csv,one,3\nb,s.csv,one,3.0\n",
+            "two check-ups of 'one' are at 3; several",
+        ),
         ("name,data\n,s.csv\n", "have to be given"),
         ("name,data\n../a,s.csv\n", "without slashes"),
         ("name,data\n..,s.csv\n", "starts with no dot"),
@@ -83,6 +92,12 @@ def test_a_table_that_cannot_be_used_is_one_sentence(tmp_path, content, words):
     table.write_text(content)
     with pytest.raises(InputError, match=words):
         read_plan(table, CELL)
+
+
+def test_a_cell_file_that_is_not_there_is_told_once_not_job_by_job(tmp_path):
+    touched(tmp_path / "a" / "1.csv")
+    with pytest.raises(InputError, match=r"There is no cell file nowhere\.json"):
+        read_plan(tmp_path, Path("nowhere.json"))
 
 
 def test_a_job_that_cannot_be_done_is_a_row_with_its_reason(tmp_path):

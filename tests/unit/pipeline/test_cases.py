@@ -85,6 +85,9 @@ def test_effects_of_the_cell_and_files_with_effects_were_passed_over_in_silence(
 def test_what_was_not_tried_is_said_so_that_no_verdict_is_read_as_one_about_it(tmp_path):
     record = write_record(tmp_path)
     assert case_of_files(BPX, [record]).restrictions == ()
+    assert case_of_files(BPX, [record], max_effects=1).restrictions == (
+        "at most 1 effect is added, as asked; what more effects explain together is not looked for.",
+    )
     alone = case_of_files(BPX, [record], only=["film_growth, clock_skew"], without=["series_resistance"])
     assert alone.restrictions == (
         "tried alone: film_growth, clock_skew; nothing is said about other effects.",

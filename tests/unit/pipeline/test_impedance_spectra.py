@@ -8,7 +8,7 @@ import pytest
 import aesi
 from aesi.errors import DataError
 from aesi.physics.effects import activated
-from aesi.pipeline.impedance import held_against, impedance_file
+from aesi.pipeline.impedance import held_against, impedance_file, read_frequencies
 from aesi.records import Spectrum
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -79,3 +79,13 @@ def test_a_shift_of_the_temperature_was_left_out_of_an_impedance_without_a_word(
     cell = CELLS / "nmc_30ah.bpx.json"
     impedance_file(cell, 0.5, "1:10:4", tmp_path / "z.csv", effects=effects, say_notes=said.extend)
     assert "ambient_temperature: not in the impedance, which is at the temperature that is given." in said
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"), [("1\n-3\n", "row 2: frequency_hz is -3"), ("", "no row below its header")]
+)
+def test_a_frequency_that_is_none_was_refused_without_its_file_and_row(tmp_path, rows, words):
+    path = tmp_path / "f.csv"
+    path.write_text(f"frequency_hz\n{rows}")
+    with pytest.raises(DataError, match=f"f.csv, {words}; give positive numbers in Hz"):
+        read_frequencies(str(path))

@@ -1,0 +1,71 @@
+"""`aesi ui` and the commands that read a store: what is not there is told, and never made."""
+
+import errno
+import os
+import socket
+
+import pytest
+
+from aesi.errors import InputError
+from flows.results import ui
+from flows.tracking.store import Store
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("compare", "smoke"),
+        ("tables", "smoke"),
+        ("candidate", "0123abcd", "--out", "c"),
+        ("ui", "--port", "5599", "--uri", "sqlite:///typo.db"),
+        ("compare", "smoke", "--uri", "sqlite:///typo.db"),
+        ("ui", "--optuna", "--storage", "sqlite:///typo.db"),
+    ],
+    ids=" ".join,
+)
+def test_a_store_that_is_only_read_was_made_where_it_was_not(call, workspace, command):
+    code, _, err = call(*command)
+    assert code == 2
+    assert "there is no" in err
+    assert not list(workspace.glob("*.db"))
+
+
+def test_a_store_where_nothing_may_be_written_asks_to_be_copied(tracked, monkeypatch):
+    opened = os.open
+
+    def refusing(path, *how, **more):
+        if str(path).endswith(".tmp"):
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(path))
+        return opened(path, *how, **more)
+
+    monkeypatch.setattr(os, "open", refusing)
+    with pytest.raises(InputError, match=r"Read-only file system.*copy it with its artifacts"):
+        Store.to_read()
+
+
+@pytest.mark.parametrize(
+    ("storage", "words"),
+    [
+        ("no address", "Could not parse SQLAlchemy URL"),
+        ("sqlite:///text.db", "file is not a database"),
+        ("postgresql://me:secret@127.0.0.1:1/x", "postgresql://127.0.0.1:1/x"),
+    ],
+)
+def test_a_storage_without_searches_was_an_unexpected_error(call, workspace, storage, words):
+    (workspace / "text.db").write_text("no database, " * 100)
+    code, out, err = call("ui", "--optuna", "--storage", storage)
+    assert (code, out) == (2, "")
+    assert words in err
+    assert "secret" not in err
+    assert err.count("\n") == 1
+
+
+def test_a_host_that_is_not_here_was_told_as_a_port_that_is_taken():
+    with pytest.raises(InputError, match=r"nothing can be served at 192\.0\.2\.1, port 5599"):
+        ui.serve_flows(5599, "192.0.2.1")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        with pytest.raises(InputError, match=f"port {port} on 127.0.0.1 is taken"):
+            ui.serve_flows(port, "127.0.0.1")
