@@ -143,12 +143,19 @@ def voltage_window_v(bpx: Path) -> tuple[float, float]:
     return _declared(bpx, "Lower voltage cut-off [V]"), _declared(bpx, "Upper voltage cut-off [V]")
 
 
-def _declared(bpx: Path, name: str) -> float:
+def stoichiometry_span(bpx: Path, electrode: str) -> float:
+    """Between the limits that a BPX file states of "Negative electrode" or "Positive electrode". Raises DataError where
+    they cannot be read."""
+    low, high = (_declared(bpx, f"{end} stoichiometry", electrode) for end in ("Minimum", "Maximum"))
+    return high - low
+
+
+def _declared(bpx: Path, name: str, part: str = "Cell") -> float:
     import json
 
     try:
         content = json.loads(bpx.read_text(encoding="utf-8"))
-        return float(content["Parameterisation"]["Cell"][name])
+        return float(content["Parameterisation"][part][name])
     except OSError as error:
         raise DataError(f"The cell file {bpx} cannot be opened: {error.strerror}.") from None
     except (ValueError, KeyError, TypeError) as error:

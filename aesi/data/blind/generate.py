@@ -92,7 +92,9 @@ def generate(spec: CaseSpec, cells: Mapping[str, Path]) -> BlindCase:
     spec, known = bench.spec, list(sizes)
     strange = [name for name in spec.recipes if name in STRANGERS]
     truth = {f"own.{a.change}.{k}": v for a in bench.own for k, v in a.values.items()}
-    truth.update({f"{RECIPES[n].label}.{k}": v for n, values in sizes.items() for k, v in values.items()})
+    for name, values in sizes.items():
+        as_named = RECIPES[name].as_named(values, bench.declared)
+        truth.update({f"{RECIPES[name].label}.{key}": value for key, value in as_named.items()})
     between = max((RECIPES[name].between for name in known), default=1)
     traces = _changed(bench, sizes, between)
     for name in strange:

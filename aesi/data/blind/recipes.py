@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from aesi.data.blind.cells import CELLS
 from aesi.data.blind.spread import BEYOND, SPREADS
 from aesi.data.laboratory.change import Values
 from aesi.data.laboratory.simulator import Applied
+from aesi.data.virtual import stoichiometry_span
 from aesi.numerics.typing import Array
 
 
@@ -53,6 +55,7 @@ class Recipe:
     no column then gives away.
     radial_points : of the two runs whose difference counts; their mesh error cancels.
     between : the instrument reads between rows: so many of the cell are made for each of its own.
+    as_named : the values as the parameters of those names in the package count them, by the declared cell file.
     """
 
     label: str
@@ -69,11 +72,22 @@ class Recipe:
     warm: bool = False
     radial_points: int | None = None
     between: int = 1
+    as_named: Callable[[Values, Path], Values] = lambda values, declared: values
 
 
 def _beyond(parameter: str, base: float) -> float:
     """Magnitude m at which base**-m is outside what parametrisations of one cell differ by."""
     return BEYOND * SPREADS[parameter] / math.log(base)
+
+
+def _over_windows(values: Values, declared: Path) -> Values:
+    """Slopes of a diffusivity over the whole stoichiometry window of an electrode, which the laboratory has per unit of
+    stoichiometry."""
+    electrodes = {"negative_slope": "Negative electrode", "positive_slope": "Positive electrode"}
+    return {
+        name: value * stoichiometry_span(declared, electrodes[name]) if name in electrodes else value
+        for name, value in values.items()
+    }
 
 
 def _algebraic() -> Applied:
@@ -167,6 +181,7 @@ RECIPES: dict[str, Recipe] = {
         "concentration_dependent_diffusivity",
         lambda m, q, s: {"negative_slope": -3.0 * m, "centre_soc": 0.5},
         "concentration_dependent_diffusivity",
+        as_named=_over_windows,
         also=("solid_diffusivity",),
         most=3.0,
     ),
@@ -174,6 +189,7 @@ RECIPES: dict[str, Recipe] = {
         "concentration_dependent_diffusivity",
         lambda m, q, s: {"positive_slope": 5.0 * m, "centre_soc": 0.5},
         "concentration_dependent_diffusivity",
+        as_named=_over_windows,
         also=("solid_diffusivity",),
         most=3.0,
     ),

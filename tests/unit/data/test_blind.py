@@ -12,6 +12,9 @@ from aesi.data.blind.spread import DIFFERENCES, SPREADS, parametrisation, publis
 from aesi.data.blind.strangers import STRANGERS
 from aesi.data.laboratory.simulator import TrueRun
 from aesi.errors import DataError
+from aesi.physics import Cell
+from aesi.physics.effects import CATALOGUE
+from aesi.physics.model import EspmModel
 
 LABELS = {
     "self_heating",
@@ -236,3 +239,15 @@ def test_the_generator_does_not_load_the_finder():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_label_of_a_slope_counts_it_over_the_window_as_the_effect_does(cells):
+    declared = cells_in(cells)["nmc"]
+    cell = Cell.from_bpx(declared)
+    values = {"positive_slope": 5.0, "centre_soc": 0.5}
+    slope = RECIPES["positive_sloped_diffusivity"].as_named(values, declared)["positive_slope"]
+    varied = CATALOGUE["concentration_dependent_diffusivity"].activate_only(positive_slope=slope)
+    positive = varied.effect.on_model(EspmModel(cell), **varied.parameters).cell.positive
+    x = np.array([positive.theta_min, positive.theta_max])
+    added = np.log(positive.diffusivity(x)) - np.log(cell.positive.diffusivity(x))
+    assert np.diff(added) == pytest.approx(5.0 * np.diff(x))
