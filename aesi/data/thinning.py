@@ -7,7 +7,7 @@ keep rows that are dense after each step of the current and ever sparser with th
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import cast
+from typing import Protocol, cast
 
 import numpy as np
 
@@ -44,6 +44,16 @@ def _steady(data: Measurement, steps: BoolArray) -> bool:
     return uneven or float(np.mean(steps)) < STEADY_SHARE
 
 
+class Averages(Protocol):
+    """Which rows of a finer record one row stands for."""
+
+    def averages(self, column: Array) -> Array:
+        """(m,) of a column (n,)."""
+
+    def record(self, time_s: Array, current_a: Array) -> tuple[Array, Array]:
+        """(m,) s, A of a time and a current (n,)."""
+
+
 @dataclass(frozen=True)
 class Window:
     """Centred averages over `factor` rows, one every `factor` rows; the first row stays as it is."""
@@ -62,12 +72,37 @@ class Window:
         """(m,) the values at the middle of each."""
         return np.concatenate([column[:1], column[self._centres(column)]])
 
+    def record(self, time_s: Array, current_a: Array) -> tuple[Array, Array]:
+        """(m,) s, A of a time and a current (n,)."""
+        return self.centres(time_s), self.averages(current_a)
+
     @property
     def _half(self) -> int:
         return self.factor // 2
 
     def _centres(self, column: Array) -> IntArray:
         return np.arange(self._half, len(column) - self._half, self.factor)
+
+
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Averages over successive rows.
+
+    rows : (m,) how many each stands for.  hold : how the current runs between the rows, then and afterwards.
+    """
+
+    rows: Array
+    hold: Hold
+
+    def averages(self, column: Array) -> Array:
+        """(m,) of a column (n,)."""
+        return means_of_rows(column, self.rows)
+
+    def record(self, time_s: Array, current_a: Array) -> tuple[Array, Array]:
+        """(m,) s, A of a time and a current (n,): one that its logger held since the row before moves the same
+        charge."""
+        time = self.averages(time_s)
+        return time, _held(time_s, current_a, time) if self.hold == "backward" else self.averages(current_a)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +113,7 @@ class Averaged(Measurement):
     """
 
     finer: Measurement = field(kw_only=True)
-    window: Window = field(kw_only=True)
+    window: Averages = field(kw_only=True)
     rows: IntArray = field(kw_only=True)
 
     def take(self, rows: slice | Array) -> Averaged:
@@ -87,7 +122,7 @@ class Averaged(Measurement):
 
     def with_record(self, time_s: Array, current_a: Array) -> Averaged:
         """The averages of another time and current of the finer record."""
-        time, current = self.window.centres(time_s), self.window.averages(current_a)
+        time, current = self.window.record(time_s, current_a)
         return replace(self, time_s=time[self.rows], current_a=current[self.rows])
 
 
@@ -102,21 +137,7 @@ def averaged_over(data: Measurement, step_s: float) -> Measurement:
     factor = round(step_s / float(np.median(np.diff(data.time_s))))
     if factor < 2 or len(data) <= factor:
         return data
-    window = Window(factor)
-    time = window.centres(data.time_s)
-    return Averaged(
-        time,
-        window.averages(data.current_a),
-        window.averages(data.voltage_v),
-        None if data.temperature_degc is None else window.averages(data.temperature_degc),
-        data.name,
-        data.source,
-        data.notes,
-        data.hold,
-        finer=data,
-        window=window,
-        rows=np.arange(len(time)),
-    )
+    return _averaged(data, Window(factor))
 
 
 def condensed(
@@ -151,24 +172,32 @@ def condensed(
     rows = np.diff(np.append(starts, n)).astype(float)
     if len(starts) == n:
         return data, rows
-    time = means_of_rows(t, rows)
-    thin = replace(
-        data,
-        time_s=time,
-        current_a=_held(data, time) if hold == "backward" else means_of_rows(data.current_a, rows),
-        voltage_v=means_of_rows(data.voltage_v, rows),
-        temperature_degc=None
-        if data.temperature_degc is None
-        else means_of_rows(data.temperature_degc, rows),
+    return _averaged(data, Runs(rows, hold)), rows
+
+
+def _averaged(data: Measurement, window: Averages) -> Averaged:
+    time, current = window.record(data.time_s, data.current_a)
+    return Averaged(
+        time,
+        current,
+        window.averages(data.voltage_v),
+        None if data.temperature_degc is None else window.averages(data.temperature_degc),
+        data.name,
+        data.source,
+        data.notes,
+        data.hold,
+        finer=data,
+        window=window,
+        rows=np.arange(len(time)),
     )
-    return thin, rows
 
 
-def _held(data: Measurement, time_s: Array) -> Array:
-    """(m,) A, held since the time before, that moves the charge of a current that was held since the row before."""
-    charge = np.concatenate([[0.0], np.cumsum(data.current_a[1:] * np.diff(data.time_s))])
-    current = np.diff(np.interp(time_s, data.time_s, charge)) / np.diff(time_s)
-    return np.concatenate([data.current_a[:1], current])
+def _held(time_s: Array, current_a: Array, at_s: Array) -> Array:
+    """(m,) A, held since the time before, that moves the charge of a current (n,) that was held since the row
+    before."""
+    charge = np.concatenate([[0.0], np.cumsum(current_a[1:] * np.diff(time_s))])
+    current = np.diff(np.interp(at_s, time_s, charge)) / np.diff(at_s)
+    return np.concatenate([current_a[:1], current])
 
 
 def means_of_rows(column: Array, rows: Array) -> Array:

@@ -16,8 +16,9 @@ def instruments_undone(
 ) -> tuple[Measurement, tuple[ActiveEffect, ...]]:
     """The record that the cell saw behind its instruments, and what the effects do beside that.
 
-    A lag of half a second cannot be told from rows of a second: a jump of the current is spread over them. Records that
-    were not averaged are returned as they are, with all effects.
+    A lag of half a second cannot be told from rows of a second: a jump of the current is spread over them. Nor can one
+    of a tenth from the sparse rows of a pulse, which begin where the current jumps. Records that were not averaged are
+    returned as they are, with all effects.
     """
     acting = [a for a in effects if a.effect.kind == "instrument" and a.effect.on_record is not None]
     if not acting or not isinstance(data, Averaged):

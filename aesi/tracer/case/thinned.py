@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.data.thinning import Averaged, Spacing, averaged_over, condensed, means_of_rows
+from aesi.data.thinning import Averaged, Spacing, averaged_over, condensed
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
@@ -50,8 +50,6 @@ class ThinnedRecord:
 
     def averaged(self, voltage_v: Array) -> Array:
         """(n_thin,) V: another voltage of the whole record (n,) as its own was thinned."""
-        if self.rows is not None:
-            return means_of_rows(voltage_v, self.rows)
         return self.thin.window.averages(voltage_v) if isinstance(self.thin, Averaged) else voltage_v
 
 

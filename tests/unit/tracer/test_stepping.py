@@ -7,6 +7,7 @@ from aesi.data.thinning import condensed
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Measurement
+from aesi.tracer.case.fit_simulation import fit_simulation
 from aesi.tracer.case.stepping import STEPS_A_SAMPLE, stepping
 from aesi.tracer.case.thinned import STEADY_SPACING, thinned_record
 
@@ -58,3 +59,16 @@ def test_pulses_between_whose_rows_the_current_runs_straight_lose_nothing_when_t
     )
     assert thin == pytest.approx(record.averaged(whole), abs=1e-3)
     assert np.sqrt(np.mean((thin - record.averaged(whole)) ** 2)) < 1e-4
+
+
+def test_a_lag_of_a_tenth_of_a_second_is_what_it_was_in_the_rows_that_a_pulse_is_averaged_over(cell):
+    time = np.arange(0.0, 1_200.0, 0.1)
+    current = np.where((time % 400.0) > 350.0, cell.nominal_capacity_ah, 0.0)
+    lag = CATALOGUE["clock_skew"].activate(lag_s=0.125)
+    read = simulate(cell, time, current, 0.8, [lag], hold="linear").voltage_v
+    record = thinned_record(cell, Measurement(time, current, read, name="pulses", hold="linear"))
+    assert len(record.thin) < len(time) / 4
+    run = fit_simulation(cell, record.thin, 0.8, [lag], record.thin_hold)
+    without = fit_simulation(cell, record.thin, 0.8, [], record.thin_hold)
+    assert np.abs(without.voltage_v - record.thin.voltage_v).max() > 20e-3
+    assert np.abs(run.voltage_v - record.thin.voltage_v).max() < 2e-3
