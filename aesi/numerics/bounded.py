@@ -9,14 +9,13 @@ Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import count
 from typing import Protocol
 
 import numpy as np
 
 from aesi.numerics.typing import Array
 
-TRIALS = 6
-"""Of a step with slopes taken where it starts, each time with a damping eight times as strong."""
 UPDATED_TRIALS = 2
 """Of a step with slopes brought up to date: where it fails, they may be what is wrong."""
 
@@ -82,15 +81,15 @@ def descend(
         near = _Place(x, residual, slopes)
         here, damping = _followed(model, near, low, high, tolerance, damping, fresh=False)
         x, residual = here.x, here.residual
-    for count in range(rounds):
+    for done in range(rounds):
         taken = model.slopes(x, residual)
         if taken is None:
-            return Minimum(x, _half_square(residual), count, False, x)
+            return Minimum(x, _half_square(residual), done, False, x)
         start = _Place(x, residual, taken)
         here, damping = _followed(model, start, low, high, tolerance, damping, fresh=True)
         x, residual = here.x, here.residual
         if start.cost - here.cost < tolerance:
-            return Minimum(x, here.cost, count + 1, True, start.x)
+            return Minimum(x, here.cost, done + 1, True, start.x)
     return Minimum(x, _half_square(residual), rounds, False, x)
 
 
@@ -123,9 +122,12 @@ def _stepped(
 ) -> tuple[_Place | None, float]:
     """One step that gains, with slopes brought up to date, or None; and the damping for the next one.
 
-    What promises less than the tolerance is tried once, and only with slopes that were taken here.
+    What does not gain is tried again with a damping eight times as strong, until it promises less than the tolerance,
+    which is tried once, and only with slopes that were taken here. Where those are right some step gains, however far
+    the damping had come down before: on a pulse test read 0.125 s late (blind set, seed 31, case 50) six trials left a
+    fit 2,000 nats short at a lag of one row, where the slope has a kink.
     """
-    for trial in range(TRIALS if fresh else UPDATED_TRIALS):
+    for trial in count() if fresh else range(UPDATED_TRIALS):
         step = _step(here, low, high, damping)
         if not step.any():
             return None, damping

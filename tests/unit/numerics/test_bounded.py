@@ -110,3 +110,10 @@ def test_a_minimum_on_the_edge_is_reached_where_the_free_step_cut_off_leads_uphi
     assert found.x == pytest.approx(expected.x, abs=1e-4)
     assert found.cost == pytest.approx(expected.cost, abs=1e-6)
     assert found.converged
+
+
+def test_a_step_that_goes_too_far_is_damped_until_it_gains():
+    # Slopes of a thousandth, as beside a kink: a step goes a thousand times too far.
+    flat = Counted(lambda x: x, lambda x: np.array([[1e-3]]))
+    found = descend(flat, np.array([1.0]), np.array([-9.0]), np.array([9.0]), 20, 1e-9)
+    assert found.cost < 1e-6
