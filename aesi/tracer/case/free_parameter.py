@@ -81,6 +81,11 @@ class FreeParameter:
         """Of x."""
         return self.coordinate(self.low), self.coordinate(self.high)
 
+    @property
+    def start(self) -> float:
+        """Of x, of an effect's parameter: a third of the way to its typical value where it is an amplitude."""
+        return (1.0 / 3.0 if self.amplitude else 1.0) * self.coordinate(self.typical)
+
     def on_bound(self, x: float) -> bool:
         """True where an effect's parameter ended on the bound of what is plausible. Its neutral point is no such bound,
         nor is the end of what can be meant at all (a share of 0 or 1)."""
@@ -181,9 +186,7 @@ def starts(free: Sequence[FreeParameter]) -> list[Array]:
     their typical value and at the quarters of their range."""
     bounds = np.array([one.bounds for one in free])
     shapes = np.array([not one.amplitude for one in free], dtype=bool)
-    first = np.array(
-        [(1.0 / 3.0 if one.amplitude else 1.0) * one.coordinate(one.typical) for one in free], dtype=float
-    )
+    first = np.array([one.start for one in free], dtype=float)
     out = [first]
     for share in (0.25, 0.75) if shapes.any() else ():
         other = first.copy()

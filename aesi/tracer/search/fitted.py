@@ -55,6 +55,22 @@ def fitted_hypothesis(
     return fitter.finished(x)
 
 
+def from_within(
+    problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, archive: Archive
+) -> FittedHypothesis:
+    """A fit that ended on bounds, or, where that says more, one begun with those parameters where they start: two of an
+    effect can hold each other where neither alone would end."""
+    fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
+    name = fit_name(problem, "fit from within", fit.hypothesis)
+    x = archive.get(name, len(fitter.free))
+    if x is None:
+        x0 = [f.start if f.on_bound(float(v)) else v for f, v in zip(fit.free, fit.point.x, strict=True)]
+        x = fitter.descend(np.array(x0), PRIORS[problem.trust].nearest(fit.score.size), FIT_ROUNDS)
+        archive.put(name, x)
+    found = fitter.finished(x)
+    return fit if found is None or found.score.total < fit.score.total else found
+
+
 def _from_the_middle(fitter: HypothesisFitter, prior: SizePrior) -> Array:
     """Coordinates after a descent from the middle of every prior at the median size of the model error, and after one
     more where so much is left within seconds that what the file may be off by would go beyond its bounds to make up for

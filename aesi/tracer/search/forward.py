@@ -18,7 +18,7 @@ from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis
+from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis, from_within
 from aesi.tracer.search.grown import ended, growths_on
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
 from aesi.tracer.search.plausible import alike, most_plausible, plausibility
@@ -195,6 +195,8 @@ def _step(
             report(problem, fit, fit.score.total - best.score.total)
             fitted.append(fit)
     fitted.sort(key=lambda f: -f.score.total)
+    if fitted and fitted[0].at_bounds:
+        fitted[0] = from_within(problem, blocks, fitted[0], archive)
     may = [f for f in fitted if admissible(blocks, best, f, least_nats, competing)]
     admitted = most_plausible(may, competing)
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
