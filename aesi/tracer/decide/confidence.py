@@ -3,8 +3,8 @@
     p = 1 / (1 + exp(-(a + b m)))        m the margin of the verdict, a and b by kind of verdict
 
 `confidence.json` holds a and b with the number of cases behind them; `confidence_cases.jsonl` holds those cases
-(of development: 209 of `aesi bench blind`, seeds 12, 13, 18, 19, 21, 23 to 27 and 30, and 11 of `aesi bench real`; one
-a line with verdict, margin and whether it was right, look-alikes counted as right).
+(of development: 436 of `aesi bench blind`, seeds 12, 13, 18, 19, 21, 23 to 27, 30 and 31, and 11 of `aesi bench real`;
+one a line with verdict, margin and whether it was right, look-alikes counted as right).
 
     python -m aesi.tracer.decide.confidence CASES.jsonl > confidence.json
 
