@@ -86,14 +86,19 @@ class FreeParameter:
         """Of x, of an effect's parameter: a third of the way to its typical value where it is an amplitude."""
         return (1.0 / 3.0 if self.amplitude else 1.0) * self.coordinate(self.typical)
 
+    def ends(self, x: float) -> tuple[bool, bool]:
+        """Is x at its lower bound, and at its upper one?"""
+        low, high = self.bounds
+        return x - low < TINY, high - x < TINY
+
     def on_bound(self, x: float) -> bool:
         """True where an effect's parameter ended on the bound of what is plausible. Its neutral point is no such bound,
         nor is the end of what can be meant at all (a share of 0 or 1)."""
         if self.own or not (self.amplitude or self.log):
             return False
-        low, high = self.bounds
-        below = x - low < TINY and abs(low) > TINY and not self.low_is_limit
-        return below or (high - x < TINY and abs(high) > TINY)
+        (low, high), (lowest, highest) = self.bounds, self.ends(x)
+        below = lowest and abs(low) > TINY and not self.low_is_limit
+        return below or (highest and abs(high) > TINY)
 
 
 def of_effect(effect: str, parameters: Mapping[str, Parameter], capacity_ah: float) -> list[FreeParameter]:

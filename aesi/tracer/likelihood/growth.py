@@ -112,6 +112,7 @@ class EffectGrowth:
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         begin = [one for one in (known, near) if one is not None]
+        self.begins_elsewhere = bool(begin)
         self.starts = begin[:1] or [np.clip(u, self.low, self.high) for u in starts(self.added)]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
@@ -124,8 +125,8 @@ class EffectGrowth:
         self._slopes: dict[bytes, Array] = {}
 
     def from_own_starts(self) -> EffectGrowth:
-        """The same descent from the starts of the effect, wherever another one ended."""
-        return EffectGrowth(self.parent, self.effect, self.size)
+        """The same descent from the starts of the effect, wherever another one ended; itself where it begins there."""
+        return EffectGrowth(self.parent, self.effect, self.size) if self.begins_elsewhere else self
 
     def error_v(self, u: Array) -> Array | None:
         """(n,) V, or None where the model fails."""

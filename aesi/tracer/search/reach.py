@@ -8,7 +8,6 @@ import numpy as np
 
 from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
-from aesi.tracer.case.free_parameter import TINY, FreeParameter
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.growth import EffectGrowth
@@ -48,7 +47,7 @@ def within_reach(
     marks = list(side_by_side(EffectGrowth.marks, growths))
     least_v, grown = least_left_v(base, marks, problem.white_v), list(growths)
     if least_v > reach_v:
-        at_end = {f.owner for f, x in zip(base.free, base.point.x, strict=True) if f.own and _at_end(f, x)}
+        at_end = {f.owner for f, x in zip(base.free, base.point.x, strict=True) if f.own and any(f.ends(x))}
         grown = [one.from_own_starts() if one.effect in at_end else one for one in growths]
         anew = [one for one in grown if one.effect in at_end]
         list(ended(anew, archive))
@@ -56,11 +55,6 @@ def within_reach(
         least_v = least_left_v(base, marks, problem.white_v)
     archive.put(key, np.array([least_v]))
     return least_v, grown
-
-
-def _at_end(free: FreeParameter, x: float) -> bool:
-    low, high = free.bounds
-    return x - low < TINY or high - x < TINY
 
 
 def least_left_v(base: FittedHypothesis, marks_v: Sequence[Array], white_v: Array) -> float:
