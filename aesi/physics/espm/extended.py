@@ -72,6 +72,7 @@ def _memory(particles: Units, salt: Salt, regions: int) -> tuple[Memory, Modes, 
     modes = Modes(
         z=of((units, order)), means=of(units),
         nodes=of(len(particles.at)), force=of(order + 1), force_end=of(order + 1), faster=np.ones(3),
+        near=np.ones(units), largest=np.ones(units),
         keys=np.full(CACHE_SLOTS, -1, dtype=np.int64),
         w=of((CACHE_SLOTS, units, 3, order)), w_e=of((CACHE_SLOTS, 3, salt_order)),
     )  # fmt: skip

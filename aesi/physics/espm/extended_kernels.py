@@ -17,12 +17,14 @@ from aesi.physics.espm.layout import StepEnd
 from aesi.physics.espm.transport_kernels import (
     arrhenius,
     diffuse,
+    follow_diffusivity,
     heated,
     mean_heat,
     observe_salt,
     predict,
     renew_factors,
     renew_weights,
+    solid_forcing,
 )
 
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
@@ -62,10 +64,12 @@ def run_general(  # type: ignore[no-untyped-def]
                 t_weights = renew_factors(
                     t_k, t_weights, cell.energies, cell.reference_k, modes.faster, modes.keys
                 )
+                for u in range(modes.near.shape[0]):
+                    modes.near[u] = follow_diffusivity(modes.largest[u], modes.near[u], modes.keys)
                 slot, missing = slot_of(dt, modes.keys)
                 if missing:
                     renew_weights(
-                        dt, modes.faster, particles.place, particles.rates, electrolyte.rates,
+                        dt, modes.faster, modes.near, particles.place, particles.rates, electrolyte.rates,
                         modes.w[slot], modes.w_e[slot],
                     )  # fmt: skip
                 diffuse(i0 / area, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved)
@@ -120,6 +124,12 @@ def rest_particles(theta0, density, particles, electrolyte, memory, modes, disso
         side = particles.place[u, 0]
         modes.means[u] = theta0[side]
         memory.y[u] = particles.share[u] * density * (1.0 if side == 0 else -1.0)
+        if particles.strength[side] > 0.0:
+            steepest = solid_forcing(
+                modes.means[u], modes.z[u], particles.at, particles.project, particles.psi[side], modes.nodes,
+                modes.force,
+            )  # fmt: skip
+            modes.largest[u] = 1.0 + particles.strength[side] * steepest
 
 
 @njit(inline="always", fastmath=FASTMATH)

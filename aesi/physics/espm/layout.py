@@ -158,6 +158,8 @@ class Modes(NamedTuple):
 
     z, means : (units, modes) and (units,).  nodes, force, force_end : scratch of the variable part.
     faster : (3,) factors of temperature, negative, positive, salt.
+    near, largest : (units,) diffusivity that is stepped exactly, and the largest in the particle, over that of the
+    rates.
     keys, w, w_e : (slots,) nanoseconds of the steps whose weights are kept, (slots, units, 3, modes) those of the
     particles, (slots, 3, salt modes) those of the salt.
     """
@@ -168,6 +170,8 @@ class Modes(NamedTuple):
     force: Array
     force_end: Array
     faster: Array
+    near: Array
+    largest: Array
     keys: IntArray
     w: Array
     w_e: Array

@@ -6,9 +6,13 @@ from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights, wet
+from aesi.physics.espm.tables import CORRECTED_MARGIN
 
 TEMPERATURE_STEP_K = 0.01
 """Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
+FOLLOWED = 2.0
+"""Times the least diffusivity that may be stepped exactly, that the one that is may be: about half of the largest in a
+particle to all of it, where the explicit rest cannot grow and is small."""
 DIFFUSIONS = (0, 1, 4)
 """Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
 
@@ -20,13 +24,14 @@ def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def renew_weights(dt, faster, units, rates, e_rates, w, w_e):  # type: ignore[no-untyped-def]
+def renew_weights(dt, faster, near, units, rates, e_rates, w, w_e):  # type: ignore[no-untyped-def]
     """Decay and input weights of all modes for a step; w : (units, 3, modes), w_e : (3, modes).
 
     faster : factors of temperature on the diffusion of the negative, the positive electrode and the electrolyte.
+    near : (units,) diffusivity that is stepped exactly, over that of the rates.
     """
     for u in range(rates.shape[0]):
-        factor = faster[units[u, 0]]
+        factor = faster[units[u, 0]] * near[u]
         for j in range(rates.shape[1]):
             w[u, 0, j], w[u, 1, j], w[u, 2, j] = step_weights(rates[u, j] * factor, dt)
     for j in range(e_rates.shape[0]):
@@ -74,11 +79,13 @@ def step_electrolyte(  # type: ignore[no-untyped-def]
 
 @njit(inline="always", fastmath=FASTMATH)
 def step_particle(  # type: ignore[no-untyped-def]
-    u, mean, z, u0, u1, dt, faster, particles, w, scratch
+    u, mean, z, u0, u1, dt, faster, near, particles, w, scratch
 ):
-    """Step particle u under a current from u0 to u1; returns its new mean and what a unit of current takes.
+    """Step particle u under a current from u0 to u1; returns its new mean, what a unit of current takes, and the
+    largest diffusivity of its profile over that of the rates.
 
-    faster : factor of temperature on the explicit part, which is predicted, then corrected once.
+    faster : factor of temperature on the explicit part, which is predicted, then corrected once: what the diffusivity
+    is beyond the one that is stepped exactly, `near` times that of the rates.
     """
     side, rates, gains, lump = (
         particles.place[u, 0],
@@ -89,36 +96,47 @@ def step_particle(  # type: ignore[no-untyped-def]
     strength, psi = particles.strength[side] * faster, particles.psi[side]
     at, project = particles.at, particles.project
     nodes, force, force_end = scratch
-    taken = lump * dt
+    taken, largest, exact = lump * dt, near, faster * (near - 1.0)
     force.fill(0.0)
     if strength > 0.0:
         solid_forcing(mean, z, at, project, psi, nodes, force)
+        for j in range(z.shape[0]):
+            force[j + 1] = strength * force[j + 1] - exact * z[j]
     for j in range(z.shape[0]):
         a, b = w[1, j], w[2, j]
-        source = -strength * rates[j] * force[j + 1]
+        source = -rates[j] * force[j + 1]
         z[j] = w[0, j] * z[j] - gains[j] * (a * u0 + b * u1) + (a + b) * source
         taken += gains[j] * (a + b)
     mean -= lump * 0.5 * (u0 + u1) * dt
     if strength > 0.0:
-        solid_forcing(mean, z, at, project, psi, nodes, force_end)
+        largest = 1.0 + particles.strength[side] * solid_forcing(mean, z, at, project, psi, nodes, force_end)
         for j in range(z.shape[0]):
-            z[j] -= w[2, j] * strength * rates[j] * (force_end[j + 1] - force[j + 1])
-    return mean, taken
+            z[j] -= w[2, j] * rates[j] * (strength * force_end[j + 1] - exact * z[j] - force[j + 1])
+    return mean, taken, largest
 
 
 @compiled
 def solid_forcing(mean, z, at, project, psi, nodes, force):  # type: ignore[no-untyped-def]
-    """force[k] : mode k of the integral psi of the diffusivity's variable part, at the profile of (mean, z)."""
+    """force[k] : mode k of the integral psi of the diffusivity's variable part, at the profile of (mean, z).
+
+    Beyond [0, 1] the diffusivity stays what it is at the end.  Returns the largest slope of psi on the profile.
+    """
     for i in range(nodes.shape[0]):
         level = mean
         for j in range(z.shape[0]):
             level += at[i, j + 1] * z[j]
         nodes[i] = level
     force.fill(0.0)
+    steepest, last = -math.inf, psi.shape[0] - 1
     for i in range(nodes.shape[0]):
-        value = lookup(psi, nodes[i])
+        s = nodes[i] * last
+        cell = int(min(max(s, 0.0), last - 1.0))
+        slope = psi[cell + 1] - psi[cell]
+        steepest = max(steepest, slope * last)
+        value = psi[cell] + (s - cell) * slope
         for j in range(force.shape[0]):
             force[j] += project[j, i] * value
+    return steepest
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -180,6 +198,18 @@ def renew_factors(t_k, t_weights, energies, reference_k, faster, keys):  # type:
     return t_k
 
 
+@njit(inline="always", fastmath=FASTMATH)
+def follow_diffusivity(largest, near, keys):  # type: ignore[no-untyped-def]
+    """The diffusivity to be stepped exactly where a profile has at most `largest`, both over that of the rates; it is
+    `near` until it is too far off.  keys : (slots,) of the weights that are kept, which are void where it moves.
+    """
+    wanted = CORRECTED_MARGIN * largest
+    if wanted <= near <= FOLLOWED * wanted:
+        return near
+    keys.fill(-1)
+    return math.sqrt(FOLLOWED) * wanted
+
+
 @compiled
 def diffuse(  # type: ignore[no-untyped-def]
     j0, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved
@@ -196,9 +226,9 @@ def diffuse(  # type: ignore[no-untyped-def]
     for u in range(modes.means.shape[0]):
         side = particles.place[u, 0]
         nominal = particles.share[u] if side == 0 else -particles.share[u]
-        modes.means[u], memory.give[u] = step_particle(
-            u, modes.means[u], modes.z[u], nominal * j0, nominal * j1, dt, modes.faster[side], particles,
-            modes.w[slot, u], scratch,
+        modes.means[u], memory.give[u], modes.largest[u] = step_particle(
+            u, modes.means[u], modes.z[u], nominal * j0, nominal * j1, dt, modes.faster[side], modes.near[u],
+            particles, modes.w[slot, u], scratch,
         )  # fmt: skip
 
 

@@ -206,3 +206,17 @@ def test_a_clipped_simulation_that_ends_in_no_numbers_says_since_when(nmc, load,
         SimulationError, match=f"no solution at {time[20]:g} s: the cell ran out at {time[10]:g} s"
     ):
         simulate(nmc, time, current, soc0=0.9, on_depletion="clip")
+
+
+@pytest.mark.parametrize("slope", [4.0, -4.0])
+@pytest.mark.parametrize("hold", ["backward", "linear"])
+def test_a_steep_diffusivity_is_followed_in_steps_of_a_second(nmc, load, slope, hold):
+    effect, fine = CATALOGUE["concentration_dependent_diffusivity"], CATALOGUE["numerical_error"]
+    steep = effect.activate(
+        positive_slope=slope, negative_slope=-slope, positive_curvature=0.0, negative_curvature=0.0
+    )
+    coarse_v, fine_v = (
+        simulate(nmc, *load, soc0=0.7, effects=effects, hold=hold).voltage_v
+        for effects in ([steep], [steep, fine.activate(refinement=4.0)])
+    )
+    assert 1e3 * np.sqrt(np.mean((coarse_v - fine_v) ** 2)) < 0.1
