@@ -139,6 +139,17 @@ class DatabaseOutcomes:
                 raise InputError(f"runner.storage {where} cannot be used: {reason}.") from None
 
 
+def with_driver(url: str) -> str:
+    """The address of a database as SQLAlchemy takes it, PostgreSQL's with the driver that the `cluster` extra installs.
+
+    SQLAlchemy knows no `postgres://`, and takes `postgresql://` for another driver since its version 2.1.
+    """
+    for scheme in ("postgresql://", "postgres://"):
+        if url.startswith(scheme):
+            return f"postgresql+psycopg2://{url.removeprefix(scheme)}"
+    return url
+
+
 def engine_of(url: str) -> Any:
     """SQLAlchemy's engine for a database; nothing is connected to yet.
 
@@ -146,9 +157,7 @@ def engine_of(url: str) -> Any:
     """
     import sqlalchemy as sa
 
-    for scheme in ("postgresql://", "postgres://"):
-        if url.startswith(scheme):  # the driver that the `cluster` extra installs
-            url = f"postgresql+psycopg2://{url.removeprefix(scheme)}"
+    url = with_driver(url)
     options: dict[str, Any] = {"connect_args": {"timeout": 60}} if url.startswith("sqlite") else {}
     try:
         return sa.create_engine(url, pool_pre_ping=True, **options)

@@ -6,9 +6,10 @@ import threading
 import time
 
 import pytest
+from sqlalchemy.exc import OperationalError
 
 from aesi.errors import InputError
-from flows.evaluation.outcome_database import DatabaseOutcomes
+from flows.evaluation.outcome_database import DatabaseOutcomes, engine_of
 from flows.evaluation.outcome_files import FileOutcomes
 from flows.evaluation.outcome_store import open_outcomes
 
@@ -118,6 +119,16 @@ def test_a_beating_heart_keeps_the_claim(tmp_path, monkeypatch):
     assert not other.claim(KEY)
     owner.close()
     other.close()
+
+
+@pytest.mark.parametrize("address", ["postgresql://127.0.0.1:9/none", "postgres://127.0.0.1:9/none"])
+def test_the_study_in_postgresql_asked_for_another_driver_than_its_candidates(address):
+    from flows.search.published_study import study_storage
+
+    with pytest.raises(OperationalError, match="Connection refused"):
+        engine_of(address).connect()
+    with pytest.raises(OperationalError, match="Connection refused"):
+        study_storage(address)
 
 
 def test_a_database_that_is_not_there_is_one_sentence():
