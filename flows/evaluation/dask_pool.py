@@ -35,20 +35,13 @@ candidates: Dask's default gives it back after each array, and taking it again c
 def connect(address: str | None, workers: int) -> tuple[Any, Any]:
     """A client of the scheduler at an address, or of a new cluster of processes on this machine, and that cluster.
 
-    Raises InputError without Dask, AesiError where the scheduler does not answer.
+    Raises InputError without Dask or for what is no address, AesiError where the scheduler does not answer.
     """
-    try:
-        import dask
-        from distributed import Client, LocalCluster
-    except ImportError as error:
-        raise InputError(
-            f"the runner dask needs Dask, which is not installed ({error}): pip install 'dask[distributed]', "
-            "or use the runner local."
-        ) from None
+    dask, distributed = _libraries()
     cluster = None
     if address is None:
         with dask.config.set(OWN_CLUSTER):
-            cluster = LocalCluster(
+            cluster = distributed.LocalCluster(
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
@@ -56,12 +49,50 @@ def connect(address: str | None, workers: int) -> tuple[Any, Any]:
                 host="127.0.0.1",
                 silence_logs=40,
             )
+    else:
+        _check_form(address)
     try:
-        return Client(cluster or address, timeout=CONNECT_S, set_as_default=False), cluster
+        return distributed.Client(cluster or address, timeout=CONNECT_S, set_as_default=False), cluster
     except (OSError, TimeoutError, ValueError) as error:
         raise AesiError(
             f"the Dask scheduler {address} does not answer ({error}); start it with `dask scheduler`, or "
             "leave out --address for a cluster on this machine."
+        ) from None
+
+
+def check_scheduler(address: str | None) -> None:
+    """Raises as `connect` would, so that it is told before the work that leads there.
+
+    A scheduler that has just been started is waited for; of a cluster on this machine only Dask has to be there.
+    """
+    if address is None:
+        _libraries()
+    else:
+        client, _ = connect(address, workers=0)
+        client.close(timeout=5)
+
+
+def _libraries() -> tuple[Any, Any]:
+    try:
+        import dask
+        import distributed
+    except ImportError as error:
+        raise InputError(
+            f"the runner dask needs Dask, which is not installed ({error}): pip install 'dask[distributed]', "
+            "or use the runner local."
+        ) from None
+    return dask, distributed
+
+
+def _check_form(address: str) -> None:
+    """Dask's own client, given what is no address, keeps the process for half a minute and ends with a traceback."""
+    from distributed.comm.addressing import parse_address, parse_host_port
+
+    try:
+        parse_host_port(parse_address(address)[1])
+    except ValueError as error:
+        raise InputError(
+            f"{address!r} is no address of a Dask scheduler ({error}); give it as tcp://HOST:PORT."
         ) from None
 
 

@@ -18,6 +18,7 @@ from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.folder_lock import alone_in
 from flows.base.interrupt import kept_on_interrupt
+from flows.evaluation.dask_pool import check_scheduler
 from flows.evaluation.spread import in_processes, on_dask
 from flows.jobs.run_session import tracked_job
 
@@ -48,6 +49,8 @@ def batch(
     started = time.monotonic()
     settings = settings or Settings()
     jobs = read_plan(source, cell, soh)
+    if runner == "dask":
+        check_scheduler(address)
     cells = "1 cell" if len(jobs) == 1 else f"{len(jobs)} cells, {workers} at a time,"
     console.say(f"{cells} from {source}; results in {out}")
     if empty := without_records(source):

@@ -39,14 +39,13 @@ def start(
     """Run an experiment; the folder of its results. Raises AesiError where it cannot be done."""
     environment.prepare_process()
     from aesi.pipeline.experiment.sources import check_roles, check_there
-    from flows.evaluation.outcome_database import engine_of
+    from flows.evaluation.in_reach import check_in_reach
 
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache, use_prefect)
     config = request.config()  # bad input is refused before anything is started
     check_roles(config)
     check_there(config)
-    if config.runner.storage is not None:
-        engine_of(config.runner.storage)
+    check_in_reach(config.runner)
 
     def under_prefect() -> Path:
         from flows.jobs.prefect_flows import experiment

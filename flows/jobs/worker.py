@@ -22,10 +22,12 @@ def work(path: Path, overrides: Sequence[str]) -> int:
     from aesi.pipeline.experiment.fit import build_problem
     from aesi.pipeline.experiment.load import load
     from flows.evaluation.generation import Tally
+    from flows.evaluation.in_reach import check_in_reach
     from flows.search.study import run_study
 
     console = Console()
     config = read_experiment(path, overrides)
+    check_in_reach(config.runner)
     where = "the database of runner.storage" if config.runner.storage else "this workspace"
     console.say(f"{config.name}: a worker on the candidates shared in {where}")
     started = time.monotonic()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from aesi.errors import DataAway, DataError, FitError, InputError
+from aesi.errors import AesiError, DataAway, DataError, FitError, InputError
 from flows.base.console import Console
 from flows.jobs.run_session import tracked_job
 from flows.tracking.run_records import records
@@ -47,6 +47,37 @@ def test_an_address_that_is_none_is_refused_before_the_data_are_read(workspace):
         (workspace / f"{name}.csv").write_text("never read")
     with pytest.raises(InputError, match=r"runner\.storage is no database that can be used"):
         start(path, ["runner.storage=blah"], use_prefect=False)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["runner.storage=postgresql://me:secret@127.0.0.1:9/none"], r"runner\.storage .* cannot be used"),
+        (
+            ["runner.kind=dask", "runner.address=tcp://127.0.0.1:9"],
+            r"scheduler tcp://127\.0\.0\.1:9 does not answer",
+        ),
+        (["runner.kind=dask", "runner.address=scheduler"], r"'scheduler' is no address .* tcp://HOST:PORT"),
+    ],
+)
+@pytest.mark.parametrize("job", ["run", "worker"])
+def test_what_a_run_needs_and_is_away_was_told_after_half_a_minute_of_work(
+    workspace, monkeypatch, capsys, overrides, words, job
+):
+    from flows.evaluation import dask_pool
+    from flows.jobs.start import start
+    from flows.jobs.worker import work
+
+    monkeypatch.setattr(dask_pool, "CONNECT_S", 0.5)
+    path = workspace / "refused.yaml"
+    path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
+    for name in ("bad", "good"):
+        (workspace / f"{name}.csv").write_text("never read")
+    with pytest.raises(AesiError, match=words) as told:
+        start(path, overrides, use_prefect=False) if job == "run" else work(path, overrides)
+    assert "secret" not in str(told.value)
+    assert capsys.readouterr().err == ""
+    assert not (workspace / "mlflow.db").exists()
 
 
 def test_data_too_few_for_the_library_leave_no_folder_nor_a_word_of_a_run(tracked, capsys):

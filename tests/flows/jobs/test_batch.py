@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from aesi.calibration.health import HEALTH_WORDS
+from aesi.errors import AesiError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.batch.job import Settings
 from aesi.pipeline.batch.plan import read_plan
@@ -64,3 +65,17 @@ def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     parent = runs["plan.csv"]
     assert parent.data.metrics["failed"] == 1.0
     assert parent.info.status == "FINISHED"
+
+
+def test_a_batch_for_a_scheduler_that_is_away_left_a_failed_run(workspace, monkeypatch, capsys):
+    from flows.evaluation import dask_pool
+    from flows.jobs.batch import batch
+
+    monkeypatch.setattr(dask_pool, "CONNECT_S", 0.5)
+    (workspace / "a.csv").write_text("a")
+    (workspace / "plan.csv").write_text("name,data\na,a.csv\n")
+    with pytest.raises(AesiError, match=r"scheduler tcp://127\.0\.0\.1:9 does not answer"):
+        batch(workspace / "plan.csv", workspace / "out", CELL, runner="dask", address="tcp://127.0.0.1:9")
+    assert capsys.readouterr().err == ""
+    assert not (workspace / "out").exists()
+    assert not (workspace / "mlflow.db").exists()
