@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from aesi.errors import InputError
 from flows.base import environment
 from flows.base.console import first_line
-from flows.tracking.store import Store, default_uri, without_login
+from flows.tracking.store import PLACE, Store, default_uri, without_login
 from flows.tracking.view import VIEW, view_of
 
 if TYPE_CHECKING:
@@ -52,6 +52,8 @@ def serve(port: int, host: str, uri: str | None) -> None:
     print(f"MLflow shows the runs at {address}{TRAINING} (Ctrl-C ends it)")
     for name, view in _views(store):
         print(f"  {name}: {address}{view}")
+    if not store.all_jobs():
+        print(f"  Nothing is tracked in {without_login(uri)} yet; {PLACE}.")
     sys.stdout.flush()
     os.execve(
         sys.executable, command, os.environ | QUIETLY

@@ -32,6 +32,8 @@ KIND = "aesi.kind"
 REACH_S = 5.0
 """Wait for the answer of a tracking server."""
 PASSING = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EAGAIN, errno.EMFILE)
+PLACE = "runs are tracked in the current folder, or in the one that AESI_HOME names"
+"""Where runs are to be found that are not in the store that was opened."""
 SHORTEST_ID = 4
 """Letters of a run's id that may stand for it."""
 PAGE = 1000
@@ -89,10 +91,7 @@ class Store:
             return cls(uri)
         database = _database(uri)
         if not database.is_file():
-            raise InputError(
-                f"nothing is tracked in {database}: there is no such file; runs are tracked in the current folder, or "
-                "in the one that AESI_HOME names."
-            )
+            raise InputError(f"nothing is tracked in {database}: there is no such file; {PLACE}.")
         try:
             check_writable(database)
         except OSError as error:

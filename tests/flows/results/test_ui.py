@@ -8,7 +8,7 @@ import pytest
 
 from aesi.errors import InputError
 from flows.results import ui
-from flows.tracking.store import Store
+from flows.tracking.store import KIND, Store
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,19 @@ def test_a_store_that_is_only_read_was_made_where_it_was_not(call, workspace, co
     assert code == 2
     assert "there is no" in err
     assert not list(workspace.glob("*.db"))
+
+
+def test_the_wrong_folder_was_shown_as_an_empty_page_without_a_word(call, tracked, monkeypatch):
+    monkeypatch.setattr(os, "execve", lambda *_: None)
+    code, out, _ = call("ui", "--port", "5599")
+    assert code == 0
+    assert (
+        f"Nothing is tracked in sqlite:///{tracked}/mlflow.db yet; runs are tracked in the current folder"
+        in out
+    )
+    store = Store()
+    store.create_run(store.experiment("smoke"), "one", {KIND: "run"})
+    assert "Nothing is tracked" not in call("ui", "--port", "5599")[1]
 
 
 def test_a_store_where_nothing_may_be_written_asks_to_be_copied(tracked, monkeypatch):
