@@ -52,7 +52,8 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     """Write a BPX file, or a Python script for PyBaMM with its BPX file beside it.
 
     model : a BPX file, or a folder of a saved model, whose effects are written as far as the target holds them.
-    Raises InputError where `out` has the wrong suffix or cannot be written.
+    Raises InputError where `out` has the wrong suffix or cannot be written, or the BPX file beside a new script would
+    replace another.
     """
     *script, bpx = files_written(out, to)
     declared = declared_model(model)
@@ -78,8 +79,19 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
     more, unknown = _for_pybamm(found.cell, found.left)
     held += [f"{_said(effect)}: as an option of the model." for effect in found.left if effect not in unknown]
     left += [f"{_said(effect)}: PyBaMM's model from BPX has no counterpart." for effect in unknown]
+    text = _bpx(found.cell)
+    _keep_unnamed(out, bpx, text)
     scripts = [_write(path, _script(bpx.name, more)) for path in script]
-    return Exported((*scripts, _write(bpx, _bpx(found.cell))), tuple(held), tuple(left))
+    return Exported((*scripts, _write(bpx, text)), tuple(held), tuple(left))
+
+
+def _keep_unnamed(script: Path, bpx: Path, text: str) -> None:
+    """Raises InputError where a file of that name is there which no earlier export left and nobody asked to replace."""
+    if bpx.exists() and not script.exists() and bpx.read_bytes() != text.encode():
+        raise InputError(
+            f"{bpx}, which is written beside {script.name}, is there and holds something else; give the script another "
+            "name, or move that file."
+        )
 
 
 def _beyond_bpx(cell: Cell) -> list[str]:

@@ -127,6 +127,21 @@ def test_the_file_beside_an_export_is_never_the_one_that_is_read(call, cell, tmp
     assert not (tmp_path / "mine.py").exists()
 
 
+def test_the_file_beside_an_export_replaced_one_that_nobody_named(call, cell, tmp_path):
+    export = ("export", "--cell", cell, "--to", "pybamm", "--out", tmp_path / "mine.py")
+    mine = tmp_path / "mine.bpx.json"
+    mine.write_text("of another day")
+    code, _, err = call(*export)
+    assert code == 2
+    assert f"{mine}, which is written beside mine.py, is there and holds something else" in err
+    assert mine.read_text() == "of another day"
+    assert not (tmp_path / "mine.py").exists()
+    mine.unlink()
+    assert call(*export)[0] == call(*export)[0] == 0  # its own files are written anew
+    (tmp_path / "mine.py").unlink()
+    assert call(*export)[0] == 0  # as after --to bpx: the file is the one that would be written
+
+
 @pytest.mark.parametrize(
     ("command", "out"),
     [
