@@ -45,9 +45,8 @@ class Job:
         sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
         for role, paths in (("cell", (self.cell,)), ("data", self.data), ("tests", self.tests)):
             for path in paths:
-                files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
-                for file in files:
-                    sha.update(f"|{role}|".encode() + hashlib.sha256(file.read_bytes()).digest())
+                for digest in _digests(path):
+                    sha.update(f"|{role}|".encode() + digest)
         return sha.hexdigest()[:16]
 
 
@@ -74,6 +73,7 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
         raise InputError(
             f"{source}: two check-ups of {again[0]!r} are at {again[1]:g}; several files of one are separated by ;"
         )
+    _check_one_cell(source, jobs)
     outside = next((name for name in names if Path(name).name != name or name.startswith(".")), None)
     if outside is not None:
         raise InputError(
@@ -82,6 +82,25 @@ def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) 
     if not jobs:
         raise InputError(f"{source} holds no cell: one subfolder each with its records, or a table of them.")
     return tuple(job if job.soh is not None else replace(job, soh=soh) for job in jobs)
+
+
+def _check_one_cell(source: Path, jobs: tuple[Job, ...]) -> None:
+    """Raises InputError where check-ups of one specimen start from different cell files: what was lost between two is
+    told from the same beginning, or it is the difference of the files."""
+    first: dict[str, Job] = {}
+    for job in jobs:
+        begun = first.setdefault(job.specimen, job) if job.specimen else job
+        if job.cell != begun.cell and _digests(job.cell) != _digests(begun.cell):
+            raise InputError(
+                f"{source}: the check-ups {begun.name!r} and {job.name!r} of {job.specimen!r} start from different "
+                f"cells, {begun.cell} and {job.cell}; give both the one that the specimen was when new."
+            )
+
+
+def _digests(path: Path) -> list[bytes]:
+    """Of what a file holds, or each file of a folder, in the order of their names."""
+    files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
+    return [hashlib.sha256(file.read_bytes()).digest() for file in files]
 
 
 def without_records(source: Path) -> tuple[str, ...]:

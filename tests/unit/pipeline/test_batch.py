@@ -53,6 +53,22 @@ def test_a_table_names_cells_tests_and_check_ups(tmp_path):
     assert (second.tests, second.soc0, second.at) == ((), None, 200.0)
 
 
+def test_a_trend_over_different_cell_files_was_taken_for_ageing(tmp_path):
+    touched(tmp_path / "s.csv")
+    table = tmp_path / "plan.csv"
+    for name, text in (("new.json", "new"), ("copy.json", "new"), ("aged.json", "aged")):
+        (tmp_path / name).write_text(text)
+    rows = "name,data,cell,specimen,at\nc0,s.csv,new.json,cell 1,0\nc1,s.csv,{},{},200\n"
+    table.write_text(rows.format("aged.json", "cell 1"))
+    with pytest.raises(
+        InputError, match=r"'c0' and 'c1' of 'cell 1' start from different cells, .*aged\.json"
+    ):
+        read_plan(table)
+    for cell, specimen in (("copy.json", "cell 1"), ("aged.json", "cell 2")):
+        table.write_text(rows.format(cell, specimen))
+        assert len(read_plan(table)) == 2
+
+
 def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
     touched(tmp_path / "s.csv")
     table = tmp_path / "plan.csv"
