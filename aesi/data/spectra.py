@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
 from aesi.data.readers import open_table
+from aesi.data.readers.table import TableFile
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 from aesi.records import Spectrum
@@ -16,6 +18,8 @@ from aesi.records import Spectrum
 LABEL = "spectrum"
 NEEDED = ("frequency_hz", "z_real_ohm", "z_imag_ohm")
 STATES = ("soc", "discharged_ah")
+MOST_AGAIN = 1
+"""Frequencies of one spectrum that come again: one of 27 measured ones has one twice."""
 DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
 
 
@@ -45,10 +49,41 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
             raise DataError(f"{file}, {table.where(row)}, column {name}: not a number.")
     if not (columns["frequency_hz"] > 0.0).all():
         raise DataError(f"{file}, column frequency_hz: a frequency has to be positive.")
+    _check_temperature(columns, table)
     told_apart: list[AnyArray] = [columns[name] for name in STATES if name in columns]
     if LABEL in header:
         told_apart += [np.array(words) for words in table.read_text((header.index(LABEL),))]
-    return tuple(_spectrum(file, k, columns, rows) for k, rows in enumerate(_pieces(told_apart)))
+    pieces = _pieces(told_apart)
+    if LABEL not in header:
+        _check_swept_once(columns["frequency_hz"], pieces, table)
+    return tuple(_spectrum(file, k, columns, rows) for k, rows in enumerate(pieces))
+
+
+def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:
+    """Raises DataError for a temperature that no cell has: said of a whole spectrum, it would end what comes after."""
+    degc = columns.get("temperature_degc", np.empty(0))
+    absurd = np.flatnonzero((degc < COLDEST_DEGC) | (degc > WARMEST_DEGC))
+    if absurd.size:
+        row = int(absurd[0])
+        kelvin = " (in kelvin? 298.15 K is 25 degC)" if degc[row] > WARMEST_DEGC else ""
+        raise DataError(
+            f"{table.path.name}, {table.where(row)}, column temperature_degc: {degc[row]:.6g} degC is outside "
+            f"{COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; correct the column or leave it out."
+        )
+
+
+def _check_swept_once(frequency_hz: Array, pieces: Sequence[slice], table: TableFile) -> None:
+    """Raises DataError where frequencies come again at one state: spectra of several temperatures, or of several days,
+    would be taken for one of their mean temperature."""
+    for rows in pieces:
+        _, first = np.unique(frequency_hz[rows], return_index=True)
+        again = np.setdiff1d(np.arange(rows.stop - rows.start), first)
+        if again.size > MOST_AGAIN:
+            row = rows.start + int(again[0])
+            raise DataError(
+                f"{table.path.name}, {table.where(row)}: {frequency_hz[row]:g} Hz is there a second time at one state "
+                f"of charge; if these are several spectra, name each in a column {LABEL}."
+            )
 
 
 def _pieces(told_apart: Sequence[AnyArray]) -> list[slice]:
