@@ -104,7 +104,7 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:
     condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
     finished = [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
     if run_ids:
-        return [_by_id(finished, run_id, name) for run_id in run_ids]
+        return _of_one_setting({run.info.run_id: run for run in (_by_id(finished, i, name) for i in run_ids)})
     if not finished:
         raise InputError(f"experiment {name!r} has no finished run yet; `aesi run` makes one.")
     setting = finished[0].data.tags.get("aesi.setting")
@@ -113,6 +113,19 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:
         if run.data.tags.get("aesi.setting") == setting:
             by_seed.setdefault(run.data.params.get("seed", "0"), run)
     return [by_seed[seed] for seed in sorted(by_seed, key=lambda text: int(text))]
+
+
+def _of_one_setting(asked: Mapping[str, Any]) -> list[Any]:
+    """The runs by their ids.  Raises InputError where more than the seed differs: a mean of them would say nothing."""
+    settings = {
+        (run.data.tags.get("aesi.setting"), run.data.params.get("seed")): i for i, run in asked.items()
+    }
+    if len({setting for setting, _ in settings}) > 1 or len(settings) < len(asked):
+        raise InputError(
+            f"the runs {' and '.join(asked)} do not differ by their seeds alone, and a mean of them would say nothing; "
+            f"`aesi compare {' '.join(asked)}` shows them side by side."
+        )
+    return list(asked.values())
 
 
 def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:

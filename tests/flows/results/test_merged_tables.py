@@ -3,6 +3,7 @@
 import pytest
 
 from flows.results.tables import merged
+from flows.tracking.store import KIND, Store
 
 
 def run(mser: float, coverage: float, forest: float | None):
@@ -34,3 +35,27 @@ def test_a_lone_run_stays_as_it_is():
 def test_records_that_diverged_are_counted_over_the_seeds():
     (row,) = merged([run(30.0, 90.0, None), run(-45.0, 91.0, None), run(-36.0, 90.5, None)])
     assert row["free_run"]["diverged"] == 2
+
+
+def test_runs_that_were_named_were_averaged_as_seeds_whatever_they_were_of(call, tracked):
+    store = Store()
+    experiment = store.experiment("two")
+    ids = []
+    for setting, seed in (("a", 0), ("a", 1), ("b", 1), ("a", 1)):
+        run_id = store.create_run(experiment, "two", {KIND: "run", "aesi.setting": setting})
+        store.client.log_param(run_id, "seed", seed)
+        store.client.log_dict(run_id, {"models": run(30.0, 90.0, None)}, "summary.json")
+        store.client.set_terminated(run_id)
+        ids.append(run_id)
+
+    def named(*numbers):
+        return call("tables", "two", *(word for number in numbers for word in ("--run", ids[number])))
+
+    code, out, _ = named(0, 1)
+    assert code == 0
+    assert "Mean over 2 seeds" in out
+    assert "Mean over" not in named(0, 0)[1]
+    for other in ((0, 2), (1, 3)):
+        code, _, err = named(*other)
+        assert code == 2
+        assert f"`aesi compare {ids[other[0]]} {ids[other[1]]}` shows them" in err
