@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable
-from pathlib import Path
 
 
 def key(*parts: bytes | str) -> str:
@@ -14,9 +12,3 @@ def key(*parts: bytes | str) -> str:
         data = part.encode() if isinstance(part, str) else part
         sha.update(len(data).to_bytes(8, "big") + data)
     return sha.hexdigest()[:32]
-
-
-def contents(paths: Iterable[Path]) -> list[bytes]:
-    """What is in each file, and in each file of a folder, in order; nothing of what is not there."""
-    files = [file for path in paths for file in (sorted(path.iterdir()) if path.is_dir() else [path])]
-    return [file.read_bytes() for file in files if file.is_file()]

@@ -12,6 +12,7 @@ from typing import Any
 
 from aesi import bench
 from aesi.bench import CaseRow
+from aesi.numerics.files.contents import contents
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -86,7 +87,7 @@ def judged_once(
         return judge(case)
     path = Path(keep) / f"{case.name}.json"
     asked = repr(judge.keywords) if isinstance(judge, partial) else ""
-    key = fingerprint.key(repr(case), asked, *fingerprint.contents(files(case)))
+    key = fingerprint.key(repr(case), asked, *contents(files(case)))
     of_this = {"program": _program(), "key": key}
     known = _read(path)
     if {name: known.get(name) for name in of_this} == of_this:

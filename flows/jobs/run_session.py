@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aesi.errors import AesiError, InputError
+from aesi.numerics.files.contents import contents
 from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment, fingerprint
@@ -163,9 +164,7 @@ def resume_key(config: ExperimentConfig) -> str:
     """
     from aesi.pipeline.experiment.sources import named_files
 
-    return fingerprint.key(
-        config.digest, source_digest(), *fingerprint.contents(named_files(config).values())
-    )
+    return fingerprint.key(config.digest, source_digest(), *contents(named_files(config).values()))
 
 
 def _unfinished(config: ExperimentConfig, store: Store, console: Console) -> RunRecord | None:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TextIO
 
 from aesi.errors import CellError, InputError
+from aesi.numerics.files.contents import contents
 from aesi.physics.cell import checked_soh
 
 CELL_FILES = ("*.bpx.json", "*.json")
@@ -45,8 +46,8 @@ class Job:
         sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
         for role, paths in (("cell", (self.cell,)), ("data", self.data), ("tests", self.tests)):
             for path in paths:
-                for digest in _digests(path):
-                    sha.update(f"|{role}|".encode() + digest)
+                for held in contents([path]):
+                    sha.update(f"|{role}|".encode() + hashlib.sha256(held).digest())
         return sha.hexdigest()[:16]
 
 
@@ -90,17 +91,11 @@ def _check_one_cell(source: Path, jobs: tuple[Job, ...]) -> None:
     first: dict[str, Job] = {}
     for job in jobs:
         begun = first.setdefault(job.specimen, job) if job.specimen else job
-        if job.cell != begun.cell and _digests(job.cell) != _digests(begun.cell):
+        if job.cell != begun.cell and contents([job.cell]) != contents([begun.cell]):
             raise InputError(
                 f"{source}: the check-ups {begun.name!r} and {job.name!r} of {job.specimen!r} start from different "
                 f"cells, {begun.cell} and {job.cell}; give both the one that the specimen was when new."
             )
-
-
-def _digests(path: Path) -> list[bytes]:
-    """Of what a file holds, or each file of a folder, in the order of their names."""
-    files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
-    return [hashlib.sha256(file.read_bytes()).digest() for file in files]
 
 
 def without_records(source: Path) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataAway, DataError, InputError
+from aesi.numerics.files.contents import contents
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_measured
 from aesi.physics.effects import activated
@@ -37,7 +38,8 @@ class Loaded:
     config : the experiment as it is run, with data and cell of the fallback where `fallback` says why.
     digests : record name -> content hash of what was measured.  notes : what a reader of the report should know
     about the data: resampling, dropped rows, a fallback.  soc0 : state of charge at the first row, by record.
-    cell, soc0 : of the physics that is corrected (`cell.start`).  left_out : the training drives under physics
+    cell, soc0 : of the physics that is corrected (`cell.start`).  files : hash of the files that say what the cell is
+    declared to be.  left_out : the training drives under physics
     that was fitted without a part of one (`cuts`), or without one, each in turn.
     """
 
@@ -52,12 +54,14 @@ class Loaded:
     config: ExperimentConfig
     fallback: str = ""
     model: ModelName = "espm"
+    files: str = ""
 
     @property
     def setting(self) -> str:
-        """Hash of what was run and on which data, without the seed: runs that share it differ by chance alone."""
+        """Hash of what was run, of which cell and on which data, without the seed: runs that share it differ by chance
+        alone."""
         data = "".join(f"|{name} {digest}" for name, digest in sorted(self.digests.items()))
-        return hashlib.sha256(f"{self.config.setting}{data}".encode()).hexdigest()[:16]
+        return hashlib.sha256(f"{self.config.setting}{data}|{self.files}".encode()).hexdigest()[:16]
 
 
 def load(config: ExperimentConfig) -> Loaded:
@@ -139,7 +143,16 @@ def _load(config: ExperimentConfig) -> Loaded:
         notes=tuple(notes),
         config=config,
         model=given.model,
+        files=_declared_in(path, config),
     )
+
+
+def _declared_in(cell: Path, config: ExperimentConfig) -> str:
+    """Hash of the cell's file, or saved model, and of the user's effects: their names stay when they are edited."""
+    sha = hashlib.sha256()
+    for held in contents([cell, *(config.path(name) for name in config.cell.effect_files)]):
+        sha.update(hashlib.sha256(held).digest())
+    return sha.hexdigest()[:16]
 
 
 def _on_grid(

@@ -35,13 +35,17 @@ def test_spectra_of_one_state_are_told_apart_by_their_names(tmp_path, names):
 
 def test_spectra_of_several_temperatures_were_taken_for_one_of_their_mean(tmp_path):
     rows = [f"{point},0.5,{degc}" for degc in (0, 25) for point in POINTS]
-    with pytest.raises(DataError, match=r"row 3 \(line 4\): 100 Hz is there a second time .* column spectrum"):
+    with pytest.raises(
+        DataError, match=r"row 3 \(line 4\): 100 Hz is there a second time .* column spectrum"
+    ):
         read_spectra(written(tmp_path, f"{COLUMNS},soc,temperature_degc", *rows))
 
 
 def test_a_spectrum_in_kelvin_ended_a_calibration_after_its_fit_with_nothing_written(tmp_path):
     rows = [f"{point},0.5,{kelvin}" for point, kelvin in zip(POINTS, (25, 298.15), strict=True)]
-    with pytest.raises(DataError, match=r"row 2 \(line 3\), column temperature_degc: 298.15 degC .*in kelvin"):
+    with pytest.raises(
+        DataError, match=r"row 2 \(line 3\), column temperature_degc: 298.15 degC .*in kelvin"
+    ):
         read_spectra(written(tmp_path, f"{COLUMNS},soc,temperature_degc", *rows))
 
 

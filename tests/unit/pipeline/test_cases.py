@@ -129,6 +129,18 @@ def test_a_posterior_of_too_few_samples_was_refused_after_the_fit(tmp_path, monk
         calibrate_files(BPX, [record], tmp_path / "new.json", Request(posterior=2))
 
 
+def test_runs_of_a_cell_file_that_was_edited_were_taken_for_seeds_of_one_setting(tmp_path):
+    own = tmp_path / "mine.bpx.json"
+    own.write_bytes(BPX.read_bytes())
+    config = experiment(write_record(tmp_path), cell={"bpx": str(own), "soc0": SOC0, "start": "declared"})
+    before = load(config).setting
+    assert load(config.model_copy(update={"seed": 1})).setting == before
+    own.write_text(
+        own.read_text().replace('"Nominal cell capacity [A.h]": 30.0', '"Nominal cell capacity [A.h]": 29.0')
+    )
+    assert load(config).setting != before
+
+
 def test_an_experiment_has_a_cell_at_its_state_of_health(tmp_path):
     cell = {"bpx": str(BPX), "soc0": SOC0, "start": "declared"}
     record = write_record(tmp_path)
