@@ -15,12 +15,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TextIO
 
+from aesi.data.reading import SUFFIXES
 from aesi.errors import CellError, InputError
 from aesi.numerics.files.contents import contents
 from aesi.physics.cell import checked_soh
 
 CELL_FILES = ("*.bpx.json", "*.json")
-RECORDS = (".csv", ".gz", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax", ".txt")
+LAID_BESIDE = (".", "~$")
+"""How the names of what systems lay beside files begin: hidden ones, and locks of open workbooks."""
 COLUMNS = ("name", "data", "cell", "test", "soc0", "soh", "specimen", "at")
 
 
@@ -114,16 +116,20 @@ def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
 
 
 def _subfolders(folder: Path) -> list[Path]:
-    return sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+    return sorted(p for p in folder.iterdir() if p.is_dir() and _visible(p))
 
 
 def _records_in(folder: Path) -> tuple[Path, ...]:
-    return tuple(sorted(p for p in folder.iterdir() if p.suffix.lower() in RECORDS))
+    return tuple(sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and _visible(p)))
+
+
+def _visible(path: Path) -> bool:
+    return not path.name.startswith(LAID_BESIDE)
 
 
 def _cell_in(folder: Path, given: Path | None) -> Path:
     for pattern in CELL_FILES:
-        found = sorted(folder.glob(pattern))
+        found = sorted(filter(_visible, folder.glob(pattern)))
         if len(found) > 1:
             raise InputError(f"{folder} holds {len(found)} files {pattern}; leave one, the cell's.")
         if found:

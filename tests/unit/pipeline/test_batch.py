@@ -39,6 +39,14 @@ def test_a_folder_is_one_cell_a_subfolder(tmp_path):
         read_plan(tmp_path)
 
 
+def test_records_of_some_kinds_were_passed_over_and_what_systems_lay_beside_them_read(tmp_path):
+    for name in ("1.bdf", "2.TSV", "3.xlsx", "._3.csv", "~$3.xlsx", "own.bpx.json", "._own.bpx.json"):
+        touched(tmp_path / "a" / name)
+    (job,) = read_plan(tmp_path)
+    assert [path.name for path in job.data] == ["1.bdf", "2.TSV", "3.xlsx"]
+    assert job.cell.name == "own.bpx.json"
+
+
 def test_a_table_names_cells_tests_and_check_ups(tmp_path):
     for name in ("s.csv", "d.csv", "t.csv"):
         touched(tmp_path / name)
