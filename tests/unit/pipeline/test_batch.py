@@ -1,8 +1,10 @@
 """The plan of a batch, what a job leaves, and what the summary makes of it."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
+from urllib.parse import unquote
 
 import pytest
 
@@ -199,6 +201,15 @@ def test_the_summary_has_every_cell_and_the_trend_in_order(tmp_path):
     assert "Resistance of contacts and films" in page
     assert "1 <small>[5, 5]</small>" in page
     assert len((tmp_path / "summary.csv").read_text().splitlines()) == 4
+
+
+def test_the_links_to_cells_whose_names_have_signs_led_nowhere(tmp_path):
+    name = "cell #3, 50%"
+    row = {"name": name, "specimen": "", "at": None, "status": "done", "finding": "none", "inventory_ah": 7.0}
+    row |= {"report": f"{name}/report.html", "effects": ""}
+    page = write_summary(tmp_path, [row], "plan").read_text(encoding="utf-8")
+    links = [unquote(link) for link in re.findall(r'<a href="([^"#?]*)"', page)]
+    assert {f"{name}/report.html", f"{name}/calibrated.bpx.report.html"} <= set(links)
 
 
 def test_a_record_that_judges_is_another_job_than_one_that_is_fitted(tmp_path):
