@@ -55,7 +55,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
     state = v1.get("State") or {}
     initial = state.get("Initial conditions") or {}
     thermal = state.get("Thermal environment") or {}
-    reference = float(fields.get("Reference temperature [K]") or DEFAULT_TEMPERATURE_K)
+    reference = _kelvin(fields, "Reference temperature [K]", DEFAULT_TEMPERATURE_K)
     user = parts.get("User-defined") or {}
     return CellParameters(
         negative=_electrode(parts["Negative electrode"], user, "Negative", where),
@@ -68,8 +68,8 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         lower_voltage_v=float(fields["Lower voltage cut-off [V]"]),
         upper_voltage_v=float(fields["Upper voltage cut-off [V]"]),
         reference_temperature_k=reference,
-        initial_temperature_k=float(initial.get("Initial temperature [K]") or reference),
-        ambient_temperature_k=float(thermal.get("Ambient temperature [K]") or reference),
+        initial_temperature_k=_kelvin(initial, "Initial temperature [K]", reference),
+        ambient_temperature_k=_kelvin(thermal, "Ambient temperature [K]", reference),
         density_kg_m3=_optional(fields, "Density [kg.m-3]"),
         specific_heat_j_kg_k=_optional(fields, "Specific heat capacity [J.K-1.kg-1]"),
         volume_m3=_optional(fields, "Volume [m3]"),
@@ -83,6 +83,12 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         references=str(header.get("References") or ""),
         unread=unread(v1),
     )
+
+
+def _kelvin(fields: Fields, name: str, without: float) -> float:
+    """A temperature, or another where the file names none; one of 0 is refused with all others that no cell has."""
+    value = _optional(fields, name)
+    return without if value is None else value
 
 
 def _optional(fields: Fields, name: str) -> float | None:

@@ -264,6 +264,19 @@ def test_a_value_in_another_unit_is_refused(content, section, field, factor, sen
         Cell.from_bpx(content)
 
 
+@pytest.mark.parametrize("name", ["reference", "initial", "ambient"])
+def test_a_temperature_of_0_in_a_file_was_taken_for_25_degc(content, name):
+    state = content["State"]
+    parts = {
+        "reference": content["Parameterisation"]["Cell"],
+        "initial": state["Initial conditions"],
+        "ambient": state.setdefault("Thermal environment", {}),
+    }
+    parts[name][f"{name.capitalize()} temperature [K]"] = 0.0
+    with pytest.raises(CellError, match=f"{name}_temperature_k = 0 K .* 25 degC is 298.15 K"):
+        Cell.from_bpx(content)
+
+
 def test_a_fit_may_move_transport_further_than_a_file_declares_it(content):
     fields = content["Parameterisation"]["Negative electrode"]
     fields["Diffusivity [m2.s-1]"] *= 1e4
