@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from os import PathLike
 from typing import Any
@@ -57,6 +58,10 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
     thermal = state.get("Thermal environment") or {}
     reference = _kelvin(fields, "Reference temperature [K]", DEFAULT_TEMPERATURE_K)
     user = parts.get("User-defined") or {}
+    if not isinstance(user, Mapping):
+        raise CellError(
+            f"{where}: the section 'User-defined' is {type(user).__name__}, and has to hold names and values."
+        )
     return CellParameters(
         negative=_electrode(parts["Negative electrode"], user, "Negative", where),
         separator=_separator(parts["Separator"]),
@@ -75,8 +80,8 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         volume_m3=_optional(fields, "Volume [m3]"),
         surface_area_m2=_optional(fields, "External surface area [m2]"),
         heat_transfer_w_m2_k=_optional(thermal, HEAT_TRANSFER),
-        contact_resistance_ohm=float(user.get(CONTACT_RESISTANCE, 0.0)),
-        capacity_shares=tuple((str(k), float(v)) for k, v in (user.get(CAPACITY_SHARES) or {}).items()),
+        contact_resistance_ohm=_own_number(user, CONTACT_RESISTANCE, where),
+        capacity_shares=_shares(user, where),
         fitted_with=next((model for model, field in FITTED_WITH.items() if user.get(field)), ""),
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),
@@ -94,6 +99,28 @@ def _kelvin(fields: Fields, name: str, without: float) -> float:
 def _optional(fields: Fields, name: str) -> float | None:
     value = fields.get(name)
     return None if value is None else float(value)
+
+
+def _own_number(user: Fields, name: str, where: str, least: float = -math.inf) -> float:
+    """A number of the section User-defined, which the schema leaves unchecked; 0 where it has none of that name."""
+    value = user.get(name)
+    if value is None:
+        return 0.0
+    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < math.inf:
+        wanted = "a number" if least < 0.0 else f"a number from {least:g} on"
+        raise CellError(f"{where}: User-defined: {name} = {value!r} has to be {wanted}.")
+    return float(value)
+
+
+def _shares(user: Fields, where: str) -> tuple[tuple[str, float], ...]:
+    shares = user.get(CAPACITY_SHARES)
+    if shares is None:
+        return ()
+    if not isinstance(shares, Mapping):
+        raise CellError(
+            f"{where}: User-defined: {CAPACITY_SHARES} = {shares!r} has to hold a number for each record."
+        )
+    return tuple((str(name), _own_number(shares, name, where)) for name in shares)
 
 
 def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode:
@@ -121,9 +148,9 @@ def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode
         ocp=relation(fields["OCP [V]"], f"{what}, OCP [V]"),
         rate_constant=float(fields["Reaction rate constant [mol.m-2.s-1]"]),
         entropic=optional_relation("Entropic change coefficient [V.K-1]") or Constant(0.0),
-        double_layer_f_m2=float(user.get(DOUBLE_LAYERS[side], 0.0)),
+        double_layer_f_m2=_own_number(user, DOUBLE_LAYERS[side], where, least=0.0),
         film_ohm_m2=NO_FILM if film is None else relation(film, f"{where}: {FILM_RESISTANCES[side]}"),
-        film_ea_j_mol=float(user.get(FILM_ENERGIES[side], 0.0)),
+        film_ea_j_mol=_own_number(user, FILM_ENERGIES[side], where),
         rate_factor=UNITY if factor is None else relation(factor, f"{where}: {RATE_FACTORS[side]}"),
         diffusivity_ea_j_mol=float(fields.get("Diffusivity activation energy [J.mol-1]") or 0.0),
         rate_ea_j_mol=float(fields.get("Reaction rate constant activation energy [J.mol-1]") or 0.0),

@@ -277,6 +277,25 @@ def test_a_temperature_of_0_in_a_file_was_taken_for_25_degc(content, name):
         Cell.from_bpx(content)
 
 
+@pytest.mark.parametrize(
+    ("own", "sentence"),
+    [
+        ({"Contact resistance [Ohm]": "1e-3 Ohm"}, "Contact resistance .* = '1e-3 Ohm' has to be a number"),
+        ({"Negative electrode double-layer capacity [F.m-2]": -0.2}, "-0.2 has to be a number from 0 on"),
+        (
+            {"Capacity share by record": 0.9},
+            "Capacity share by record = 0.9 has to hold a number for each record",
+        ),
+        ({"Capacity share by record": {"drive": [0.9]}}, r"drive = \[0.9\] has to be a number"),
+        (["Contact resistance [Ohm]"], "'User-defined' is list"),
+    ],
+)
+def test_what_is_no_number_in_the_user_s_section_was_an_unexpected_error(content, own, sentence):
+    content["Parameterisation"]["User-defined"] = own
+    with pytest.raises(CellError, match=sentence):
+        Cell.from_bpx(content)
+
+
 def test_a_fit_may_move_transport_further_than_a_file_declares_it(content):
     fields = content["Parameterisation"]["Negative electrode"]
     fields["Diffusivity [m2.s-1]"] *= 1e4
