@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from aesi.errors import DataError
+from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.recalibrate import FitRecord
 from aesi.pipeline.experiment.sections import DataConfig, RepeatsConfig
 from aesi.records import ROLES, ErrorSeries, Role, Split
@@ -54,6 +55,26 @@ def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
             f"{period_s:g} s; take it out of `repeats`."
         )
     return series.take(slice(int(low), int(high)), f"repeat {number}")
+
+
+WHOLE = 0.99
+"""Of a period: a logger's last rows may be missing of a repeat that is a whole one. A convention."""
+
+
+def cut_short(time_s: Array, repeats: RepeatsConfig) -> list[str]:
+    """Sentences on the repeats that the record ends in.
+
+    time_s : (n,) s, of the record.
+    """
+    lasts = {
+        number: float(time_s[-1] - time_s[0]) - (number - 1) * repeats.period_s
+        for number in (*repeats.train, *repeats.test)
+    }
+    return [
+        f"repeat {number} has {seconds:.0f} s of the {repeats.period_s:g} s of a period: the record ends in it."
+        for number, seconds in lasts.items()
+        if seconds < WHOLE * repeats.period_s
+    ]
 
 
 def training_drives(

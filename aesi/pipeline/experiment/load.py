@@ -18,7 +18,7 @@ from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_measured
 from aesi.physics.effects import activated
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.pipeline.experiment.drives import by_role, training_drives
+from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
@@ -112,6 +112,9 @@ def _load(config: ExperimentConfig) -> Loaded:
     records, told = _on_grid(config, given, sources)
     notes = [*cell.unread, *told]
     drives = training_drives(config.data, records, sources.roles)
+    if config.data.repeats is not None:
+        (cut,) = records.values()
+        notes += cut_short(cut.measurement.time_s, config.data.repeats)
     for name, rows in drives:
         records[name].rows[rows] = True
     physics = physics_models(cell, given.effects, records, hold, config.cell.start, model=given.model)

@@ -61,6 +61,15 @@ def test_a_repeat_the_record_does_not_have_is_named(record):
         load(config.model_copy(update={"data": config.data.model_copy(update={"repeats": repeats})}))
 
 
+def test_a_repeat_that_the_record_ends_in_passed_for_a_whole_one(record):
+    config = experiment(record)
+    assert not any("the record ends" in note for note in load(config).notes)
+    repeats = config.data.repeats.model_copy(update={"period_s": 700.0})  # of a record of 3,000 s
+    loaded = load(config.model_copy(update={"data": config.data.model_copy(update={"repeats": repeats})}))
+    assert "repeat 5 has 199 s of the 700 s of a period: the record ends in it." in loaded.notes
+    assert len(loaded.split.train[-1]) == 200
+
+
 def test_the_correction_finds_the_ohmic_drop_in_free_run(evaluation):
     assert row(evaluation, "ESPM")["free_run"]["test_mser_pct"] == pytest.approx(0.0, abs=1e-9)
     # What is left is the noise: of about 45 mV of drop, 1 mV.
