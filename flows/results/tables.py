@@ -151,11 +151,9 @@ def _footer(name: str, runs: Sequence[Any], format: str) -> str:
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {ids}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
-    about = (runs[0].data.tags.get("mlflow.note.content", "").splitlines() or [""])[
-        0
-    ]  # below: what came of that run
-    if about:
-        text = f"{text} {about.rstrip('.')}."
+    about, below, _ = runs[0].data.tags.get("mlflow.note.content", "").partition("\n\n")
+    if about and below:  # without a note what came of that one run stands there alone
+        text = f"{text} {about.splitlines()[0].rstrip('.')}."
     for run in runs:
         if "aesi.fallback" in run.data.tags:
             text = f"{text} {run.data.tags['aesi.fallback']}"

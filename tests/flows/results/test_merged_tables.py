@@ -4,6 +4,7 @@ import pytest
 
 from flows.results.tables import merged
 from flows.tracking.store import KIND, Store
+from flows.tracking.view import NOTE
 
 
 def run(mser: float, coverage: float, forest: float | None):
@@ -59,3 +60,17 @@ def test_runs_that_were_named_were_averaged_as_seeds_whatever_they_were_of(call,
         code, _, err = named(*other)
         assert code == 2
         assert f"`aesi compare {ids[other[0]]} {ids[other[1]]}` shows them" in err
+
+
+@pytest.mark.parametrize(("note", "shown"), [("Our own cell", "(seed 1). Our own cell."), ("", "(seed 1).")])
+def test_the_figures_of_one_seed_stood_below_the_mean_of_an_experiment_without_a_note(
+    call, tracked, note, shown
+):
+    store = Store()
+    for seed in (0, 1):
+        tags = {KIND: "run", NOTE: f"{note}\n\nAESI I: 38.6 % less squared error.".strip()}
+        run_id = store.create_run(store.experiment("two"), "two", tags)
+        store.client.log_param(run_id, "seed", seed)
+        store.client.log_dict(run_id, {"models": run(30.0, 90.0, None)}, "summary.json")
+        store.client.set_terminated(run_id)
+    assert call("tables", "two")[1].rstrip("\n").endswith(shown)
