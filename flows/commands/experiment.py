@@ -71,6 +71,8 @@ def tables(
     ] = None,
 ) -> None:
     """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
+    if figures is not None:
+        outputs.check_folder(figures, option="--figures")
     from flows.base.console import Console
     from flows.results.tables import tables_of, tracked_as
     from flows.tracking.leftovers import deliver_leftovers
@@ -89,7 +91,7 @@ def compare(
     uri: Annotated[str | None, typer.Option(help="Tracking store; the workspace's without it.")] = None,
 ) -> None:
     """Tracked runs side by side on one offline page: what differed, what came of it, where the error is."""
-    outputs.check_file(out)
+    outputs.check_page(out)
     from flows.results.compare import compare as write
 
     shown = write(runs, out, uri)

@@ -12,6 +12,7 @@ from aesi.numerics.files.whole import check_writable
 
 MODEL = "model"
 """The folder of the model within a folder of results."""
+PAGES = (".html", ".htm")
 OTHER_FORMATS = (".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5")
 
 
@@ -50,12 +51,19 @@ def check_json(out: Path, inputs: Sequence[Path] = ()) -> None:
         raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
 
 
-def check_folder(out: Path, inputs: Sequence[Path] = ()) -> None:
+def check_page(out: Path) -> None:
+    """As `check_file`, of a page.  Raises InputError also where the name promises another format."""
+    check_file(out)
+    if out.suffix.lower() not in PAGES:
+        raise InputError(f"--out {out}: what is written is a page; give a name that ends in .html.")
+
+
+def check_folder(out: Path, inputs: Sequence[Path] = (), option: str = "--out") -> None:
     """Raises InputError where `out` cannot be a folder to write to, or the model in it is one that is read; one that is
     there is kept, and its files may be replaced."""
-    with _refused(out):
+    with _refused(out, option):
         if out.exists() and not out.is_dir():
-            raise InputError(f"--out {out} is a file; name a folder.")
+            raise InputError(f"{option} {out} is a file; name a folder.")
         if any(_lies_in(given, out / MODEL) for given in inputs):
             raise InputError(
                 f"--out {out}: the model in it is the one that is read, and would be lost; name another folder."
@@ -77,11 +85,11 @@ def _lies_in(file: Path, place: Path) -> bool:
 
 
 @contextmanager
-def _refused(out: Path) -> Iterator[None]:
+def _refused(out: Path, option: str = "--out") -> Iterator[None]:
     """What the system refuses, as a sentence about the option."""
     try:
         yield
     except OSError as error:
         raise InputError(
-            f"--out {out} cannot be written ({error.filename}: {error.strerror}); name another place."
+            f"{option} {out} cannot be written ({error.filename}: {error.strerror}); name another place."
         ) from None

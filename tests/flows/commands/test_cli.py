@@ -202,6 +202,24 @@ def test_what_cannot_be_written_is_told_before_anything_is_computed(
     assert (tmp_path / "file").read_text() == there.read_text() == "kept"
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (
+            ("compare", "mine", "--out"),
+            "drive.csv: what is written is a page; give a name that ends in .html",
+        ),
+        (("tables", "mine", "--figures"), "--figures drive.csv is a file; name a folder"),
+    ],
+)
+def test_a_page_over_a_record_and_figures_into_it_were_not_refused(call, tracked, command, words):
+    (tracked / "drive.csv").write_text("kept")
+    code, _, err = call(*command, "drive.csv")
+    assert code == 2
+    assert words in err
+    assert (tracked / "drive.csv").read_text() == "kept"
+
+
 @pytest.mark.parametrize("out", ["cells", "cells/found"])
 def test_results_of_a_batch_were_read_as_a_cell_the_next_time(call, tmp_path, out):
     (tmp_path / "cells" / "a").mkdir(parents=True)
