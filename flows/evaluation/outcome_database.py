@@ -75,14 +75,11 @@ class DatabaseOutcomes:
     def release(self, key: str) -> None:
         if key in self._mine:
             self._mine.discard(key)
+            table = self._table
+            ours = (table.c.key == key, table.c.owner == self._owner)
             with self._engine.begin() as connection:
-                connection.execute(
-                    self._table.delete().where(
-                        self._table.c.key == key,
-                        self._table.c.owner == self._owner,
-                        self._table.c.data.is_(None),
-                    )
-                )
+                connection.execute(table.delete().where(*ours, table.c.data.is_(None)))
+                connection.execute(table.update().where(*ours).values(owner=None, beat_s=None))
 
     def close(self) -> None:
         self._stop.set()
@@ -91,14 +88,13 @@ class DatabaseOutcomes:
         self._engine.dispose()
 
     def _take_over(self, key: str) -> bool:
-        """Win the claim of an owner whose heart no longer beats."""
+        """Win what nobody computes now: a result, to be made anew, or the claim of a heart that no longer beats."""
         table = self._table
         with self._engine.begin() as connection:
             now = self._now(connection)
+            free = self._sa.or_(table.c.owner.is_(None), table.c.beat_s < now - self.STALE_S)
             done = connection.execute(
-                table.update()
-                .where(table.c.key == key, table.c.data.is_(None), table.c.beat_s < now - self.STALE_S)
-                .values(owner=self._owner, beat_s=now)
+                table.update().where(table.c.key == key, free).values(owner=self._owner, beat_s=now)
             )
         return done.rowcount == 1
 

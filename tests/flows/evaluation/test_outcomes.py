@@ -57,6 +57,21 @@ def test_a_result_can_be_put_over_a_claim(opened):
     assert other.get(KEY) == b"done"
 
 
+def test_a_run_that_uses_no_cache_waited_for_ever_for_a_result_in_a_database(opened):
+    one, other = opened(), opened()
+    one.claim(KEY)
+    one.put(KEY, b"old")
+    one.release(KEY)
+    assert other.claim(KEY)  # to make it anew
+    assert not one.claim(KEY)
+    other.put(KEY, b"new")
+    other.release(KEY)
+    assert one.claim(KEY)
+    one.release(KEY)
+    assert other.get(KEY) == b"new"
+    assert other.claim(KEY)
+
+
 def test_many_threads_agree_on_one_owner(opened):
     stores = [opened() for _ in range(8)]
     won = []
