@@ -162,7 +162,7 @@ class DaskPool:
                 self._futures[key] = (self._futures[key][0], now)
                 continue
             tag, _ = self._futures.pop(key)
-            found.append((tag, Failed(f"took longer than {self._timeout_s:g} s")))
+            found.append((tag, Failed(f"took longer than {self._timeout_s:g} s", of_machine=True)))
             self._client.restart_workers([running[key]], raise_for_error=False)
         return found
 
@@ -181,8 +181,8 @@ def _outcome(future: Any) -> Any:
     if future.status == "finished":
         return codec.loads(future.result())
     if future.status == "cancelled":
-        return Failed("was cancelled by the scheduler")
+        return Failed("was cancelled by the scheduler", of_machine=True)
     error = future.exception()
     if isinstance(error, AesiError):  # the experiment cannot be loaded there: no candidate ever will
         raise error
-    return Failed(f"its worker was lost ({type(error).__name__}: {error})")
+    return Failed(f"its worker was lost ({type(error).__name__}: {error})", of_machine=True)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from aesi.records import Failed
 from flows.base import codec, fingerprint
 from flows.evaluation.outcome_store import Outcomes
 from flows.evaluation.pool import Pool
@@ -29,6 +30,7 @@ class Evaluation:
 
     study : content key of the problem, so that the same genome on other data is another candidate.
     reuse : False evaluates what an earlier run has stored; what this one stores is still shared.
+    lost_again : evaluates what an earlier run lost to its machine, which would fail every run from then on.
     """
 
     def __init__(
@@ -39,12 +41,14 @@ class Evaluation:
         say: Callable[[str], None],
         tally: Tally,
         reuse: bool = True,
+        lost_again: bool = False,
     ) -> None:
         self._pool = pool
         self._outcomes = outcomes
         self._study = study
         self._say = say
         self._reuse = reuse
+        self._lost_again = lost_again
         self._fresh: set[str] = set()
         self.tally = tally
 
@@ -87,11 +91,13 @@ class Evaluation:
         if data is None:
             return None
         try:
-            return codec.loads(data)
+            outcome = codec.loads(data)
         except codec.Damaged as error:
             self._say(f"cache: the stored candidate {key[:8]} is damaged ({error}); it is evaluated again.")
             self._outcomes.discard(key)
             return None
+        lost = isinstance(outcome, Failed) and outcome.of_machine
+        return None if lost and self._lost_again and key not in self._fresh else outcome
 
     def _store(self, key: str, outcome: Any) -> None:
         try:

@@ -91,7 +91,7 @@ class LocalPool:
             if one.pipe in ready:
                 found.append((one.tag, self._receive(i, one)))
             elif time.monotonic() >= one.deadline_s:
-                found.append((one.tag, Failed(f"took longer than {self._timeout_s:g} s")))
+                found.append((one.tag, Failed(f"took longer than {self._timeout_s:g} s", of_machine=True)))
                 self._processes[i] = self._replace(one)
         return found
 
@@ -107,7 +107,7 @@ class LocalPool:
         except (EOFError, OSError):
             one.process.join(5)
             self._processes[i] = self._replace(one)
-            return Failed(f"its process was lost ({_how(one.process.exitcode)})")
+            return Failed(f"its process was lost ({_how(one.process.exitcode)})", of_machine=True)
         one.tag = one.deadline_s = None
         return outcome
 

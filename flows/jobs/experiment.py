@@ -81,6 +81,7 @@ def _stages(
             follow,
             publish_as=name,
             on_generation=lambda done, total: run.progress("search", done, total),
+            lost_again=not tracker.resumed,
         ),
     )
     tracker.metrics({f"importance/{gene}": share for gene, share in found.result.importances().items()})

@@ -79,18 +79,20 @@ def run_study(
     tally: Tally | None = None,
     publish_as: str | None = None,
     on_generation: Callable[[int, int], None] | None = None,
+    lost_again: bool = False,
 ) -> Found:
     """Search until all candidates of the experiment are known, and pick one.
 
     on_generation : told how many candidates of how many are done, a generation at a time.
     publish_as : name of the study in Optuna's storage; None publishes nothing.
+    lost_again : see `Evaluation`; not of a run that is gone on with, whose candidates are tracked as they were.
 
     Raises FitError, with the reasons counted, where no candidate is feasible.
     """
     outcomes = shared_outcomes(config)
     pool = open_pool(problem, config)
     tally = tally or Tally()
-    evaluation = Evaluation(pool, outcomes, study_key(problem, config), console.say, tally, reuse)
+    evaluation = Evaluation(pool, outcomes, study_key(problem, config), console.say, tally, reuse, lost_again)
     scored: dict[int, ScoredCandidate | Failed] = {}
     waiting: dict[Genome, list[ScoredCandidate | Failed]] = {}
     started = time.monotonic()

@@ -43,9 +43,9 @@ def impatient(monkeypatch):
 
 @pytest.fixture
 def made(tmp_path, said):
-    def make(calls, study="s", reuse=True, work=lambda genome: genome * 2):
+    def make(calls, study="s", reuse=True, work=lambda genome: genome * 2, lost_again=False):
         pool = Inline(calls, work)
-        return Evaluation(pool, FileOutcomes(tmp_path / "o"), study, said.append, Tally(), reuse)
+        return Evaluation(pool, FileOutcomes(tmp_path / "o"), study, said.append, Tally(), reuse, lost_again)
 
     return make
 
@@ -86,6 +86,19 @@ def test_failures_are_stored_too(made):
     dict(made([], **work)([1]))
     assert dict(made(calls, **work)([1])) == {0: Failed("no")}
     assert calls == []
+
+
+def test_what_was_lost_to_the_machine_failed_in_every_run_from_then_on(made):
+    lost = {"work": lambda genome: Failed("its process was lost (SIGKILL)", of_machine=True)}
+    dict(made([], **lost)([1]))
+    assert dict(made([])([1]))[0] == lost["work"](1)  # a run that is gone on with, and its workers
+    calls = []
+    assert dict(made(calls, lost_again=True)([1, 1])) == {0: 2, 1: 2}
+    assert calls == [1]
+    dict(made([], study="t", **lost)([1]))
+    assert dict(made(calls, study="t", lost_again=True, **lost)([1]))[0] == lost["work"](1)
+    dict(made([], study="u", work=lambda genome: Failed("no"))([1]))
+    assert dict(made([], study="u", lost_again=True)([1])) == {0: Failed("no")}
 
 
 def test_a_damaged_entry_is_evaluated_again_and_said(made, tmp_path, said):
