@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aesi.data.fetch import Remote, fetch
-from aesi.errors import DataError, did_you_mean
+from aesi.errors import DataAway, DataError, did_you_mean
 from aesi.numerics.files.cache_folder import cache_folder
 
 FOLDER_VARIABLE = "AESI_DATA"
@@ -174,11 +174,27 @@ def get(name: str, out: Path | None = None) -> Path:
     if here is not None:
         return here if out is None else _copy(here, out)
     if not one.files:
-        raise DataError(f"{name} cannot be fetched by a program. {one.how} Source: {one.source}.")
+        raise DataError(
+            f"{name} cannot be fetched by a program. {one.how} Source: {one.source}.{_named_in_vain(name)}"
+        )
     folder = _own_folder(name) if out is None else out
-    for remote in one.files:
-        fetch(remote, folder)
+    try:
+        for remote in one.files:
+            fetch(remote, folder)
+    except DataAway as error:
+        raise DataAway(f"{error}{_named_in_vain(name)}") from None
     return folder
+
+
+def _named_in_vain(name: str) -> str:
+    """A sentence on a folder of the user's that was looked into and has not all of a set; '' where none is named."""
+    own = os.environ.get(FOLDER_VARIABLE)
+    if not own:
+        return ""
+    if not Path(own).expanduser().is_dir():
+        return f" {FOLDER_VARIABLE} names {own}, which is no folder."
+    files = ", ".join(remote.name for remote in find_set(name).files) or "files in it"
+    return f" {FOLDER_VARIABLE} names {own}, which has no folder {name} with {files}."
 
 
 def locate(name: str, file: str) -> Path:

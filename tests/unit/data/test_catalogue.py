@@ -94,6 +94,19 @@ def test_no_network_is_one_sentence(monkeypatch):
     assert "AESI_DATA" in str(caught.value)
 
 
+@pytest.mark.parametrize("name", ["about_energy_nmc", "lg_m50t_w8"])
+def test_a_folder_that_was_named_in_vain_was_asked_for_again(tmp_path, monkeypatch, name):
+    first, *others = catalogue.SETS
+    dead = (replace(first.files[0], url="http://127.0.0.1:9/nothing"),)
+    monkeypatch.setattr(catalogue, "SETS", (replace(first, files=dead), *others))
+    monkeypatch.setenv("AESI_DATA", str(tmp_path / "typo"))
+    with pytest.raises(DataError, match=f"AESI_DATA names {tmp_path}/typo, which is no folder"):
+        catalogue.get(name)
+    (tmp_path / "typo").mkdir()
+    with pytest.raises(DataError, match=f"AESI_DATA names .*typo, which has no folder {name} with"):
+        catalogue.get(name)
+
+
 @pytest.mark.parametrize("below", ["", "measured"])
 def test_a_copy_on_disk_goes_first(tmp_path, monkeypatch, below):
     folder = tmp_path / "mine" / below / "lg_18650hg2"
