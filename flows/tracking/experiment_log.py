@@ -43,7 +43,8 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
     tags = {NOTE: config.note, "aesi.setting": loaded.setting}
     if loaded.fallback:
         tags["aesi.fallback"] = loaded.fallback
-    tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name}, tags)
+    held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
+    tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name, **held}, tags)
     tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
     write_whole(folder / INPUTS / LEFT_OUT, codec.dumps(loaded.left_out))

@@ -110,6 +110,14 @@ def test_tracked_runs_are_found_by_the_beginning_of_their_id(finished, tmp_path)
     assert content["intervals"]["ESPM"]["test_mser_pct"] == pytest.approx([0.0, 0.0], abs=1e-9)
 
 
+def test_runs_of_files_that_were_edited_under_their_names_had_no_setting_that_differs(finished):
+    store = Store(f"sqlite:///{finished / 'mlflow.db'}")
+    (run,) = store.runs(store.find_experiment("smoke"), f"tags.`{KIND}` = 'run'")
+    digests = run.data.params["data_digest"].split(", ")
+    assert len(digests) == len(set(digests)) == 5
+    assert len(run.data.params["cell_digest"]) == 16
+
+
 def test_five_hundred_runs_make_one_page_of_a_size_that_opens(tracked, tmp_path):
     """From the tracking store to the page, with 60 settings and 60 figures a run."""
     store = Store()
