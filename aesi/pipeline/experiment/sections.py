@@ -13,6 +13,7 @@ from aesi.records import Hold
 
 Share = Annotated[float, Field(gt=0, lt=1)]
 Positive = Annotated[float, Field(gt=0)]
+Weight = Annotated[float, Field(ge=0)]
 Count = Annotated[int, Field(ge=1)]
 
 
@@ -232,11 +233,18 @@ class SearchConfig(Section):
     tau: tuple[Share, Share] = (0.3, 0.7)
     pearson_train: Annotated[float, Field(ge=-1, le=1)] = -1.0
     pearson_valid: Annotated[float, Field(ge=-1, le=1)] = -1.0
-    weights: tuple[float, float, float] = (0.5, 0.5, 0.0)
+    weights: tuple[Weight, Weight, Weight] = (0.5, 0.5, 0.0)
     warm_start: bool = True
     timeout_s: Positive = 300.0
     memory_mb: Positive = 6000.0
     workers: Count = 1
+
+    @field_validator("weights")
+    @classmethod
+    def _weigh_something(cls, value: tuple[float, float, float]) -> tuple[float, float, float]:
+        if not any(value):
+            raise ValueError("of the losses at least one has to count; all candidates would be as fit")
+        return value
 
     @field_validator("lambda1", "lambda2", "tau")
     @classmethod

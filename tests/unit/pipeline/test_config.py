@@ -53,6 +53,8 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
     [
         ({"search": {"candidates": 0}}, "search.candidates = 0"),
         ({"search": {"lambda1": [1e-1, 1e-3]}}, "[0.1, 0.001] is empty"),
+        ({"search": {"weights": [-0.5, 0.5, 0.0]}}, "search.weights.0 = -0.5 is not admissible"),
+        ({"search": {"weights": [0, 0, 0]}}, "search.weights: of the losses at least one has to count"),
         ({"library": {"p_c": [2, 1]}}, "[2, 1] is empty; give low <= high"),
         ({"search": {"timeout_s": float("nan")}}, "search.timeout_s"),
         ({"conformal": {"alpha": 1.5}}, "conformal.alpha = 1.5"),
