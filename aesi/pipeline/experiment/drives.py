@@ -49,6 +49,11 @@ def cut_repeats(series: ErrorSeries, repeats: RepeatsConfig) -> Split:
 def _repeat(series: ErrorSeries, period_s: float, number: int) -> ErrorSeries:
     start = series.time_s[0] + (number - 1) * period_s
     low, high = np.searchsorted(series.time_s, [start, start + period_s])
+    if high - low < 2 and period_s < 2 * series.dt_s:
+        raise DataError(
+            f"{series.name}: a repeat of {period_s:g} s holds no two rows {series.dt_s:g} s apart; give the period of "
+            "the schedule in seconds (repeats.period_s), or shorter steps (data.dt_s)."
+        )
     if high - low < 2:
         raise DataError(
             f"{series.name} lasts {series.time_s[-1] - series.time_s[0]:.0f} s and has no repeat {number} of "

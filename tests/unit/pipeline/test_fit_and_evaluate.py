@@ -61,6 +61,13 @@ def test_a_repeat_the_record_does_not_have_is_named(record):
         load(config.model_copy(update={"data": config.data.model_copy(update={"repeats": repeats})}))
 
 
+def test_a_period_of_a_row_was_told_as_a_repeat_that_is_not_there(record):
+    config = experiment(record)
+    repeats = config.data.repeats.model_copy(update={"period_s": 1.0})
+    with pytest.raises(DataError, match="a repeat of 1 s holds no two rows 1 s apart"):
+        load(config.model_copy(update={"data": config.data.model_copy(update={"repeats": repeats})}))
+
+
 def test_a_repeat_that_the_record_ends_in_passed_for_a_whole_one(record):
     config = experiment(record)
     assert not any("the record ends" in note for note in load(config).notes)
