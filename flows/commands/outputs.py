@@ -13,6 +13,8 @@ from aesi.numerics.files.whole import check_writable
 MODEL = "model"
 """The folder of the model within a folder of results."""
 PAGES = (".html", ".htm")
+SUMMARY = "summary.json"
+"""Beside a model it is that of a run."""
 OTHER_FORMATS = (".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5")
 
 
@@ -67,6 +69,11 @@ def check_folder(out: Path, inputs: Sequence[Path] = (), option: str = "--out") 
         if any(_lies_in(given, out / MODEL) for given in inputs):
             raise InputError(
                 f"--out {out}: the model in it is the one that is read, and would be lost; name another folder."
+            )
+        if (out / SUMMARY).is_file() and (out / MODEL).is_dir():
+            raise InputError(
+                f"{option} {out} holds the results of a run ({SUMMARY}), whose model would be lost; name another "
+                "folder."
             )
         check_writable(out / MODEL)
 

@@ -161,6 +161,18 @@ def test_a_model_that_is_read_was_written_over(call, cell, tmp_path, command, ou
 
 
 @pytest.mark.parametrize(
+    "command", [("candidate", "0123abcd"), ("discover", "--cell", LG_M50, "--data", "drive.csv")]
+)
+def test_the_results_of_a_run_were_written_over_by_another_command(call, tmp_path, command):
+    run = tmp_path / "runs" / "smoke" / "0123abcd"
+    (run / "model").mkdir(parents=True)
+    (run / "summary.json").write_text("{}")
+    code, _, err = call(*command, "--out", run)
+    assert code == 2
+    assert f"--out {run} holds the results of a run (summary.json), whose model would be lost" in err
+
+
+@pytest.mark.parametrize(
     ("command", "made", "words"),
     [
         ("simulate", "folder", "is a folder; name the file to write"),
