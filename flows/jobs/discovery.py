@@ -28,9 +28,19 @@ EXPERIMENT = "discover"
 
 
 def check(case: Case) -> None:
-    """Raise AesiError, one sentence, for a cell or an effect file that cannot be used."""
-    case.declared()
-    case.tried()
+    """Raise AesiError, one sentence, for a cell, an effect file or records that cannot be used."""
+    from aesi.tracer.discovery import inverse_problem
+
+    given = case.declared()
+    inverse_problem(
+        given.cell,
+        case.measurements,
+        case.soc0,
+        case.kept_back,
+        case.tried(),
+        given.effects,
+        good=case.good,
+    )
 
 
 def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, str]:

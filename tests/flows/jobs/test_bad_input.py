@@ -94,6 +94,17 @@ def test_data_too_few_for_the_library_leave_no_folder_nor_a_word_of_a_run(tracke
     assert "started" not in capsys.readouterr().err
 
 
+def test_a_record_too_short_to_decide_was_told_after_a_server_had_been_started(call, workspace):
+    rows = "".join(f"{k},{1 + k % 2},{3.9 - 0.001 * k - 0.02 * (k % 2)}\n" for k in range(100))
+    (workspace / "short.csv").write_text(f"time_s,current_a,voltage_v\n{rows}")
+    code, _, err = call("discover", "--cell", CELL, "--data", "short.csv", "--out", "found", "--prefect")
+    assert code == 2
+    assert "are too little to decide" in err
+    assert "Prefect" not in err
+    assert not (workspace / "found").exists()
+    assert not (workspace / "mlflow.db").exists()
+
+
 @pytest.mark.parametrize(
     ("error", "left"),
     [(InputError("no."), []), (DataAway("no network."), ["FAILED"]), (FitError("it fails."), ["FAILED"])],
