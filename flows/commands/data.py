@@ -63,7 +63,8 @@ def convert(
     ] = "aesi",
 ) -> None:
     """Write a measurement as CSV in SI units, and say what was done to it."""
-    outputs.check_table(out, [file, *([cell] if cell else [])])
+    read = [file] if not file.is_dir() else []  # a folder is none that is read, which the reader says
+    outputs.check_table(out, [*read, *([cell] if cell else [])])
     from aesi.data.convert import convert_file, record_lines
 
     admit = None

@@ -232,6 +232,16 @@ def test_a_page_over_a_record_and_figures_into_it_were_not_refused(call, tracked
     assert (tracked / "drive.csv").read_text() == "kept"
 
 
+def test_a_folder_given_for_a_record_was_told_as_a_file_that_would_be_lost(call, tmp_path):
+    (tmp_path / "records").mkdir()
+    for name in ("old.csv", "new.csv"):
+        code, _, err = call("data", "convert", tmp_path / "records", "--out", tmp_path / "records" / name)
+        assert code == 2
+        assert err == f"aesi: {tmp_path}/records is a folder; give one file of it.\n"
+        (tmp_path / "records" / "new.csv").write_text("kept")
+    assert (tmp_path / "records" / "new.csv").read_text() == "kept"
+
+
 @pytest.mark.parametrize("out", ["cells", "cells/found"])
 def test_results_of_a_batch_were_read_as_a_cell_the_next_time(call, tmp_path, out):
     (tmp_path / "cells" / "a").mkdir(parents=True)
