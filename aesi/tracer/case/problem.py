@@ -74,6 +74,8 @@ class InverseProblem:
 
     effects : id -> Effect, all that may be tried or moved.  own : ids of the declared parameters that every hypothesis
     may move within their spread, by trust.  fixed : effects in every simulation.  model : that every hypothesis uses.
+    approximated_v : RMS, V, by which approximations of that model that were let stand move the voltage: no effect is
+    named for less.
     """
 
     cell: Cell
@@ -82,6 +84,7 @@ class InverseProblem:
     fixed: tuple[ActiveEffect, ...] = ()
     trust: Trust = "tight"
     model: ModelName = "espm"
+    approximated_v: float = 0.0
 
     @property
     def coarse(self) -> bool:

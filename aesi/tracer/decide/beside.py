@@ -34,7 +34,7 @@ def gathered_beside(
     Raises DataError where the model cannot be simulated on the records.
     """
     beside = replace(problem, trust="beside")
-    path = searched(beside, min(max_effects, MEASURED_EFFECTS), lambda blocks, fit: False, archive, report)
+    path = searched(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
     if path is None:
         raise DataError(
             f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -22,13 +22,12 @@ from aesi.tracer.decide.verdict import (
     unexplained_v,
 )
 from aesi.tracer.decide.written import Option, carries_best, limits_of, stand_ins, written
-from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
 from aesi.tracer.search.forward import refitted, searched
 from aesi.tracer.search.path import Path, Report
-from aesi.tracer.search.plausible import most_plausible
+from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.wrong_parameters import beyond_spread, with_wrong_parameters
 
 MEASURED_EFFECTS = 1
@@ -66,9 +65,7 @@ def gathered(
         if trust not in paths:
             most = min(max_effects, MOST_EFFECTS.get(trust, max_effects))
             allowed_v = np.inf if trust in MOST_EFFECTS else tolerance_v(problem, thresholds)
-            found = searched(
-                replace(problem, trust=trust), most, _enough(problem, thresholds), archive, report, allowed_v
-            )
+            found = searched(replace(problem, trust=trust), most, archive, report, allowed_v)
             if found is None:
                 raise DataError(
                     f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the "
@@ -85,8 +82,9 @@ def gathered(
             path, verdict = wrong, judged(wrong, thresholds)
     if verdict.word == "found":
         path, verdict = _with_one_cause(path, verdict, archive, thresholds)
+    if verdict.word != "unknown":
         path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
-    elif verdict.word == "none" and not _as_declared(replace(problem, trust="exact"), path, archive):
+    if verdict.word == "none" and path.problem.trust == "tight":  # own parameters may hide an effect
         exact = path_of("exact")
         found = exact, judged(exact, thresholds)
         if believed((path, verdict), found):
@@ -112,32 +110,25 @@ def gathered(
     return Evidence(path, paths, recalibrated, after, with_confidence(verdict), why, limits)
 
 
-def _enough(problem: InverseProblem, thresholds: Thresholds) -> Callable[[Blocks, FittedHypothesis], bool]:
-    """Does a hypothesis leave no more on unseen data than a right one may?"""
-    allowed_v = tolerance_v(problem, thresholds)
-
-    def enough(blocks: Blocks, fit: FittedHypothesis) -> bool:
-        return unexplained_v(problem, blocks, fit, allowed_v) <= allowed_v
-
-    return enough
-
-
 def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
     """Is the second of two searches believed rather than the first? One that explains the data before one that does
-    not, then by what they chose."""
+    not, then by what they chose; both kinds of evidence have to speak for more names, as where one is admitted.
+
+    A blind case that lacks nothing said 3.5 nats more of unseen data with another radius and a plating that made the
+    data less likely by 17.
+    """
     unknown = [verdict.word == "unknown" for _, verdict in (one, other)]
     if unknown[0] != unknown[1]:
         return unknown[0]
-    chosen = other[0].chosen
-    return most_plausible([one[0].chosen, chosen], len(one[0].problem.competing())) is chosen
-
-
-def _as_declared(exact: InverseProblem, tight: Path, archive: Archive) -> bool:
-    """Is the model with its parameters all but as declared the more plausible one? Then no effect can stand in for what
-    they were moved by."""
-    base = base_of(exact, blocks_of(exact), archive)
-    fits = [tight.chosen] if base is None else [tight.chosen, base]
-    return most_plausible(fits, len(exact.competing())) is base
+    competing = len(one[0].problem.competing())
+    first, second = one[0].chosen, other[0].chosen
+    fewer, more = sorted((first, second), key=lambda fit: len(fit.hypothesis))
+    best = most_plausible([first, second], competing)
+    if len(fewer.hypothesis) < len(more.hypothesis):
+        best = (
+            more if best is more and plausibility(more, competing) > plausibility(fewer, competing) else fewer
+        )
+    return best is second
 
 
 def consistent(path: Path, verdict: Verdict) -> Verdict:

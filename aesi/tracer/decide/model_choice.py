@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import Reduction, reduction_of, with_fine_numerics
+from aesi.tracer.case.reduction import Reduction, let_stand, reduction_of, with_fine_numerics
 from aesi.tracer.decide.evidence import Evidence, believed
 from aesi.tracer.decide.verdict import Thresholds, structured_v, tolerance_v
 from aesi.tracer.search.archive import Archive
@@ -66,6 +66,8 @@ def with_model(
         why = ", as asked" if wanted else ", with which the parameters of the cell were fitted"
         return told(search(one, kept(one, None), max_effects), one.model, why)
     single = fine("espm")
+    if reduction is not None and not reduction.notable:
+        single = let_stand(single, reduction.shift_v)
     fits = kept(single, None)
     if problem.has_good:
         return told(
@@ -89,7 +91,7 @@ def with_model(
     unknown = "unknown" in (first.verdict.word, second.verdict.word)
     if most < max_effects and unknown and second.verdict.word != "none":
         first = search(single, fits, max_effects)
-    if with_single_particle(second, first):
+    if believed((second.path, second.verdict), (first.path, first.verdict)):
         return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
 
@@ -111,20 +113,6 @@ def most_names(single: Evidence, max_effects: int) -> int:
     if single.verdict.word == "unknown" or lowers_error(left_v, path.problem.noise_v):
         return max_effects
     return len(path.chosen.hypothesis)
-
-
-def with_single_particle(full: Evidence, single: Evidence) -> bool:
-    """Is the search with the single particle believed? Of two that explain the data as well the one with fewer names,
-    unless more of them lower the error of unseen data by more than two solvers of one model differ: what one model
-    approximates, a name too many makes up for in the other. Else as of any two."""
-    explained = "unknown" not in (full.verdict.word, single.verdict.word)
-    names = [len(one.path.chosen.hypothesis) for one in (full, single)]
-    if explained and names[0] != names[1]:
-        fewer, more = sorted((full, single), key=lambda one: len(one.path.chosen.hypothesis))
-        left_v = [unseen_rmse_v(one.path.blocks, one.path.chosen) for one in (fewer, more)]
-        if not lowers_error(*left_v):
-            return fewer is single
-    return believed((full.path, full.verdict), (single.path, single.verdict))
 
 
 def _explains(single: Evidence, reduction: Reduction | None) -> bool:

@@ -111,22 +111,25 @@ class EffectGrowth:
         )
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
-        begin = [one for one in (known, near) if one is not None]
-        self.begins_elsewhere = bool(begin)
-        self.starts = begin[:1] or [np.clip(u, self.low, self.high) for u in starts(self.added)]
+        self.near = near
+        own_starts = [np.clip(u, self.low, self.high) for u in starts(self.added)]
+        self.starts = own_starts if near is None else [near]
         self.held: ValuesByOwner = {o: v for o, v in fit.values.items() if o != effect}
         self.simulations = 0
         self.off_v = off_within_seconds(self.problem, parent.blocks, (*fit.hypothesis, effect))
-        off = whitened(self.problem, parent.blocks, self.off_v, size)[0]
-        known_columns = np.column_stack([parent.white[size][0][:, self.rest], off])
-        basis = np.vstack([known_columns, np.eye(known_columns.shape[1])])
-        self.q = np.linalg.qr(basis)[0]
         self._errors: dict[bytes, Array | None] = {}
         self._slopes: dict[bytes, Array] = {}
 
+    @cached_property
+    def q(self) -> Array:
+        """Orthonormal basis of what the rest can take up, over its prior."""
+        off = whitened(self.problem, self.parent.blocks, self.off_v, self.size)[0]
+        known_columns = np.column_stack([self.parent.white[self.size][0][:, self.rest], off])
+        return np.linalg.qr(np.vstack([known_columns, np.eye(known_columns.shape[1])]))[0]
+
     def from_own_starts(self) -> EffectGrowth:
         """The same descent from the starts of the effect, wherever another one ended; itself where it begins there."""
-        return EffectGrowth(self.parent, self.effect, self.size) if self.begins_elsewhere else self
+        return self if self.near is None else EffectGrowth(self.parent, self.effect, self.size)
 
     def error_v(self, u: Array) -> Array | None:
         """(n,) V, or None where the model fails."""
@@ -203,6 +206,12 @@ class EffectGrowth:
                 columns += [jacobian, (self.parent.fit.point.residual_v - e)[:, None]]
         return np.hstack(columns)
 
+    def first_slopes(self) -> Array | None:
+        """(n, k) V: the slopes where a descent begins; None where it cannot be simulated there."""
+        u = self._most_promising()
+        e = None if u is None else self.error_v(u)
+        return None if u is None or e is None else self.jacobian(u, e)
+
     def ended(self) -> Grown | None:
         """Where a descent ends, within the bounds; None where the effect cannot be simulated."""
         self.known = u = self._descended() if self.known is None else self.known
@@ -231,19 +240,22 @@ class EffectGrowth:
         return min(promised, key=lambda one: one[0])[1] if promised else None
 
 
-def promise(parent: Parent, slopes_v: Array, size: Size) -> float:
-    """What an effect would say of unseen data on top of a parent, nats up to a constant, to first order and with the
-    slopes that it had on another one: costs no simulation."""
-    fit = parent.fit
-    known, log_det = parent.white[size]
-    own = np.column_stack([fit.point.residual_v, slopes_v])
-    new, _ = whitened(parent.problem, parent.blocks, own, size)
-    table = np.column_stack([new[:, :1], known, new[:, 1:]])
+def promise(parent: Parent, slopes_v: Array) -> float:
+    """What an effect would say of unseen data on top of a parent, nats, to first order and with the slopes that it had
+    on another one, at the size of the model error that the parent needs or that a right hypothesis leaves, whichever
+    says more: costs no simulation."""
+    fit, prior = parent.fit, PRIORS[parent.problem.trust]
+    own = SplitTable(parent.problem, parent.blocks, np.column_stack([fit.point.residual_v, slopes_v]))
     x = np.concatenate([fit.point.padded_x, np.zeros(slopes_v.shape[1])])
     open_ends = np.tile([-np.inf, np.inf], (slopes_v.shape[1], 1))
     bounds = np.vstack([fit.point.padded_bounds, open_ends])
-    sums = block_sums(parent.blocks, table, log_det)
-    return score_at(parent.blocks, sums, x, bounds, size, 0.0).total
+    said = []
+    for size in {fit.score.size, prior.nearest(prior.median)}:
+        known, log_det = parent.white[size]
+        new, _ = own.whitened(size)
+        sums = block_sums(parent.blocks, np.column_stack([new[:, :1], known, new[:, 1:]]), log_det)
+        said.append(score_at(parent.blocks, sums, x, bounds, size, prior.log_density(size)).total)
+    return max(said)
 
 
 def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:

@@ -13,15 +13,14 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis, from_within
 from aesi.tracer.search.grown import ended, growths_on
-from aesi.tracer.search.path import Path, Report, Step, beyond_noise, lowers_error, unseen_rmse_v
-from aesi.tracer.search.plausible import alike, most_plausible, plausibility
+from aesi.tracer.search.path import Path, Report, Step, beyond_noise, unseen_rmse_v
+from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.reach import REACH, within_reach
 
 FINALISTS = 6
@@ -32,9 +31,6 @@ fits left 1.36 mV with a wrong name, six 1.006 of a noise of 1.01, in 30 instead
 FINALIST_SHARE = 0.5
 """Of what the best of them says more when it is grown. On six blind cases of seeds 0 and 12 those that said less ended
 at 2 to 27 % of the best one's full fit."""
-BEAM = 2
-"""Hypotheses that a further effect is tried on. The best and one to fall back on, a convention: each costs
-another round of growing. With 1 and 4 the seven cases of `ALIKE_NATS` get the same answers."""
 HOPELESS_SHARE = 0.7
 """Of the mean square beyond noise on unseen data without any effect: where two effects leave more, a third is not tried
 and none is exchanged. A convention that saves time: on a measured cell, which no two effects explain, each further
@@ -45,14 +41,12 @@ of three said 256 nats and did not lower the error, and the three were found."""
 def searched(
     problem: InverseProblem,
     max_effects: int,
-    enough: Callable[[Blocks, FittedHypothesis], bool],
     archive: Archive,
     report: Report = lambda problem, one, gain: None,
     allowed_v: float = np.inf,
 ) -> Path | None:
     """Grow from the bare model until nothing more is admitted, at most `max_effects` effects.
 
-    enough : is what a hypothesis leaves within what a right one leaves? Then nothing is added that does not say much.
     allowed_v : V beyond noise that a right one may leave; where all effects together leave far more, none is fitted.
     """
     blocks = blocks_of(problem)
@@ -81,10 +75,7 @@ def searched(
         chosen = step.admitted
         if len(chosen.hypothesis) > 1 and _hopeless(problem, blocks, base, chosen):
             break
-        others = [f for f in step.fitted if f is not chosen]
-        if enough(blocks, chosen):
-            others = [f for f in others if alike(chosen, f)]
-        parents = [chosen, *others][:BEAM]
+        parents = [chosen, *(f for f in step.fitted if f is not chosen)]
     least_nats = max((step.admission_nats for step in steps), default=0.0)
     chosen = without_needless(problem, blocks, chosen, least_nats, archive, base, report)
     if not _hopeless(problem, blocks, base, chosen):
@@ -116,7 +107,7 @@ def without_needless(
                 continue
             report(problem, fit, fit.score.total - chosen.score.total)
             if (
-                not needed(blocks, fit, chosen, least_nats, len(problem.competing()))
+                not needed(problem, blocks, fit, chosen, least_nats)
                 and may_be(fit)
                 and (best is None or fit.score.total > best.score.total)
             ):
@@ -197,7 +188,7 @@ def _step(
     fitted.sort(key=lambda f: -f.score.total)
     if fitted and fitted[0].at_bounds:
         fitted[0] = from_within(problem, blocks, fitted[0], archive)
-    may = [f for f in fitted if admissible(blocks, best, f, least_nats, competing)]
+    may = [f for f in fitted if admissible(problem, blocks, best, f, least_nats)]
     admitted = most_plausible(may, competing)
     return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
@@ -237,21 +228,32 @@ def _hopeless(
 
 
 def admissible(
-    blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float, competing: int
+    problem: InverseProblem,
+    blocks: Blocks,
+    without: FittedHypothesis,
+    fit: FittedHypothesis,
+    least_nats: float,
 ) -> bool:
     """Does the effect say enough of unseen data, is the hypothesis more plausible with it, does it move the voltage by
-    more than two solvers of one model differ, and does it end on no bound? By how much it lowers their error is not
-    asked: the first of several may not lower it at all."""
+    more than approximations of the model do, and does it end on no bound? By how much it lowers the error is not asked:
+    the first of several may not lower it at all."""
+    competing = len(problem.competing())
     moved_v = held_out_residual(blocks, without) - held_out_residual(blocks, fit)
-    says = fit.score.total - without.score.total
-    believed = plausibility(fit, competing) > plausibility(without, competing)
-    return says > least_nats and believed and float(np.mean(moved_v**2)) > LEAST_V**2 and not fit.at_bounds
+    return (
+        fit.score.total - without.score.total > least_nats
+        and plausibility(fit, competing) > plausibility(without, competing)
+        and float(np.mean(moved_v**2)) > problem.approximated_v**2
+        and not fit.at_bounds
+    )
 
 
 def needed(
-    blocks: Blocks, without: FittedHypothesis, fit: FittedHypothesis, least_nats: float, competing: int
+    problem: InverseProblem,
+    blocks: Blocks,
+    without: FittedHypothesis,
+    fit: FittedHypothesis,
+    least_nats: float,
 ) -> bool:
-    """Would the effect be admitted on top of all the others, and does it lower the error of unseen data by more than
-    two solvers of one model differ?"""
-    left_v = unseen_rmse_v(blocks, without), unseen_rmse_v(blocks, fit)
-    return lowers_error(*left_v) and admissible(blocks, without, fit, least_nats, competing)
+    """Would the effect be admitted on top of all the others, and does it lower the error of unseen data?"""
+    lowers = unseen_rmse_v(blocks, fit) < unseen_rmse_v(blocks, without)
+    return lowers and admissible(problem, blocks, without, fit, least_nats)

@@ -13,7 +13,7 @@ from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
-from aesi.tracer.search.grown import promising
+from aesi.tracer.search.grown import competing
 
 OFFSET_V = 8e-3
 TRIED = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "ocv_hysteresis")
@@ -87,11 +87,10 @@ def test_what_the_cell_is_made_with_and_its_age_do_not_compete_beside_good_recor
         for good in ([], [make(seed=3)])
     )
 
-    def competing(problem):
-        fit = SimpleNamespace(hypothesis=())
-        return set(promising(SimpleNamespace(problem=problem, fit=fit), {}))
+    def tried(problem):
+        return set(competing(SimpleNamespace(problem=problem, fit=SimpleNamespace(hypothesis=()))))
 
-    assert competing(beside) == {
+    assert tried(beside) == {
         "ambient_temperature",
         "series_resistance",
         "leakage_current",
@@ -100,7 +99,7 @@ def test_what_the_cell_is_made_with_and_its_age_do_not_compete_beside_good_recor
         "voltage_sensor_offset",
         "clock_skew",
     }
-    assert competing(beside) < competing(alone)
+    assert tried(beside) < tried(alone)
 
 
 def test_good_records_count_where_the_others_have_been(cell, make):

@@ -13,7 +13,8 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content, found_model
 from aesi.records import Measurement
 from aesi.tracer import discover
-from aesi.tracer.decide.model_choice import most_names, with_single_particle
+from aesi.tracer.decide.evidence import believed
+from aesi.tracer.decide.model_choice import most_names
 
 from .conftest import CELLS, NOISE_V, steps
 
@@ -100,11 +101,16 @@ def test_the_porous_electrode_is_tried_with_as_many_names_as_could_be_believed()
     assert most_names(explained(("a",), 100.0, 1e-3, "unknown"), 3) == 3
 
 
-def test_a_further_name_than_with_the_other_model_has_to_lower_the_error_of_unseen_data():
-    one = explained(("a",), 100.0, 1e-3)
-    two = explained(("b", "c"), 120.0, 1e-3)
-    assert not with_single_particle(one, two)
-    assert with_single_particle(two, one)
-    assert with_single_particle(one, explained(("b", "c"), 120.0, 0.9e-3))
-    assert with_single_particle(one, explained(("d",), 120.0, 1e-3))
-    assert with_single_particle(explained((), 90.0, 1e-3, "unknown"), two)
+def test_both_kinds_of_evidence_have_to_speak_for_a_further_name():
+    def searched(names, total, plausible, word="found"):
+        one = explained(names, total, 1e-3, word)
+        one.path.chosen.score.evidence = plausible + len(names) * np.log(20)
+        return one.path, one.verdict
+
+    one = searched(("a",), 100.0, 50.0)
+    assert believed(one, searched(("b", "c"), 110.0, 51.0))
+    assert not believed(one, searched(("b", "c"), 110.0, 49.0))
+    assert not believed(one, searched(("b", "c"), 96.0, 60.0))
+    assert believed(searched(("b", "c"), 110.0, 49.0), one)
+    assert believed(one, searched(("d",), 110.0, 49.0))
+    assert believed(searched((), 120.0, 70.0, "unknown"), one)

@@ -9,7 +9,6 @@ import pytest
 from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
-from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
@@ -17,7 +16,7 @@ from aesi.tracer.search import reach
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
-from aesi.tracer.search.grown import growths_on
+from aesi.tracer.search.grown import PROMISING, growths_on, most_promising
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 from aesi.tracer.search.reach import REACH, least_left_v
 
@@ -87,6 +86,22 @@ def test_a_name_is_paid_for_with_how_many_might_have_been_given():
     assert most_plausible([nothing, named], 10) is named
 
 
+def test_a_pair_is_grown_from_whichever_of_its_effects_says_more_with_the_other():
+    names = ["best", "other", *(f"effect {k}" for k in range(PROMISING))]
+    parents = [SimpleNamespace(fit=SimpleNamespace(hypothesis=(name,))) for name in names[:2]]
+    says = {("best", "other"): 20.0, ("other", "best"): 30.0, ("other", "effect 3"): 25.0}
+    promised = [
+        (p, name, says.get((*p.fit.hypothesis, name), 10.0))
+        for p in parents
+        for name in names
+        if name not in p.fit.hypothesis
+    ]
+    tried = [(p.fit.hypothesis[0], name) for p, name in most_promising(promised)]
+    assert tried[:2] == [("other", "best"), ("other", "effect 3")]
+    assert ("best", "other") not in tried
+    assert len(tried) == PROMISING
+
+
 def test_a_declared_parameter_under_test_is_expected_as_far_off_as_files_are():
     kinetics = of_effect("charge_transfer_kinetics", CATALOGUE["charge_transfer_kinetics"].parameters, 30.0)
     loose = [p.spread.loose for p in CATALOGUE["charge_transfer_kinetics"].parameters.values()]
@@ -101,6 +116,8 @@ BLOCKS = SimpleNamespace(of_row=np.zeros(100, dtype=int), compared=np.ones(100, 
 
 
 COMPETING = 20
+PROBLEM = SimpleNamespace(competing=lambda: range(COMPETING), approximated_v=0.0)
+WAVE_V = 3e-4 * np.sin(np.arange(100.0))
 
 
 def left(residual_v, total, evidence=None, names=("one",)):
@@ -111,29 +128,36 @@ def left(residual_v, total, evidence=None, names=("one",)):
     return SimpleNamespace(score=score, point=point, at_bounds=(), hypothesis=names)
 
 
-def test_an_effect_that_moves_unseen_data_is_a_step_though_it_is_no_end_before_it_lowers_the_error():
-    wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
-    before = left(wave_v, 0.0, names=())
-    moved, lower = left(-wave_v, 50.0), left(0.5 * wave_v, 50.0)
-    assert admissible(BLOCKS, before, moved, 5.0, COMPETING)
-    assert not needed(BLOCKS, before, moved, 5.0, COMPETING)
-    assert admissible(BLOCKS, before, lower, 5.0, COMPETING)
-    assert needed(BLOCKS, before, lower, 5.0, COMPETING)
+def test_an_effect_that_says_much_is_a_step_though_it_is_no_end_before_it_lowers_the_error():
+    before = left(WAVE_V, 0.0, names=())
+    moved, lower = left(-WAVE_V, 50.0), left(0.5 * WAVE_V, 50.0)
+    assert admissible(PROBLEM, BLOCKS, before, moved, 5.0)
+    assert not needed(PROBLEM, BLOCKS, before, moved, 5.0)
+    assert admissible(PROBLEM, BLOCKS, before, lower, 5.0)
+    assert needed(PROBLEM, BLOCKS, before, lower, 5.0)
 
 
-def test_an_effect_that_says_little_or_moves_less_than_two_solvers_differ_by_is_no_step():
-    wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
-    before = left(wave_v, 0.0, names=())
-    assert not admissible(BLOCKS, before, left(0.5 * wave_v, 4.0), 5.0, COMPETING)
-    assert not admissible(BLOCKS, before, left(0.9 * wave_v, 50.0), 5.0, COMPETING)
+def test_an_effect_that_says_little_or_ends_on_a_bound_is_no_step():
+    before = left(WAVE_V, 0.0, names=())
+    on_bound = left(0.5 * WAVE_V, 50.0)
+    on_bound.at_bounds = ("one.value",)
+    assert not admissible(PROBLEM, BLOCKS, before, left(0.5 * WAVE_V, 4.0), 5.0)
+    assert not admissible(PROBLEM, BLOCKS, before, on_bound, 5.0)
+
+
+def test_an_effect_that_moves_less_than_what_the_model_approximates_is_no_step():
+    before, small = left(WAVE_V, 0.0, names=()), left(0.9 * WAVE_V, 50.0)
+    assert admissible(PROBLEM, BLOCKS, before, small, 5.0)
+    rough = SimpleNamespace(competing=PROBLEM.competing, approximated_v=3e-5)
+    assert not admissible(rough, BLOCKS, before, small, 5.0)
+    assert admissible(rough, BLOCKS, before, left(0.5 * WAVE_V, 50.0), 5.0)
 
 
 def test_what_one_of_many_names_foretells_by_luck_is_no_step_where_it_makes_the_data_less_likely():
-    wave_v = 3 * LEAST_V * np.sin(np.arange(100.0))
-    before = left(wave_v, 0.0, names=())
+    before = left(WAVE_V, 0.0, names=())
     paid = float(np.log(COMPETING))
-    assert not admissible(BLOCKS, before, left(0.5 * wave_v, 8.5, evidence=paid - 0.1), 5.0, COMPETING)
-    assert admissible(BLOCKS, before, left(0.5 * wave_v, 8.5, evidence=paid + 0.1), 5.0, COMPETING)
+    assert not admissible(PROBLEM, BLOCKS, before, left(0.5 * WAVE_V, 8.5, evidence=paid - 0.1), 5.0)
+    assert admissible(PROBLEM, BLOCKS, before, left(0.5 * WAVE_V, 8.5, evidence=paid + 0.1), 5.0)
 
 
 def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_right_one(cell, few, make):
@@ -143,7 +167,7 @@ def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_righ
     strange = replace(right, voltage_v=right.voltage_v + 5e-3 * np.sin(right.time_s / 30.0))
     asked = ((right, many), (strange, many), (strange, few))
     problems = [inverse_problem(cell, [data], 0.9, effects=effects) for data, effects in asked]
-    paths = [searched(one, 1, lambda *_: True, Archive(None, ""), allowed_v=ALLOWED_V) for one in problems]
+    paths = [searched(one, 1, Archive(None, ""), allowed_v=ALLOWED_V) for one in problems]
     assert paths[0].chosen.hypothesis == ("series_resistance",)
     assert paths[0].beyond_reach_v is None
     assert paths[1].chosen is paths[1].base
@@ -157,7 +181,7 @@ def test_what_moves_the_voltage_far_is_followed_before_it_is_called_out_of_reach
     many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "clock_skew")}
     data = make((CATALOGUE["clock_skew"].activate(lag_s=2.0),))
     problem = inverse_problem(cell, [data], 0.9, effects=many)
-    path = searched(problem, 1, lambda *_: True, Archive(None, ""), allowed_v=ALLOWED_V)
+    path = searched(problem, 1, Archive(None, ""), allowed_v=ALLOWED_V)
     growths = growths_on([Parent(problem, path.blocks, path.base)], {}, Archive(None, ""))
     begun = least_left_v(path.base, [growth.marks() for growth in growths], problem.white_v)
     assert begun > REACH * ALLOWED_V
@@ -172,7 +196,7 @@ def test_what_was_within_reach_is_within_reach_with_more_names(cell, few, make, 
     archive = Archive(None, "")
 
     def looked(most, archive):
-        return searched(problem, most, lambda *_: True, archive, allowed_v=ALLOWED_V)
+        return searched(problem, most, archive, allowed_v=ALLOWED_V)
 
     once = looked(1, archive)
     monkeypatch.setattr(reach, "least_left_v", lambda *_: np.inf)
