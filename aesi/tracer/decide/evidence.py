@@ -123,12 +123,11 @@ def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
     competing = len(one[0].problem.competing())
     first, second = one[0].chosen, other[0].chosen
     fewer, more = sorted((first, second), key=lambda fit: len(fit.hypothesis))
-    best = most_plausible([first, second], competing)
-    if len(fewer.hypothesis) < len(more.hypothesis):
-        best = (
-            more if best is more and plausibility(more, competing) > plausibility(fewer, competing) else fewer
-        )
-    return best is second
+    if len(fewer.hypothesis) < len(more.hypothesis) and not (
+        plausibility(more, competing) > plausibility(fewer, competing)
+    ):
+        return fewer is second
+    return most_plausible([first, second], competing) is second
 
 
 def consistent(path: Path, verdict: Verdict) -> Verdict:
