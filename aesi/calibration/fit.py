@@ -117,12 +117,13 @@ def problem(
     span = _span_k(start, ready)
     if span <= SPAN_K:
         told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
-    start = with_interfaces(start)
+    measured = any(r.kelvin is not None for r in ready)
+    start = with_interfaces(start, measured)
     ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
     model = Model(
         start,
         ready,
-        free_parameters(start, span, conditions.same_cell),
+        free_parameters(start, span, conditions.same_cell, measured),
         Shapes.over(start, span),
         zero,
         ageing,

@@ -1,9 +1,10 @@
 """Heat capacity and conductance of a cell, from the temperature measured on its case.
 
-    C dT/dt = I (U - V) - I T dU/dT - G (T - T_amb)      I > 0 on discharge; V as measured, U of the calibrated cell
+    C dT/dt = Q - (T - T_case)/R,   (T - T_case)/R = G (T_case - T_amb)
+    Q = I (U - V) - I T dU/dT        I > 0 on discharge; V as measured, U of the calibrated cell
 
-Leaves out gradients between core and case. The surroundings are those of each record, within `AMBIENT_SD_K` of where
-the cell starts.
+Leaves out what the case itself stores. R is the calibrated cell's (`Cell.winding_resistance_k_w`). The surroundings are
+those of each record, within `AMBIENT_SD_K` of where the cell starts.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """
@@ -34,7 +35,7 @@ TYPICAL_W_K = 0.1
 
 @dataclass(frozen=True)
 class HeatFit:
-    """Heat capacity (J/K), conductance to the surroundings (W/K), and what is left of the temperatures (K)."""
+    """Heat capacity (J/K), conductance from case to surroundings (W/K), and what is left of the temperatures (K)."""
 
     heat_capacity_j_k: float
     conductance_w_k: float
@@ -45,8 +46,8 @@ class HeatFit:
     def sentence(self) -> str:
         """For a reader."""
         return (
-            f"heat: {self.heat_capacity_j_k:.3g} J/K and {self.conductance_w_k:.3g} W/K follow the measured "
-            f"temperature of {', '.join(self.records)} within {self.rmse_k:.2f} K; they are in the file."
+            f"heat: {self.heat_capacity_j_k:.3g} J/K and {self.conductance_w_k:.3g} W/K from the case follow the "
+            f"measured temperature of {', '.join(self.records)} within {self.rmse_k:.2f} K; they are in the file."
         )
 
 
@@ -67,17 +68,20 @@ def with_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str,
 
 def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float) -> HeatFit:
     """Least squares over all records."""
+    inside = cell.winding_resistance_k_w
     driven = [(r, heat_w(cell, r)) for r in records]
 
     def off(z: Array) -> Array:
         capacity, conductance = start_j_k * np.exp(z[0]), TYPICAL_W_K * np.exp(z[1])
+        share = 1.0 / (1.0 + conductance * inside)
         parts = []
         for (record, watts), shift in zip(driven, z[2:], strict=True):
             assert record.kelvin is not None
             ambient = record.kelvin[0] + AMBIENT_SD_K * shift
-            course = temperature_k(
-                record.rows.time_s, watts, record.kelvin[0], ambient, capacity, conductance
+            winding = temperature_k(
+                record.rows.time_s, watts, record.kelvin[0], ambient, capacity, conductance * share
             )
+            course = ambient + share * (winding - ambient)
             parts.append((course - record.kelvin) / READING_K / len(course) ** 0.5)
         return np.concatenate([*parts, 0.1 * z[2:]])
 

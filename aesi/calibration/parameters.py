@@ -115,6 +115,13 @@ a hundred times that of the window; its pulses at -10 degC left out."""
 DOUBLE_LAYER_F_M2, LAYER_SD = 1.0, 1.2
 """A convention. With 0.2 and 0.7 the same pulses ended at four deviations, 3.2 F/m2."""
 LAYERS = "0.2 F/m2 in PyBaMM's parameter sets; convention: five times that, of a rough surface"
+CONDUCTIVITY_W_M_K, CONDUCTIVITY_SD = 0.2, 0.5
+"""From the winding to the thermocouple on its case, and the deviation of its logarithm: a convention, as what is glued
+to a case reads less than the case has. The source is of LFP cells."""
+CONDUCTIVITIES = (
+    "0.20 and 0.15 W/(m K) across the windings of an 18650 and a 26650, Drake et al. 2014, "
+    "doi:10.1016/j.jpowsour.2013.11.107"
+)
 FULL_SD = {"negative": 0.015, "positive": 0.03}
 """Of the stoichiometries of full charge, where the file may be of a cell that was made a little differently."""
 AGED_FULL_SD = {"negative": 0.15, "positive": 0.15}
@@ -123,11 +130,14 @@ Measured on three made check-ups of an LG M50 with up to that: with FULL_SD a te
 HALF_CELLS = "convention: cells of one chemistry are balanced alike within a tenth; no source"
 
 
-def free_parameters(cell: Cell, span_k: float, same_cell: bool = False) -> tuple[Free, ...]:
+def free_parameters(
+    cell: Cell, span_k: float, same_cell: bool = False, measured: bool = False
+) -> tuple[Free, ...]:
     """What moves, for records whose temperatures span `span_k` (K).
 
     Energies are free where the records tell them; at one temperature nothing does, and they stay.
-    same_cell : the records are of the cell of the file, which may have lost lithium.
+    same_cell : the records are of the cell of the file, which may have lost lithium.  measured : there is a temperature
+    of the case.
     """
     ohm = CONTACT_V / cell.nominal_capacity_ah
     full = AGED_FULL_SD if same_cell else FULL_SD
@@ -159,6 +169,10 @@ def free_parameters(cell: Cell, span_k: float, same_cell: bool = False) -> tuple
         typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
         out.append(Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True))
         out.append(Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True))
+    if measured and cell.winding_resistance_k_w and cell.heat_capacity_j_k is not None:
+        k = cell.thermal_conductivity_w_m_k
+        assert k is not None
+        out.append(Free("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
     if span_k > SPAN_K:
         n, p, e = cell.negative, cell.positive, cell.electrolyte
         out += [
@@ -206,6 +220,7 @@ def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:
         positive=_electrode(p, "positive", values),
         electrolyte=electrolyte,
         contact_resistance_ohm=values.get("contact.resistance", cell.contact_resistance_ohm),
+        thermal_conductivity_w_m_k=values.get("thermal.conductivity", cell.thermal_conductivity_w_m_k),
     )
 
 
@@ -214,8 +229,13 @@ def course(side: str, what: str, place: int) -> str:
     return f"{side}.{what}_at_{round(100 * PLACES[place])}_percent"
 
 
-def with_interfaces(cell: Cell) -> Cell:
-    """The cell with typical contacts and films where its file has none: a calibration moves them from there."""
+def with_interfaces(cell: Cell, measured: bool) -> Cell:
+    """The cell with typical contacts and films where its file has none: a calibration moves them from there.
+
+    measured : there is a temperature of the case, to which heat is conducted from within.
+    """
+    if measured and cell.thermal_conductivity_w_m_k is None:
+        cell = replace(cell, thermal_conductivity_w_m_k=CONDUCTIVITY_W_M_K)
     if not cell.contact_resistance_ohm:
         cell = replace(cell, contact_resistance_ohm=CONTACT_V / cell.nominal_capacity_ah)
     film = Constant(FILM_OHM_M2)

@@ -57,7 +57,10 @@ class Interface:
 
 @dataclass(frozen=True)
 class HeatBalance:
-    """The cell as one lump: heat capacity (J/K), conductance to its surroundings (W/K)."""
+    """The cell as one lump: heat capacity (J/K), conductance to its surroundings (W/K).
+
+    Its surroundings are the air about it, or its own case where the temperature of that was measured.
+    """
 
     heat_capacity_j_k: float
     conductance_w_k: float
@@ -71,7 +74,7 @@ class EspmModel:
     """The extended single-particle model of a cell, and its extensions.
 
     regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
-    heat : None for a temperature that is given or constant.
+    heat : None for a temperature that is given or constant; see `of_record`.
     solid_order, surface_slope : even Legendre polynomials a particle, and the slope of their coordinate at its surface
     (`SphereModes`).  electrolyte_order : polynomial degree a layer.
     electrode_points : of a porous electrode, where reaction and salt are resolved.
@@ -126,8 +129,23 @@ def activation_energies(cell: Cell) -> Array:
     )  # fmt: skip
 
 
+def of_record(model: EspmModel, measured: bool) -> EspmModel:
+    """The model for a record with or without the temperature of its case.
+
+        C dT/dt = Q - (T - T_case)/R
+
+    Where that was measured no other heat balance counts; the winding has the temperature of its case where the file
+    tells no resistance R between them (`Cell.winding_resistance_k_w`) or no heat capacity C.
+    """
+    if not measured:
+        return model
+    resistance, capacity = model.cell.winding_resistance_k_w, model.cell.heat_capacity_j_k
+    heat = HeatBalance(capacity, 1.0 / resistance) if resistance and capacity else None
+    return model if heat == model.heat else replace(model, heat=heat)
+
+
 def heat_numbers(model: EspmModel) -> Array:
-    """(3,) heat capacity J/K (0 for none), conductance W/K, surroundings K."""
+    """(3,) heat capacity J/K (0 for none), conductance W/K, surroundings K where no case was measured."""
     if model.heat is None:
         return np.zeros(3)
     balance = model.heat

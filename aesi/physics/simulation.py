@@ -170,7 +170,7 @@ def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: 
     temperature = record.temperature_k
     if temperature is not None and np.ptp(temperature) == 0.0:
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
-        if model.heat is None:
+        if model.heat is None and not model.cell.winding_resistance_k_w:
             temperature = None
     return solve(model, record.time_s, record.current_a, temperature, soc0, hold)
 

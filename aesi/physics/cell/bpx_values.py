@@ -139,7 +139,9 @@ def _check_thermal(cell: CellParameters, where: str) -> None:
     """What is there of mass, heat capacity and surface is positive, and together that of a cell."""
     names = ("density_kg_m3", "specific_heat_j_kg_k", "volume_m3")
     there = {
-        name: value for name in (*names, "surface_area_m2") if (value := getattr(cell, name)) is not None
+        name: value
+        for name in (*names, "surface_area_m2", "thermal_conductivity_w_m_k")
+        if (value := getattr(cell, name)) is not None
     }
     require_positive(where, **there)
     if not all(name in there for name in names):

@@ -14,6 +14,7 @@ from aesi.physics.cell.parts import (
     HEAT_TRANSFER,
     NO_FILM,
     RATE_FACTORS,
+    THERMAL_CONDUCTIVITY,
     UNITY,
     CellParameters,
     Electrode,
@@ -82,6 +83,7 @@ def _own_fields(cell: CellParameters) -> dict[str, Any]:
     """What BPX has no field for, as far as the cell has it."""
     own: dict[str, Any] = {
         CONTACT_RESISTANCE: cell.contact_resistance_ohm,
+        THERMAL_CONDUCTIVITY: cell.thermal_conductivity_w_m_k,
         **{field: float(model == cell.fitted_with) for model, field in FITTED_WITH.items()},
         CAPACITY_SHARES: dict(cell.capacity_shares),
     }

@@ -20,6 +20,8 @@ NO_FILM = Constant(0.0)
 UNITY = Constant(1.0)
 CONTACT_RESISTANCE = "Contact resistance [Ohm]"
 """The field of `contact_resistance_ohm` in the user-defined section of a file: BPX itself has none for it."""
+THERMAL_CONDUCTIVITY = "Thermal conductivity [W.m-1.K-1]"
+"""The field of `thermal_conductivity_w_m_k` in the user-defined section."""
 HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FITTED_WITH = {model: f"Fitted with {model}" for model in ("espm", "dfn")}
 """Fields of `fitted_with`, one of them 1: the standard takes numbers there, and reads words as formulas."""
@@ -106,6 +108,7 @@ class CellParameters:
 
     electrode_area_m2 : of one electrode pair.
     density_kg_m3 to heat_transfer_w_m2_k : None where the file has no thermal data.
+    thermal_conductivity_w_m_k : from the inside of the winding to the case, see `winding_resistance_k_w`.
     contact_resistance_ohm : in series with the whole cell; that of metal, the same at any temperature.
     fitted_with : "espm" or "dfn", the model that the parameters were fitted with, where they were.
     capacity_shares : (record, share of this capacity that the cell had then), of the records of that fit.
@@ -128,6 +131,7 @@ class CellParameters:
     specific_heat_j_kg_k: float | None = None
     volume_m3: float | None = None
     surface_area_m2: float | None = None
+    thermal_conductivity_w_m_k: float | None = None
     heat_transfer_w_m2_k: float | None = None
     contact_resistance_ohm: float = 0.0
     fitted_with: str = ""
@@ -154,11 +158,24 @@ class CellParameters:
         return window * self.electrode_capacity_ah(self.negative)
 
     @property
+    def winding_resistance_k_w(self) -> float:
+        """By how much (K/W) the mean of the winding is warmer than its case; 0 where the file does not tell.
+
+        Of a long cylinder that heats evenly, k its conductivity, V its volume and A its surface: (V/A)/(2 k A), by the
+        mean of q (r0^2 - r^2)/(4 k). A plate of the same V and A has two thirds of it.
+        """
+        k, surface, volume = self.thermal_conductivity_w_m_k, self.surface_area_m2, self.volume_m3
+        if k is None or surface is None or volume is None:
+            return 0.0
+        return volume / surface / (2.0 * k * surface)
+
+    @property
     def conductance_w_k(self) -> float | None:
-        """To the surroundings: heat transfer coefficient times surface, or None where one is not declared."""
+        """W/K from the winding to the surroundings, through the case; None where the file does not tell."""
         if self.heat_transfer_w_m2_k is None or self.surface_area_m2 is None:
             return None
-        return self.heat_transfer_w_m2_k * self.surface_area_m2
+        outside = self.heat_transfer_w_m2_k * self.surface_area_m2
+        return outside / (1.0 + outside * self.winding_resistance_k_w)
 
     @property
     def heat_capacity_j_k(self) -> float | None:

@@ -68,11 +68,13 @@ def run_porous(  # type: ignore[no-untyped-def]
             i0 = t.total[0] * e.area
             i1 = current[k] if drive.backward else current[k - 1] + (current[k] - current[k - 1]) * share
             set_currents(t, i1, e.area)
-            start_k = t_k
+            start_k, around_k = t_k, e.heat[2]
             if drive.given:
-                t_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * share
-            elif e.heat[0] > 0.0:
-                t_k = heated(start_k, watts, dt, e.heat)
+                around_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * share
+            if e.heat[0] > 0.0:
+                t_k = heated(start_k, watts, dt, e.heat, around_k)
+            elif drive.given:
+                t_k = around_k
             t_weights = renew_factors(t_k, t_weights, e.energies, e.reference_k, t.faster, weights.keys)
             if t_k != t_rates:
                 t_rates = t_k
@@ -104,8 +106,7 @@ def run_porous(  # type: ignore[no-untyped-def]
             if e.heat[0] > 0.0:
                 voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
                 power = heat_power(p, e, state, half, i1, voltage, t_k)
-                if not drive.given:
-                    t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat)
+                t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat, around_k)
                 watts = power
         voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
         if k == 0 and e.heat[0] > 0.0:

@@ -11,7 +11,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.dfn.arguments import porous_arguments
 from aesi.physics.dfn.layout import DfnState, DfnTrial, Electrodes, NewtonScratch, Particles, Stack, Weights
 from aesi.physics.espm.layout import CACHE_SLOTS, VOLTAGE_ROWS, Drive
-from aesi.physics.model import EspmModel
+from aesi.physics.model import EspmModel, of_record
 from aesi.records import Hold
 
 LONGER_STEPS = 5.0
@@ -35,6 +35,7 @@ def run_porous_electrode(
     from aesi.physics.dfn.record_kernels import run_porous
 
     check_whole(model)
+    model = of_record(model, temperature_k is not None)
     particles, stack, electrodes = porous_arguments(model)
     out = np.empty((9, len(time)))
     given = temperature_k is not None

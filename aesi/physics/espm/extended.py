@@ -34,7 +34,7 @@ from aesi.physics.espm.tables import (
     rate_tables,
     solid_diffusion,
 )
-from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers
+from aesi.physics.model import NO_PLATING, EspmModel, activation_energies, heat_numbers, of_record
 from aesi.records import Hold
 
 
@@ -44,6 +44,7 @@ def run_extended(
     """Rows as `plain.run_plain`, then further states by name, then the first fault."""
     from aesi.physics.espm.extended_kernels import run_general
 
+    model = of_record(model, temperature_k is not None)
     out = np.empty((9, len(time)))
     theta0 = np.array(model.cell.stoichiometries(soc0))
     given = temperature_k is not None

@@ -83,11 +83,13 @@ def run_general(  # type: ignore[no-untyped-def]
                 memory.log_salt,
                 memory.region_salt,
             )
-            start_k = t_k
+            start_k, around_k = t_k, heat[2]
             if drive.given and k > 0:
-                t_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
-            elif k > 0 and heat[0] > 0.0:
-                t_k = heated(start_k, watts, dt, heat)
+                around_k = temperature[k - 1] + (temperature[k] - temperature[k - 1]) * end_share
+            if k > 0 and heat[0] > 0.0:
+                t_k = heated(start_k, watts, dt, heat, around_k)
+            elif drive.given and k > 0:
+                t_k = around_k
             set_conductivities(
                 arrhenius(cell.energies[5], t_k, cell.reference_k), electrolyte, memory, dissolved.c
             )
@@ -106,8 +108,8 @@ def run_general(  # type: ignore[no-untyped-def]
             voltage -= i1 * cell.contact
             if heat[0] > 0.0:
                 power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
-                if k > 0 and not drive.given:
-                    t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat)
+                if k > 0:
+                    t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
                 watts = power
         out[0, k], out[7, k] = voltage, t_k
         what = record_sample(k, driest, particles, memory, modes, dissolved.c, out)

@@ -176,11 +176,11 @@ def mean_heat(start, end, i0, i1):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def heated(t_k, watts, dt, heat):  # type: ignore[no-untyped-def]
-    """Temperature after a step of constant heating; heat : capacity J/K, conductance W/K, surroundings K."""
+def heated(t_k, watts, dt, heat, around_k):  # type: ignore[no-untyped-def]
+    """Temperature after a step of constant heating; heat : capacity J/K, conductance W/K.  around_k : surroundings."""
     if heat[1] * dt < 1e-9 * heat[0]:
         return t_k + watts * dt / heat[0]
-    settled = heat[2] + watts / heat[1]
+    settled = around_k + watts / heat[1]
     return settled + (t_k - settled) * math.exp(-heat[1] * dt / heat[0])
 
 

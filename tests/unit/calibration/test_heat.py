@@ -44,6 +44,31 @@ def test_it_goes_into_the_file_and_comes_back(warming):
     assert of_file(again).parameters["heat_transfer_w_k"] == pytest.approx(again.conductance_w_k)
 
 
+def test_a_case_that_lags_its_winding_does_not_make_the_cell_heavier(warming):
+    """What is conducted through the winding is told apart from what is stored, where the cell tells how it conducts."""
+    cell = replace(NMC, thermal_conductivity_w_m_k=0.25)
+    time = warming.time_s
+    run = simulate(
+        cell,
+        time,
+        warming.current_a,
+        0.9,
+        [of_file(replace(cell, heat_transfer_w_m2_k=20.0))],
+        hold="backward",
+    )
+    winding, air = run.series["temperature_k"] - 273.15, 25.0
+    outside = 20.0 * cell.surface_area_m2
+    case = air + (winding - air) / (1.0 + outside * cell.winding_resistance_k_w)
+    record = Measurement(time, warming.current_a, run.voltage_v, case, "case")
+    found, as_one_lump = (
+        fitted(one, prepared(one, [record], 0.9), one.heat_capacity_j_k)
+        for one in (cell, replace(cell, thermal_conductivity_w_m_k=None))
+    )
+    assert found.heat_capacity_j_k == pytest.approx(cell.heat_capacity_j_k, rel=0.15)
+    assert found.conductance_w_k == pytest.approx(outside, rel=0.15)
+    assert as_one_lump.heat_capacity_j_k > 1.3 * cell.heat_capacity_j_k
+
+
 def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
     flat = replace(warming, temperature_degc=np.full(len(warming), 25.0))
     assert with_heat(NMC, prepared(NMC, [flat], 0.9)) == (NMC, ())

@@ -1,5 +1,6 @@
 """`simulate`: conservation, sampling, ways of holding the current, errors that name time and electrode."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.physics import Cell, impedance, simulate
+from aesi.physics.cell.parts import NO_ENTROPY
 from aesi.physics.cell.relations import LookupTable
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import solver as _solver
@@ -113,6 +115,56 @@ def test_a_measured_temperature_is_used_as_given(nmc, load):
     assert simulate(nmc, time, current, soc0=0.9, temperature_degc=ramp).series[
         "temperature_k"
     ] == pytest.approx(ramp + 273.15)
+
+
+@pytest.mark.parametrize("hold", ["linear", "backward"])
+def test_a_winding_stores_and_conducts_what_it_loses(nmc, hold):
+    """Without entropy that is I (U - V), U of the surfaces: the heat of a run against the course of its temperature."""
+    cell = replace(
+        nmc.with_negative(entropic=NO_ENTROPY).with_positive(entropic=NO_ENTROPY),
+        thermal_conductivity_w_m_k=0.3,
+    )
+    resistance, capacity = cell.winding_resistance_k_w, cell.heat_capacity_j_k
+    assert resistance == pytest.approx(cell.volume_m3 / cell.surface_area_m2**2 / 0.6)
+    time = np.arange(0.0, 3000.0, 2.0)
+    current = np.where(time % 1200 < 600, 40.0, 0.0)
+    case = 10.0 + 3.0 * time / 3000.0
+    run = simulate(cell, time, current, 0.9, temperature_degc=case, hold=hold)
+    winding = run.series["temperature_k"] - 273.15
+    surface_v = cell.positive.ocp(run.series["c_sp"] / cell.positive.c_max_mol_m3) - cell.negative.ocp(
+        run.series["c_sn"] / cell.negative.c_max_mol_m3
+    )
+    lost_j = np.sum((current * (surface_v - run.voltage_v))[1:] * np.diff(time))
+    conducted_j = np.trapezoid(winding - case, time) / resistance
+    assert winding[0] == case[0]
+    assert winding[200:300].mean() > case[200:300].mean() + 0.5
+    assert capacity * (winding[-1] - winding[0]) + conducted_j == pytest.approx(lost_j, rel=0.01)
+
+
+def test_both_models_warm_a_winding_alike_and_need_less_voltage(nmc):
+    time = np.arange(0.0, 1200.0, 2.0)
+    case = 5.0 + 0.001 * time
+    cell = replace(nmc, thermal_conductivity_w_m_k=0.3)
+    warm, porous, as_case = (
+        simulate(of, time, 40.0 * np.ones(600), 0.9, temperature_degc=case, model=model)
+        for of, model in ((cell, "espm"), (cell, "dfn"), (nmc, "espm"))
+    )
+    rise, rise_porous = (run.series["temperature_k"][-1] - 273.15 - case[-1] for run in (warm, porous))
+    assert rise > 1.0
+    assert rise_porous == pytest.approx(rise, rel=0.1)
+    assert (warm.voltage_v - as_case.voltage_v)[300:].min() > 2e-3
+
+
+def test_a_winding_follows_a_constant_case_too_and_nothing_else_heats_it(nmc):
+    cell = replace(nmc, thermal_conductivity_w_m_k=0.3)
+    time = np.arange(0.0, 600.0, 2.0)
+    current = np.full(len(time), 40.0)
+    plain = simulate(cell, time, current, 0.9, temperature_degc=10.0)
+    assert plain.series["temperature_k"][-1] > 283.15 + 1.0
+    warmed = simulate(cell, time, current, 0.9, [CATALOGUE["self_heating"].activate()], temperature_degc=10.0)
+    assert warmed.voltage_v == pytest.approx(plain.voltage_v, abs=1e-12)
+    without = simulate(cell, time, current, 0.9)
+    assert without.series["temperature_k"] == pytest.approx(298.15)
 
 
 def test_an_empty_cell_names_time_and_electrode(lg_m50):
