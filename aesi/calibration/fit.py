@@ -65,13 +65,21 @@ def calibrate(
     began = time.perf_counter()
     model, notes = problem(cell, records, conditions or Conditions())
     x = descended(model, evaluations)
+    found, warmth = with_heat(rewound(model, x), model.records)
+    if warmth:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
+        model.cell = replace(
+            model.cell,
+            specific_heat_j_kg_k=found.specific_heat_j_kg_k,
+            heat_transfer_w_m2_k=found.heat_transfer_w_m2_k,
+        )
+        x = descended(model, evaluations, x)
+        found = rewound(model, x)
     states = model.states(cell, x)
     jacobian, errors = model.jacobian(x), model.errors(x)
     weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
     scaled = jacobian * weights[:, None]
     covariance = np.linalg.inv(scaled.T @ scaled)
     rms = {name: [_rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
-    found, warmth = with_heat(rewound(model, x), model.records)
     shares = capacities(model, x)
     return Calibration(
         cell=replace(found, fitted_with=model.physics, capacity_shares=tuple(shares.items())),
