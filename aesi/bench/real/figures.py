@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 WORST = 5
+LINE_PX = 17
+"""Of a name beside the confusion matrix."""
 RATIO = (-1.0, 3.0)
 """Of found to true size, as drawn; what lies beyond is drawn at the edge."""
 STATES = {"before": "as declared", "recalibrated": "recalibrated", "after": "after"}
@@ -26,16 +28,18 @@ def confusion_figure(matrix: Mapping[str, Mapping[str, int]]) -> Figure:
     said = sorted({name for counts in matrix.values() for name in counts})
     counts = [[matrix[a].get(s, 0) for s in said] for a in asked]
     shares = [[n / max(1, sum(row)) for n in row] for row in counts]
+    rows = [a.replace("_", " ").replace(" or ", " or<br>") for a in asked]
+    tallest = max(row.count("<br>") for row in rows) + 1
     fig = style.figure(
         "What was there, and what was said",
         "Rows: the right name, or one of several; columns: what the loop said, names that it is not sure of after "
         "'unknown'. Numbers are cases, shades their share of the row.",
-        220 + 30 * len(asked),
+        220 + max(30, LINE_PX * tallest) * len(asked),
     )
     fig.add_heatmap(
         z=shares,
         x=[s.replace("_", " ") for s in said],
-        y=[a.replace("_", " ").replace(" or ", " or<br>") for a in asked],
+        y=rows,
         text=[[str(n) if n else "" for n in row] for row in counts],
         texttemplate="%{text}",
         colorscale=[[0, "rgba(0,114,178,0)"], [1, "rgba(0,114,178,0.7)"]],
