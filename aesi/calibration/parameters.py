@@ -229,7 +229,7 @@ def course(side: str, what: str, place: int) -> str:
     return f"{side}.{what}_at_{round(100 * PLACES[place])}_percent"
 
 
-def with_interfaces(cell: Cell, measured: bool) -> Cell:
+def with_interfaces(cell: Cell, measured: bool = False) -> Cell:
     """The cell with typical contacts and films where its file has none: a calibration moves them from there.
 
     measured : there is a temperature of the case, to which heat is conducted from within.
