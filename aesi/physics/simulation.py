@@ -60,8 +60,9 @@ def simulate(
     soc0 : state of charge at rest before the first sample, by the declared windows; where an effect moved these,
     the cell starts from the same rest voltage in the new ones. None takes it from `rest_voltage_v`.
     effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
-    temperature_degc : (n,) or one value: the cell's measured temperature; None leaves it to the cell file's
-    initial temperature, or to the heat balance where an effect brings one.
+    temperature_degc : (n,) or one value: the measured temperature of the cell's case, which the winding follows (see
+    `aesi.physics.model.of_record`); None leaves it to the cell file's initial temperature, or to the heat balance where
+    an effect brings one.
     hold : "linear" joins the samples by straight lines; "backward" holds each row's value since the row before.
     on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
     "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on

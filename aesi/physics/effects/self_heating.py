@@ -3,10 +3,11 @@
     C dT/dt = sum_u i_u (T dU/dT - U)_u - I V - G (T - T_amb)      i_u > 0 delithiates, I > 0 on discharge
     D, K, kappa scale with exp(E_a/R (1/T_ref - 1/T)),   U = U_ref + dU/dT (T - T_ref)
 
-Where a temperature was measured it is used as it is, and the balance is not needed.
+Where the temperature of the case was measured that is used, with what the winding is warmer by where the cell file
+tells how it conducts (`aesi.physics.model.of_record`), and this balance is not needed.
 
-Leaves out gradients within the cell, heat of mixing and the casing's own heat capacity. Holds for cells whose Biot
-number is small. Needs density, specific heat and volume in the cell file.
+Leaves out other gradients within the cell, heat of mixing and the casing's own heat capacity. Holds for cells whose
+Biot number is small. Needs density, specific heat and volume in the cell file.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """
