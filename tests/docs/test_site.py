@@ -192,17 +192,22 @@ def test_what_the_page_of_the_cells_says_in_short_is_what_its_table_says():
 
     def told(cells, column, *starts):
         found = [row[head.index(column)] for row in unseen if row[0] in cells and row[1].startswith(starts)]
-        return sorted(round(float(each)) for each in found)
+        return sorted(round(float(each.split()[0])) for each in found)  # it may have run out, and says when
 
     def said(values):
         return f"{values[0]} to {values[-1]} mV"
 
+    def but_one(values):
+        return f"{said(values[:-1])}, one {values[-1]}"
+
     both, cold = ("panasonic_ncr18650pf", "lg_18650hg2"), ("10degC", "0degC", "n10degC", "40degC")
-    *most, worst = told(both, "with temperature", *cold)
     assert f"NMC pouch, four records) | {said(told(('about_energy_nmc',), 'declared', ''))} |" in short
     assert f"| {said(told(both, 'declared', '25degC'))} | {said(told(both, 'declared', *cold))} |" in short
-    assert f"| {said(told(both, 'with temperature', '25degC'))} | {said(most)}, one {worst} |" in short
-    assert f"| {said(told(both, 'aged', '25degC'))} | {said(told(both, 'aged', *cold))} |" in short
+    assert (
+        f"| {said(told(both, 'with temperature', '25degC'))} | {but_one(told(both, 'with temperature', *cold))} |"
+        in short
+    )
+    assert f"| {said(told(both, 'aged', '25degC'))} | {but_one(told(both, 'aged', *cold))} |" in short
 
 
 def test_every_formula_of_the_documentation_is_understood():
