@@ -103,9 +103,11 @@ def run_porous(  # type: ignore[no-untyped-def]
                 fault_at, fault = k, 4
             if e.plating[0] > 0.0:
                 plate(dt, half, e, state)
-            if e.heat[0] > 0.0 and steps > 0:  # what solves nothing heats as the step before it
-                voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
-                power = heat_power(p, e, state, half, i1, voltage, t_k)
+            if e.heat[0] > 0.0:
+                power = 0.0  # past what a cell can do nothing tells its heat
+                if steps > 0 and fault_at < 0:
+                    voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
+                    power = heat_power(p, e, state, half, i1, voltage, t_k)
                 t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat, around_k)
                 watts = power
         voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])

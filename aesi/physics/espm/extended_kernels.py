@@ -107,7 +107,9 @@ def run_general(  # type: ignore[no-untyped-def]
             voltage = phi_p - phi_n - j1 * cell.separator / memory.kappa[memory.kappa.shape[0] - 1]
             voltage -= i1 * cell.contact
             if heat[0] > 0.0:
-                power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
+                power = 0.0  # past what a cell can do nothing tells its heat
+                if fault_at < 0:
+                    power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
                 if k > 0:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
                 watts = power
