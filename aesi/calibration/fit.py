@@ -67,11 +67,7 @@ def calibrate(
     x = descended(model, evaluations)
     found, warmth = with_heat(rewound(model, x), model.records)
     if warmth:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
-        model.cell = replace(
-            model.cell,
-            specific_heat_j_kg_k=found.specific_heat_j_kg_k,
-            heat_transfer_w_m2_k=found.heat_transfer_w_m2_k,
-        )
+        model.take_heat_of(found)
         x = descended(model, evaluations, x)
         found = rewound(model, x)
     states = model.states(cell, x)

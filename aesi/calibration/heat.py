@@ -58,29 +58,25 @@ def with_heat(cell: Cell, records: Sequence[Prepared]) -> tuple[Cell, tuple[str,
     if not warming or declared is None or cell.surface_area_m2 is None or cell.specific_heat_j_kg_k is None:
         return cell, ()
     fit = fitted(cell, warming, declared)
-    changed = replace(
-        cell,
-        specific_heat_j_kg_k=cell.specific_heat_j_kg_k * fit.heat_capacity_j_k / declared,
-        heat_transfer_w_m2_k=fit.conductance_w_k / cell.surface_area_m2,
-    )
+    specific = cell.specific_heat_j_kg_k * fit.heat_capacity_j_k / declared
+    changed = replace(_cooled(cell, fit.conductance_w_k), specific_heat_j_kg_k=specific)
     return changed, (fit.sentence,)
 
 
 def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float) -> HeatFit:
     """Least squares over all records."""
-    inside = cell.winding_resistance_k_w
     driven = [(r, heat_w(cell, r)) for r in records]
 
     def off(z: Array) -> Array:
         capacity, conductance = start_j_k * np.exp(z[0]), TYPICAL_W_K * np.exp(z[1])
-        share = 1.0 / (1.0 + conductance * inside)
+        through = _cooled(cell, conductance).conductance_w_k
+        assert through is not None
+        share = through / conductance
         parts = []
         for (record, watts), shift in zip(driven, z[2:], strict=True):
             assert record.kelvin is not None
             ambient = record.kelvin[0] + AMBIENT_SD_K * shift
-            winding = temperature_k(
-                record.rows.time_s, watts, record.kelvin[0], ambient, capacity, conductance * share
-            )
+            winding = temperature_k(record.rows.time_s, watts, record.kelvin[0], ambient, capacity, through)
             course = ambient + share * (winding - ambient)
             parts.append((course - record.kelvin) / READING_K / len(course) ** 0.5)
         return np.concatenate([*parts, 0.1 * z[2:]])
@@ -96,6 +92,12 @@ def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float) -> HeatFit
         rmse,
         tuple(r.name for r, _ in driven),
     )
+
+
+def _cooled(cell: Cell, conductance_w_k: float) -> Cell:
+    """The cell with this conductance from its case to the surroundings."""
+    assert cell.surface_area_m2 is not None
+    return replace(cell, heat_transfer_w_m2_k=conductance_w_k / cell.surface_area_m2)
 
 
 def heat_w(cell: Cell, record: Prepared) -> Array:

@@ -126,6 +126,14 @@ class Model:
         self.low[self.layout.ages] = -self.high[self.layout.ages]
         self.simulations = 0
 
+    def take_heat_of(self, found: Cell) -> None:
+        """From here on the start has this cell's heat capacity and its conductance to the surroundings."""
+        self.cell = replace(
+            self.cell,
+            specific_heat_j_kg_k=found.specific_heat_j_kg_k,
+            heat_transfer_w_m2_k=found.heat_transfer_w_m2_k,
+        )
+
     def cell_at(self, x: Array) -> Cell:
         """The cell with all that is global moved."""
         values = {f.name: f.value(float(z)) for f, z in zip(self.free, x, strict=False)}

@@ -169,9 +169,8 @@ def free_parameters(
         typical = electrode.double_layer_f_m2 or DOUBLE_LAYER_F_M2
         out.append(Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True))
         out.append(Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True))
-    if measured and cell.winding_resistance_k_w and cell.heat_capacity_j_k is not None:
-        k = cell.thermal_conductivity_w_m_k
-        assert k is not None
+    k = cell.thermal_conductivity_w_m_k
+    if measured and k is not None and cell.winding_resistance_k_w:
         out.append(Free("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
     if span_k > SPAN_K:
         n, p, e = cell.negative, cell.positive, cell.electrolyte

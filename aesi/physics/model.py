@@ -135,12 +135,12 @@ def of_record(model: EspmModel, measured: bool) -> EspmModel:
         C dT/dt = Q - (T - T_case)/R
 
     Where that was measured no other heat balance counts; the winding has the temperature of its case where the file
-    tells no resistance R between them (`Cell.winding_resistance_k_w`) or no heat capacity C.
+    tells no resistance R between them (`Cell.winding_resistance_k_w`).
     """
     if not measured:
         return model
     resistance, capacity = model.cell.winding_resistance_k_w, model.cell.heat_capacity_j_k
-    heat = HeatBalance(capacity, 1.0 / resistance) if resistance and capacity else None
+    heat = None if capacity is None or not resistance else HeatBalance(capacity, 1.0 / resistance)
     return model if heat == model.heat else replace(model, heat=heat)
 
 

@@ -159,13 +159,14 @@ class CellParameters:
 
     @property
     def winding_resistance_k_w(self) -> float:
-        """By how much (K/W) the mean of the winding is warmer than its case; 0 where the file does not tell.
+        """By how much (K/W) the mean of the winding is warmer than its case; 0 where the file does not tell how it
+        conducts or how much heat it holds.
 
         Of a long cylinder that heats evenly, k its conductivity, V its volume and A its surface: (V/A)/(2 k A), by the
         mean of q (r0^2 - r^2)/(4 k). A plate of the same V and A has two thirds of it.
         """
         k, surface, volume = self.thermal_conductivity_w_m_k, self.surface_area_m2, self.volume_m3
-        if k is None or surface is None or volume is None:
+        if k is None or surface is None or volume is None or self.heat_capacity_j_k is None:
             return 0.0
         return volume / surface / (2.0 * k * surface)
 

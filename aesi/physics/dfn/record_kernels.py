@@ -10,6 +10,7 @@ from aesi.physics.dfn.output_kernels import left_range, record, record_profile
 from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, slot_of
 from aesi.physics.espm.transport_kernels import (
+    all_inside,
     arrhenius,
     heated,
     mean_heat,
@@ -104,8 +105,8 @@ def run_porous(  # type: ignore[no-untyped-def]
             if e.plating[0] > 0.0:
                 plate(dt, half, e, state)
             if e.heat[0] > 0.0:
-                power = 0.0  # past what a cell can do nothing tells its heat
-                if steps > 0 and fault_at < 0:
+                power = 0.0
+                if steps > 0 and fault_at < 0 and all_inside(state.theta):
                     voltage = voltage_of(s, e, state, t, phi_n, phi_p, t.total[0])
                     power = heat_power(p, e, state, half, i1, voltage, t_k)
                 t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, e.heat, around_k)

@@ -15,6 +15,7 @@ from aesi.physics.espm.electrode_kernels import local_conductivity, region_drops
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, open_circuit, slot_of
 from aesi.physics.espm.layout import StepEnd
 from aesi.physics.espm.transport_kernels import (
+    all_inside,
     arrhenius,
     diffuse,
     follow_diffusivity,
@@ -27,9 +28,6 @@ from aesi.physics.espm.transport_kernels import (
     solid_forcing,
 )
 
-HEAT_V, HEAT_A_M2 = 5.0, 100.0
-"""No cell gives more heat than its current, and what its particles exchange, times its voltage; one of which single
-particles are past their edge seems to, before its mean surfaces are."""
 GAS_OVER_FARADAY = GAS_CONSTANT_J_MOL_K / FARADAY_C_MOL
 
 
@@ -110,9 +108,9 @@ def run_general(  # type: ignore[no-untyped-def]
             voltage = phi_p - phi_n - j1 * cell.separator / memory.kappa[memory.kappa.shape[0] - 1]
             voltage -= i1 * cell.contact
             if heat[0] > 0.0:
-                power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
-                if fault_at >= 0 or not abs(power) <= HEAT_V * (abs(i1) + HEAT_A_M2 * area):
-                    power = 0.0  # past what a cell can do nothing tells its heat
+                power = 0.0
+                if fault_at < 0 and all_inside(memory.theta):
+                    power = reaction_heat(t_k, cell, particles, surfaces, memory) - i1 * voltage
                 if k > 0:
                     t_k = heated(start_k, mean_heat(watts, power, i0, i1), dt, heat, around_k)
                 watts = power
