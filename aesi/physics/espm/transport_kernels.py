@@ -178,10 +178,10 @@ def mean_heat(start, end, i0, i1):  # type: ignore[no-untyped-def]
 @njit(inline="always", fastmath=FASTMATH)
 def all_inside(theta):  # type: ignore[no-untyped-def]
     """Has every particle's surface lithium, and room for more? Past that nothing tells the heat of a cell."""
+    inside = 0
     for u in range(theta.shape[0]):
-        if not 0.0 <= theta[u] <= 1.0:
-            return False
-    return True
+        inside += 0.0 <= theta[u] <= 1.0
+    return inside == theta.shape[0]
 
 
 @njit(inline="always", fastmath=FASTMATH)

@@ -80,7 +80,8 @@ def test_over_the_envelope_a_simulation_ends_at_its_cut_off_or_says_why_not(mode
     share=st.sampled_from([-1.0, -0.3, 0.3, 1.0]),
     soc0=st.floats(0.05, 0.95),
 )
-@example(name="panasonic_ncr18650pf", degc=0.0, share=-1.0, soc0=0.0625)  # small particles are full long before large
+# Of particles of several sizes the small ones are full long before the large ones.
+@example(name="panasonic_ncr18650pf", degc=0.0, share=-1.0, soc0=0.0625)
 def test_with_any_effect_a_cell_is_followed_until_it_runs_out_or_one_sentence_says_why_not(
     model, effect, name, degc, share, soc0
 ):
