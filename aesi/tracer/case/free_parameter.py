@@ -3,7 +3,8 @@
     x = (phi(value) - phi(centre)) / sd        phi the natural logarithm, the square or the identity
 
 The declared parameters of a cell (its own ones) have the spread that is declared beside them; those of an effect under
-test have a prior as wide as the effect allows; the initial state of charge of a record has its standard deviation.
+test have a prior as wide as the effect allows; the initial state of charge of a record has its standard deviation, and
+so has the share of its capacity that the cell had then.
 """
 
 from __future__ import annotations
@@ -19,6 +20,10 @@ from aesi.physics.effect import Effect
 
 STATE_OF_CHARGE = "soc0"
 """Owner of the parameters that shift a record's initial state of charge."""
+CAPACITY_SHARE = "capacity_share"
+"""Owner of the parameters that say what share of the file's capacity the cell had in a record."""
+OF_ONE_RECORD = (STATE_OF_CHARGE, CAPACITY_SHARE)
+"""Owners of what is a record's and not the cell's; the name of the parameter is the number of the record."""
 OF_ALL_RECORDS = " of all records"
 """Ends the owner of a declared parameter that good records and others share, beside an effect of the others alone."""
 FURTHEST_SDS = 4.0
@@ -31,7 +36,7 @@ TINY = 1e-6
 class FreeParameter:
     """One scalar: who owns it, its bounds, and its normal prior.
 
-    owner : id of an effect, or STATE_OF_CHARGE with the number of a record as the name.
+    owner : id of an effect, or one of OF_ONE_RECORD with the number of a record as the name.
     low, high, centre : in `unit`.  sd : of the natural logarithm where `log`, of the square where `even`, else in
     `unit`.
     own : True for what the declared model has anyway, False for what an effect under test adds.
@@ -57,6 +62,11 @@ class FreeParameter:
     def key(self) -> tuple[str, str]:
         """(owner, name)."""
         return self.owner, self.name
+
+    @property
+    def record(self) -> int | None:
+        """Number of the record that it belongs to; None for what all records share."""
+        return int(self.name) if self.owner in OF_ONE_RECORD else None
 
     def coordinate(self, value: float) -> float:
         """x of a value."""
@@ -169,6 +179,22 @@ def state_of_charge(record: int, soc0: float, sd: float) -> FreeParameter:
     )
 
 
+def capacity_share(record: int, sd: float) -> FreeParameter:
+    """Share of the file's capacity that the cell had in a record, its logarithm known to `sd`."""
+    reach = FURTHEST_SDS * sd
+    return FreeParameter(
+        owner=CAPACITY_SHARE,
+        name=str(record),
+        unit="1",
+        low=float(np.exp(-reach)),
+        high=float(np.exp(reach)),
+        log=True,
+        centre=1.0,
+        sd=sd,
+        own=True,
+    )
+
+
 def values_of(free: Sequence[FreeParameter], x: Array) -> dict[str, dict[str, float]]:
     """owner -> name -> value of the coordinates (n_free,)."""
     out: dict[str, dict[str, float]] = {}
@@ -216,7 +242,7 @@ def acting_on(
     out: dict[str, dict[str, float]] = {}
     for owner, given in values.items():
         name = owner.removesuffix(OF_ALL_RECORDS)
-        if owner == STATE_OF_CHARGE or (good and name == owner):
+        if owner in OF_ONE_RECORD or (good and name == owner):
             continue
         there = out.setdefault(name, {})
         for key, value in given.items():

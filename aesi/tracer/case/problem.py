@@ -19,9 +19,11 @@ from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.fit_simulation import fit_simulation
 from aesi.tracer.case.free_parameter import (
+    CAPACITY_SHARE,
     STATE_OF_CHARGE,
     FreeParameter,
     acting_on,
+    capacity_share,
     of_all_records,
     of_effect,
     own,
@@ -36,6 +38,13 @@ that errs as models of measured cells do, its records read by instruments that m
 what is gone within seconds does not count.  beside: as lasting, with records of the cell that are known to be good, so
 that the question is what is different about the others."""
 MEASURED_CELL: tuple[Trust, ...] = ("measured", "lasting", "beside")
+AGEING: tuple[Trust, ...] = ("loose", "measured", "lasting")
+"""Where the records of a cell may be of several ages. A careful parametrisation is one of the cell as it is, and what
+is sought beside good records is what has changed since."""
+SHARE_SD = 0.024
+"""Of the logarithm of a record's capacity over the file's: root mean square of the shares that the two shipped files
+over temperatures give the twelve records that they were calibrated on, within weeks of each other
+(`Cell.capacity_shares`)."""
 INDEPENDENT_S, INDEPENDENT_CHARGE = 200.0, 0.05
 """How long, and over how much charge, the error of a model of a measured cell lasts: its integral correlation time is
 45 to 670 s on eight development records of `aesi bench real`, geometric mean 140 s about the mean and 260 s about
@@ -66,6 +75,11 @@ rows a second tell a lag to a thousandth of its spread."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
+
+
+def share_of(values: ValuesByOwner, record: int) -> float:
+    """Of the file's capacity that the cell had in a record."""
+    return values.get(CAPACITY_SHARE, {}).get(str(record), 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +115,12 @@ class InverseProblem:
         """True where what the model errs by within seconds is told apart from what lasts longer."""
         return self.trust == "measured"
 
+    @property
+    def ages(self) -> bool:
+        """True where the cell may have another capacity in each record: of one record alone, what the cell has lost
+        since its file is what an effect would say."""
+        return self.trust in AGEING and len(self.records) > 1
+
     def competing(self) -> tuple[str, ...]:
         """Ids of the effects that may be named: not those that only take back an approximation of the model."""
         return tuple(name for name, effect in self.effects.items() if effect.refines is None)
@@ -108,6 +128,8 @@ class InverseProblem:
     def free(self, hypothesis: Sequence[str]) -> tuple[FreeParameter, ...]:
         """What a hypothesis may move: states of charge, own parameters, then those of its effects."""
         out = [state_of_charge(i, r.soc0, self._soc0_sd(r)) for i, r in enumerate(self.records)]
+        if self.ages:
+            out += [capacity_share(i, SHARE_SD) for i in range(len(self.records))]
         for effect in self.effects.values():
             if effect.refines is not None or (effect.id in hypothesis and not self.has_good):
                 continue
@@ -156,7 +178,7 @@ class InverseProblem:
                 good = self.records[i].good
                 soc0, effects = values[STATE_OF_CHARGE][str(i)], self.active(values, good)
                 known = self._of_good.get((i, soc0, effects))
-                voltage = self._voltage_v(i, soc0, effects) if known is None else known
+                voltage = self._voltage_v(i, soc0, effects, share_of(values, i)) if known is None else known
                 if good:
                     self._of_good[i, soc0, effects] = voltage
                 out.append(voltage)
@@ -165,8 +187,8 @@ class InverseProblem:
         joined = np.concatenate(out)
         return joined if np.isfinite(joined).all() else None
 
-    def _voltage_v(self, i: int, soc0: float, effects: tuple[ActiveEffect, ...]) -> Array:
-        return self.run(self.seen[i], soc0, effects, self.records[i].thin_hold).voltage_v
+    def _voltage_v(self, i: int, soc0: float, effects: tuple[ActiveEffect, ...], share: float = 1.0) -> Array:
+        return self.run(self.seen[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v
 
     @cached_property
     def _of_good(self) -> dict[tuple[int, float, tuple[ActiveEffect, ...]], Array]:
@@ -180,9 +202,11 @@ class InverseProblem:
         effects: tuple[ActiveEffect, ...],
         hold: Hold,
         rest_voltage_v: float | None = None,
+        share: float = 1.0,
     ) -> Run:
-        """One simulation, see `fit_simulation`."""
-        return fit_simulation(self.cell, data, soc0, effects, hold, self.model, rest_voltage_v)
+        """One simulation, see `fit_simulation`.  share : of the file's capacity that the cell had then."""
+        cell = self.cell if share == 1.0 else self.cell.with_material(share)
+        return fit_simulation(cell, data, soc0, effects, hold, self.model, rest_voltage_v)
 
     def why_not(self, hypothesis: Sequence[str]) -> str:
         """Why a hypothesis cannot be simulated at its typical values: one sentence."""

@@ -13,7 +13,7 @@ from aesi.numerics.bounded import descend
 from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, values_of
+from aesi.tracer.case.free_parameter import FreeParameter, values_of
 from aesi.tracer.case.problem import STEP, InverseProblem
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
@@ -108,7 +108,7 @@ class HypothesisFitter:
         """(n,) V, None where the model fails on both sides, and the simulations that it took."""
         one = self.free[j]
         size = min(STEP, 0.25 * (self.high[j] - self.low[j]))
-        only = int(one.name) if one.owner == STATE_OF_CHARGE else None
+        only = one.record
         rows = slice(None) if only is None else self.problem.slices[only]
         sides = (size, -size) if x[j] + size <= self.high[j] else (-size, size)
         for count, h in enumerate(sides, start=1):

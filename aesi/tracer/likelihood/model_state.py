@@ -13,7 +13,7 @@ from aesi.physics.model import EspmModel
 from aesi.physics.simulation import model_with
 from aesi.records import Run
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
-from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
+from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, share_of
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.likelihood.growth import Explanation, linear_values
 
@@ -49,7 +49,8 @@ class ModelState:
         data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
         effects, run = self.effects(record.good), self.problem.run
         if self.values is not None and index is not None:
-            return run(data, self.values[STATE_OF_CHARGE][str(index)], effects, hold)
+            share = share_of(self.values, index)
+            return run(data, self.values[STATE_OF_CHARGE][str(index)], effects, hold, share=share)
         if self.values is not None and record.start.basis == "full charge":
             return run(data, self._full(record.soc0), effects, hold)
         rest_v = record.start.rest_voltage_v  # None where the state of charge was given

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter
+from aesi.tracer.case.free_parameter import FreeParameter
 from aesi.tracer.likelihood.model_state import ModelState
 
 LIMIT_SHARE = 0.01
@@ -15,7 +15,7 @@ LIMIT_SHARE = 0.01
 class OwnParameter:
     """A declared parameter after a fit.
 
-    owner : the effect that restates it, or STATE_OF_CHARGE, whose `name` is then that of the record.
+    owner : the effect that restates it, or one of OF_ONE_RECORD, whose `name` is then that of the record.
     declared, value : in `unit`; a factor is declared as 1.  deviations : from declared, in standard deviations of its
     tolerance.  at_limit : whether it ended at the end of the range in which it may move.
     """
@@ -43,7 +43,7 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
 
 
 def _name(state: ModelState, free: FreeParameter) -> str:
-    return state.problem.records[int(free.name)].name if free.owner == STATE_OF_CHARGE else free.name
+    return free.name if free.record is None else state.problem.records[free.record].name
 
 
 def _own_parameter(free: FreeParameter, value: float, name: str) -> OwnParameter:

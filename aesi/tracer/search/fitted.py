@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, FreeParameter, coordinates_of, values_of
+from aesi.tracer.case.free_parameter import FreeParameter, coordinates_of, values_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, HypothesisFitter
 from aesi.tracer.likelihood.growth import Explanation
@@ -103,7 +103,7 @@ def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:
 def as_declared(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> FittedHypothesis | None:
     """The same hypothesis about the declared values of its own parameters, as a place to grow from: one that lacks an
     effect moves them to make up for it. None where none of them moved far, or where it cannot be simulated there."""
-    own = np.array([f.own and f.owner != STATE_OF_CHARGE for f in fit.free])
+    own = np.array([f.own and f.record is None for f in fit.free])
     if not np.any(own & (np.abs(fit.point.x) > MOVED_SDS)):
         return None
     there = HypothesisFitter(problem, blocks, fit.hypothesis).finished(np.where(own, 0.0, fit.point.x))

@@ -13,8 +13,11 @@ MOST_NAMED = 3
 """Parameters that one sentence names."""
 MOST_DIGITS = 6
 """A state of charge is known to a ten-thousandth at best."""
-INITIAL_STATE = "soc0"
-"""Stands for the effect of a row where a record's initial state of charge moved."""
+OF_A_RECORD = {
+    "soc0": "the initial state of charge of {}",
+    "capacity_share": "the share of its capacity that the cell had in {}",
+}
+"""What stands for the effect of a row where something moved that is a record's, in words."""
 RECALIBRATING, BESIDE, WRITTEN = "Recalibrating", "Beside the finding the fit", "The model that is written"
 
 
@@ -82,8 +85,8 @@ def _apart(value: float, declared: float, least: int = 3) -> tuple[str, str]:
 
 def parameter_words(row: Row) -> str:
     """'solid diffusivity (negative)', 'the initial state of charge of drive'."""
-    if row["effect"] == INITIAL_STATE:
-        return f"the initial state of charge of {row['parameter']}"
+    if row["effect"] in OF_A_RECORD:
+        return OF_A_RECORD[row["effect"]].format(row["parameter"])
     effect, name = row["effect"].replace("_", " "), row["parameter"]
     if name.rpartition("_")[0] in row["effect"]:  # 'resistance_ohm' of 'series_resistance' says nothing more
         return str(effect)

@@ -1,0 +1,85 @@
+"""Records of one cell at several ages, and states of charge at which no record has been."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aesi.physics import simulate
+from aesi.records import Measurement
+from aesi.tracer.case.blocks import blocks_of
+from aesi.tracer.case.free_parameter import CAPACITY_SHARE
+from aesi.tracer.case.problem import SHARE_SD, InverseProblem, share_of
+from aesi.tracer.case.records import prepare_all
+from aesi.tracer.decide.beyond import foretold_beyond
+from aesi.tracer.decide.written import Option
+from aesi.tracer.likelihood.model_error import MEASURED_V
+from aesi.tracer.likelihood.model_state import ModelState
+from aesi.tracer.report.own_parameters import own_parameters
+from aesi.tracer.search.archive import Archive
+from aesi.tracer.search.fitted import base_of, values_without
+
+
+@pytest.fixture(scope="module")
+def discharge(cell):
+    """measurement(share of the capacity that the cell had, state of charge at the end): from full, at 1C."""
+
+    def measurement(share=1.0, until=0.03, name="made"):
+        time = np.arange(0.0, 3600.0 * (1.0 - until) * share, 4.0)
+        current = np.full(len(time), cell.nominal_capacity_ah)
+        voltage = simulate(cell.with_material(share), time, current, 1.0).voltage_v
+        noise = 1e-3 * np.random.default_rng(1).normal(size=len(time))
+        return Measurement(time, current, voltage + noise, name=name)
+
+    return measurement
+
+
+def fitted(cell, few, records, trust):
+    problem = InverseProblem(cell, prepare_all(cell, records, 1.0, 0.0), few, trust=trust)
+    blocks = blocks_of(problem)
+    return problem, blocks, base_of(problem, blocks, Archive(None, ""))
+
+
+def test_each_of_several_records_of_a_measured_cell_has_a_capacity_of_its_own(cell, few, discharge):
+    records = [discharge(0.96, name="later"), discharge(name="first")]
+    problem, blocks, fit = fitted(cell, few, records, "loose")
+    assert share_of(fit.values, 0) / share_of(fit.values, 1) == pytest.approx(0.96, abs=4e-3)
+    state = ModelState.of(problem, fit)
+    runs = [state.simulated(one, k, thin=False) for k, one in enumerate(problem.records)]
+    left = [
+        np.sqrt(np.mean((run.voltage_v - one.voltage_v) ** 2)) for run, one in zip(runs, records, strict=True)
+    ]
+    assert max(left) < 1.5e-3
+    told = {one.name: one.value for one in own_parameters(state) if one.owner == CAPACITY_SHARE}
+    assert told == {"later": share_of(fit.values, 0), "first": share_of(fit.values, 1)}
+    without = values_without(problem, blocks, fit, blocks.folds["record"][0])
+    assert share_of(without, 0) == pytest.approx(1.0, abs=1e-4)  # nothing but its own rows tells it
+    held = replace(problem, trust="tight")
+    assert not any(one.owner == CAPACITY_SHARE for one in held.free(()))
+    assert sum(one.owner == CAPACITY_SHARE and one.sd == SHARE_SD for one in problem.free(())) == 2
+
+
+def test_of_one_record_alone_what_the_cell_has_lost_is_left_to_effects(cell, few, discharge):
+    problem, _, fit = fitted(cell, few, [discharge(0.98)], "loose")
+    assert not any(one.owner == CAPACITY_SHARE for one in problem.free(()))
+    assert share_of(fit.values, 0) == 1.0
+
+
+def test_what_says_nothing_of_charges_that_no_record_has_been_at_is_not_written(cell, few, discharge):
+    half = [discharge(until=0.5), discharge(until=0.45)]
+    problem, blocks, loose = fitted(cell, few, half, "loose")
+    held, _, exact = fitted(cell, few, half, "exact")
+    assert foretold_beyond(problem, loose, MEASURED_V) < foretold_beyond(held, exact, MEASURED_V) == 1.0
+    assert foretold_beyond(problem, loose, 1e3) == 1.0
+    assert foretold_beyond(problem, loose, 1e-9) == 0.0
+    assert Option.of(held, blocks, exact).tested
+    unsure = replace(loose, score=replace(loose.score, covariance=1e4 * loose.score.covariance))
+    assert not Option.of(problem, blocks, unsure).tested
+
+
+def test_where_the_records_have_been_everywhere_nothing_is_beyond_them(cell, few):
+    time = np.arange(0.0, 3600.0, 4.0)
+    current = np.full(len(time), 1.02 * cell.capacity_ah)
+    empty = Measurement(time, current, simulate(cell, time, current, 1.0, on_depletion="clip").voltage_v)
+    problem, _, fit = fitted(cell, few, [empty], "loose")
+    assert foretold_beyond(problem, fit, 1e-9) == 1.0
