@@ -114,7 +114,7 @@ def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAS
     at fault where it runs out long before the declared one ends.
     """
     declared = ModelState(state.problem)
-    for temperature in _temperatures(state.problem):
+    for temperature in temperatures_degc(state.problem):
         for rate in rates_c:
             ends_s, fault = _end(state, rate, temperature)
             if fault is None:
@@ -125,7 +125,8 @@ def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAS
     return None
 
 
-def _temperatures(problem: InverseProblem) -> tuple[float | None, ...]:
+def temperatures_degc(problem: InverseProblem) -> tuple[float | None, ...]:
+    """The least and the largest measured temperature of the records; None alone where none was measured."""
     measured = [r.data.temperature_degc for r in problem.records]
     known = [t for t in measured if t is not None]
     if not known:
@@ -137,14 +138,11 @@ def _end(state: ModelState, rate: float, temperature: float | None) -> tuple[flo
     """Seconds until a full discharge or charge ends, and a sentence where the model runs empty before the voltage
     reaches its limit."""
     cell = state.problem.cell
-    hours = 1.0 / abs(rate)
-    time: Array = np.arange(0.0, hours * SECONDS_PER_HOUR, STEP_S)
-    current = np.full(len(time), rate * cell.nominal_capacity_ah)
-    kelvin = None if temperature is None else np.full(len(time), temperature)
-    profile = Measurement(time, current, np.zeros(len(time)), kelvin, name="range")
+    profile, soc0 = full_course(cell, rate, temperature)
+    time = profile.time_s
     what = f"{'a full discharge' if rate > 0 else 'a charge'} at {abs(rate):g}C"
     try:
-        run = state.problem.run(profile, 1.0 if rate > 0 else 0.0, state.effects(), "linear")
+        run = state.problem.run(profile, soc0, state.effects(), "linear")
     except AesiError as error:
         return 0.0, f"{what} cannot be simulated: {error}"
     if not np.isfinite(run.voltage_v).all():
@@ -156,6 +154,16 @@ def _end(state: ModelState, rate: float, temperature: float | None) -> tuple[flo
     return float(time[empty]), (
         f"{what} runs out of lithium or of salt at {time[empty]:g} s, before it reaches its voltage limit"
     )
+
+
+def full_course(cell: Cell, rate_c: float, degc: float | None) -> tuple[Measurement, float]:
+    """A full discharge (rate > 0) or charge at a constant current, without voltages, and the state of charge at its
+    first row."""
+    time: Array = np.arange(0.0, SECONDS_PER_HOUR / abs(rate_c), STEP_S)
+    current = np.full(len(time), rate_c * cell.nominal_capacity_ah)
+    temperature = None if degc is None else np.full(len(time), degc)
+    course = Measurement(time, current, np.zeros(len(time)), temperature, name="range")
+    return course, 1.0 if rate_c > 0 else 0.0
 
 
 def _beyond_limit(cell: Cell, rate: float, voltage_v: Array) -> BoolArray:

@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem
+from aesi.tracer.decide.beyond import foretold_beyond
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.verdict import FORETOLD_SHARE, foretold_share
 from aesi.tracer.likelihood.fit import FittedHypothesis
@@ -18,7 +19,7 @@ from aesi.tracer.likelihood.model_state import ModelState
 AS_GOOD = 1.05
 """Times the error of another model: what is less does as well. A convention."""
 HARM = "on data left out it is worse than the declared model in a range of charge"
-UNTESTED = "this record alone cannot bear it out, at other states of charge or currents it could be anything"
+UNTESTED = "these data cannot bear it out, at other states of charge or currents it could be anything"
 LESS_ELSEWHERE = "another model leaves less on records left out"
 
 
@@ -53,9 +54,12 @@ class Option:
 
 
 def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> bool:
-    """Could these data have spoken against a fit? Other records bear it out, or not. One record does as far as its
-    ranges of charge foretell each other; where own parameters are open, as they are known by how they answer to the
-    current, also its ranges of current."""
+    """Could these data have spoken against a fit? Not where it says nothing of states of charge that they lack. Within
+    those that they have, other records bear it out, or not. One record does as far as its ranges of charge foretell
+    each other; where own parameters are open, as they are known by how they answer to the current, also its ranges of
+    current."""
+    if foretold_beyond(problem, fit, MEASURED_V) < FORETOLD_SHARE:
+        return False
     if len(problem.records) > 1:
         return True
     conditions = ("charge",) if problem.trust in MEASURED_CELL else ("rate", "charge")
