@@ -1,4 +1,5 @@
-"""Calibrate: one descent from the start file, then what the data determine and what they leave open."""
+"""Calibrate: a descent from the start file, and one with the heat that it tells; then what the data determine and what
+they leave open."""
 
 from __future__ import annotations
 
@@ -59,7 +60,7 @@ def calibrate(
 
     records : at least one, of any temperatures: their column, or by `conditions`, or the cell file's; those that share
     a name are numbered in what comes back.
-    evaluations : of the descent, at most.
+    evaluations : of each descent, at most.
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()

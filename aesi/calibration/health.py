@@ -7,15 +7,13 @@ from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 
-from aesi.calibration.result import Calibration
+from aesi.calibration.result import NINETY_FIVE, Calibration
 from aesi.calibration.rewind import rewound
 from aesi.constants import MILLI
 from aesi.physics.cell import Cell
 
 STEP = 1e-2
 """In standard deviations of the priors, for slopes."""
-REACH = 1.96
-"""Standard deviations either side of a 95 % interval."""
 HEALTH_WORDS = {
     "resistance_mohm": "resistance of contacts and films, mohm",
     "inventory_ah": "cyclable lithium, Ah",
@@ -72,7 +70,7 @@ def health_intervals(found: Calibration) -> Mapping[str, tuple[float, float]]:
         there = found.x.copy()
         there[j] += STEP
         slopes[:, j] = (np.array(astuple(health_of(rewound(found.model, there)))) - at) / STEP
-    reach = REACH * np.sqrt(np.einsum("ij,jk,ik->i", slopes, found.covariance, slopes))
+    reach = NINETY_FIVE * np.sqrt(np.einsum("ij,jk,ik->i", slopes, found.covariance, slopes))
     middle = np.array(astuple(health_of(found.cell)))
     return {
         field.name: (float(max(m - r, 0.0)), float(m + r))

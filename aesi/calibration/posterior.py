@@ -16,7 +16,7 @@ from importlib.util import find_spec
 
 import numpy as np
 
-from aesi.calibration.result import Calibration, Interval, information_weights
+from aesi.calibration.result import NINETY_FIVE, Calibration, Interval, information_weights
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
 
@@ -115,5 +115,5 @@ def _summary(found: Calibration, samples: Array, accepted: float, autocorrelatio
         out[free.name] = Interval(
             free.value(float(middle)), free.value(float(low)), free.value(float(high)), free.unit, free.source
         )
-        off[free.name] = float((high - low) / (2.0 * 1.96 * np.sqrt(found.covariance[j, j])))
+        off[free.name] = float((high - low) / (2.0 * NINETY_FIVE * np.sqrt(found.covariance[j, j])))
     return PosteriorSamples(samples, out, off, accepted, autocorrelation)

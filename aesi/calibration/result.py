@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from plotly.graph_objects import Figure
 
+NINETY_FIVE = 1.96
+"""Standard deviations either side of a 95 % interval."""
 BOUND_SHARE = 0.02
 """A parameter closer to a bound than this share of its range is reported to have ended there."""
 
@@ -149,7 +151,7 @@ def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
     """Value and 95 % interval of every global parameter."""
     out = {}
     for j, free in enumerate(model.free):
-        reach = 1.96 * float(np.sqrt(covariance[j, j]))
+        reach = NINETY_FIVE * float(np.sqrt(covariance[j, j]))
         out[free.name] = Interval(
             free.value(float(x[j])), free.value(float(x[j]) - reach), free.value(float(x[j]) + reach),
             free.unit, free.source,

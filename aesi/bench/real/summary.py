@@ -12,6 +12,7 @@ from aesi.bench import CaseRow
 from aesi.bench.detectable import SEEN_NATS
 from aesi.bench.limit import NO_ANSWER
 from aesi.bench.scoring import rate
+from aesi.tracer.decide.written import AS_GOOD
 
 NEAR_K = 2.0
 """A temperature, a share of capacity in percentage points, or a share of the right value, that counts as near;
@@ -20,8 +21,6 @@ NEAR_PP = 2.0
 NEAR_SHARE = 0.15
 HALVED = 0.5
 """Of the declared error."""
-WORSE = 1.05
-"""Of the better of the declared and the recalibrated error; as where the tracer warns."""
 SOC0 = "wrong_soc0"
 
 
@@ -65,7 +64,9 @@ def _rates(rows: Sequence[CaseRow]) -> CaseRow:
             "ageing_within_2pp"
         ),
         **_witnesses([r for r in rows if "ohmic_off" in r]),
-        **rate([{"worse": not _at_most(r, WORSE)} for r in rows if _errors(r)], "worse").named("after_worse"),
+        **rate([{"worse": not _at_most(r, AS_GOOD)} for r in rows if _errors(r)], "worse").named(
+            "after_worse"
+        ),
         "processor_s_median": _median(rows, "processor_s"),
         "processor_s_total": float(sum(r["processor_s"] for r in rows)),
     }

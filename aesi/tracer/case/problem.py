@@ -39,8 +39,8 @@ what is gone within seconds does not count.  beside: as lasting, with records of
 that the question is what is different about the others."""
 MEASURED_CELL: tuple[Trust, ...] = ("measured", "lasting", "beside")
 AGEING: tuple[Trust, ...] = ("loose", "measured", "lasting")
-"""Where the records of a cell may be of several ages. A careful parametrisation is one of the cell as it is, and what
-is sought beside good records is what has changed since."""
+"""Where the records of a cell may be of several ages: not where something explains them all, and what is sought beside
+good records is what has changed since."""
 SHARE_SD = 0.024
 """Of the logarithm of a record's capacity over the file's: root mean square of the shares that the two shipped files
 over temperatures give the twelve records that they were calibrated on, within weeks of each other
@@ -89,7 +89,7 @@ class InverseProblem:
     effects : id -> Effect, all that may be tried or moved.  own : ids of the declared parameters that every hypothesis
     may move within their spread, by trust.  fixed : effects in every simulation.  model : that every hypothesis uses.
     approximated_v : RMS, V, by which approximations of that model that were let stand move the voltage: no effect is
-    named for less.
+    named for less.  ages : whether the records say that they are of several ages.
     """
 
     cell: Cell
@@ -99,6 +99,7 @@ class InverseProblem:
     trust: Trust = "tight"
     model: ModelName = "espm"
     approximated_v: float = 0.0
+    ages: bool = False
 
     @property
     def coarse(self) -> bool:
@@ -116,10 +117,10 @@ class InverseProblem:
         return self.trust == "measured"
 
     @property
-    def ages(self) -> bool:
+    def several_ages(self) -> bool:
         """True where the cell may have another capacity in each record: of one record alone, what the cell has lost
         since its file is what an effect would say."""
-        return self.trust in AGEING and len(self.records) > 1
+        return self.ages and self.trust in AGEING and len(self.records) > 1
 
     def competing(self) -> tuple[str, ...]:
         """Ids of the effects that may be named: not those that only take back an approximation of the model."""
@@ -128,7 +129,7 @@ class InverseProblem:
     def free(self, hypothesis: Sequence[str]) -> tuple[FreeParameter, ...]:
         """What a hypothesis may move: states of charge, own parameters, then those of its effects."""
         out = [state_of_charge(i, r.soc0, self._soc0_sd(r)) for i, r in enumerate(self.records)]
-        if self.ages:
+        if self.several_ages:
             out += [capacity_share(i, SHARE_SD) for i in range(len(self.records))]
         for effect in self.effects.values():
             if effect.refines is not None or (effect.id in hypothesis and not self.has_good):
@@ -143,10 +144,8 @@ class InverseProblem:
         return tuple(out)
 
     def _soc0_sd(self, record: PreparedRecord) -> float:
-        """Standard deviation of the initial state of charge, at least the difference between the one that was given and
-        the one that its voltage reads as: of two that disagree neither is known better than that."""
-        least = BESIDE_SOC0_SD if self.trust == "beside" else 0.0
-        return max(record.soc0_sd, record.start.doubt, least)
+        """Standard deviation of the initial state of charge."""
+        return max(record.soc0_sd, BESIDE_SOC0_SD) if self.trust == "beside" else record.soc0_sd
 
     def _spread(self, effect: Effect, p: Parameter) -> float | None:
         """Standard deviation of an own parameter at this trust, None where nothing is open."""
@@ -176,11 +175,11 @@ class InverseProblem:
         try:
             for i in range(len(self.records)) if only is None else (only,):
                 good = self.records[i].good
-                soc0, effects = values[STATE_OF_CHARGE][str(i)], self.active(values, good)
-                known = self._of_good.get((i, soc0, effects))
-                voltage = self._voltage_v(i, soc0, effects, share_of(values, i)) if known is None else known
+                asked = i, values[STATE_OF_CHARGE][str(i)], self.active(values, good), share_of(values, i)
+                known = self._of_good.get(asked)
+                voltage = self._voltage_v(*asked) if known is None else known
                 if good:
-                    self._of_good[i, soc0, effects] = voltage
+                    self._of_good[asked] = voltage
                 out.append(voltage)
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
@@ -191,7 +190,7 @@ class InverseProblem:
         return self.run(self.seen[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v
 
     @cached_property
-    def _of_good(self) -> dict[tuple[int, float, tuple[ActiveEffect, ...]], Array]:
+    def _of_good(self) -> dict[tuple[int, float, tuple[ActiveEffect, ...], float], Array]:
         """Voltages of good records as they were simulated: what is under test does not act on them."""
         return {}
 
@@ -314,7 +313,8 @@ class InverseProblem:
         """(effects that restate the parameter, (n,) V for one standard deviation); the first is of the contacts."""
         current = np.concatenate([data.current_a for data in self.seen])
         held = np.concatenate([run.voltage_v for run in self._declared])
-        moves, responds = np.diff(current), np.diff(held)
+        moves = np.concatenate([np.diff(data.current_a) for data in self.seen])
+        responds = np.concatenate([np.diff(run.voltage_v) for run in self._declared])
         resistance = max(-float(moves @ responds) / max(float(moves @ moves), 1e-12), 0.0)
         ohmic = frozenset(name for name, effect in self.effects.items() if effect.ohmic)
         out = [(ohmic, -OHMIC_SHARE * resistance * current)]

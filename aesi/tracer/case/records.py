@@ -40,6 +40,7 @@ class PreparedRecord:
     the white noise in each row of `thin`.  noise_full_v : of that in `data`.
     lead_rows : rows of `data` at the start that only lead to what is judged.
     good : known to be good: nothing is looked for in it, and what others have beside it is what is different there.
+    continues : number of the record that fits have seen and that this one begins with, where it does.
     """
 
     data: Measurement
@@ -54,6 +55,7 @@ class PreparedRecord:
     lead_rows: int = 0
     notes: tuple[str, ...] = ()
     good: bool = False
+    continues: int | None = None
 
     @property
     def name(self) -> str:
@@ -67,8 +69,9 @@ class PreparedRecord:
 
     @property
     def soc0_sd(self) -> float:
-        """What it is uncertain by, standard deviation."""
-        return self.start.sd
+        """What it is uncertain by, standard deviation: at least the difference between what was given and what its
+        voltage reads as; of two that disagree neither is known better than that."""
+        return max(self.start.sd, self.start.doubt)
 
     @property
     def other_soc0(self) -> float:
@@ -199,22 +202,22 @@ def prepare_test(
     Where it is the continuation of a record that fits have seen, or has such a record as its beginning, the model
     runs through that and only what comes after is judged.
     """
-    for known in seen:
+    for index, known in enumerate(seen):
         n = len(known)
         same = len(data) > n and np.array_equal(data.time_s[:n], known.time_s)
         if same and np.array_equal(data.voltage_v[:n], known.voltage_v):
-            return replace(prepare(cell, data, soc0, 0.0, given=given, shared=True), lead_rows=n)
+            whole = prepare(cell, data, soc0, 0.0, given=given, shared=True)
+            return replace(whole, lead_rows=n, continues=index)
         gap = float(data.time_s[0] - known.time_s[-1])
         if 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s))):
-            return replace(
-                prepare(cell, _joined(known, data), soc0, 0.0, given=given, shared=True), lead_rows=n
-            )
+            whole = prepare(cell, _joined(known, data), soc0, 0.0, given=given, shared=True)
+            return replace(whole, lead_rows=n, continues=index)
     return prepare(cell, data, soc0, 0.0, given=given, shared=True)
 
 
 def _joined(first: Measurement, second: Measurement) -> Measurement:
     temperatures = (first.temperature_degc, second.temperature_degc)
-    both = None not in temperatures
+    both = all(t is not None for t in temperatures)
     return replace(
         second,
         time_s=np.concatenate([first.time_s, second.time_s]),

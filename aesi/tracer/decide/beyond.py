@@ -15,23 +15,34 @@ import numpy as np
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array, BoolArray
 from aesi.records import Measurement
+from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import values_of
 from aesi.tracer.case.problem import STEP, InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, full_course, temperatures_degc
-from aesi.tracer.likelihood.fit import FittedHypothesis
+from aesi.tracer.decide.verdict import told_share
+from aesi.tracer.likelihood.fit import FittedHypothesis, covariance_at
+from aesi.tracer.likelihood.model_error import PRIORS
 
 
-def foretold_beyond(problem: InverseProblem, fit: FittedHypothesis, allowed_v: float) -> float:
-    """Share of the rows, at states of charge outside those of the records, whose voltage a fit foretells within
-    `allowed_v`: of full discharges and charges at ordinary rates, between the limits of voltage, at the temperatures
-    of the records. 1 where the records have been everywhere; nought where the fit cannot be simulated there."""
-    known = []
-    for rows, course, soc0 in _unseen(problem):
-        try:
-            known.append(_sd_v(problem, fit, course, soc0)[rows] <= allowed_v)
-        except AesiError:
+def foretold_beyond(
+    problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allowed_v: float
+) -> float:
+    """As `verdict.foretold_share`, of states of charge outside those of the records: the rows of full discharges and
+    charges at ordinary rates there, between the limits of voltage, at the temperatures of the records. 1 where the
+    records have been everywhere; nought where the fit cannot be simulated there."""
+    courses = list(_unseen(problem))
+    if not courses:
+        return 1.0
+    most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
+    covariance = covariance_at(problem, blocks, fit, most)
+    told = []
+    for rows, course, soc0 in courses:
+        slopes = _slopes_v(problem, fit, course, soc0)
+        if slopes is None:
             return 0.0
-    return float(np.mean(np.concatenate(known))) if known else 1.0
+        sd_v = np.sqrt(np.einsum("ij,jk,ik->i", slopes[rows], covariance, slopes[rows]))
+        told.append(told_share(problem.noise_v, sd_v, allowed_v))
+    return float(np.mean(np.concatenate(told)))
 
 
 def _unseen(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, float]]:
@@ -53,19 +64,30 @@ def _unseen(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, f
             yield rows, course, soc0
 
 
-def _sd_v(problem: InverseProblem, fit: FittedHypothesis, course: Measurement, soc0: float) -> Array:
-    """(n,) V, (1); what is of single records moves nothing."""
+def _slopes_v(
+    problem: InverseProblem, fit: FittedHypothesis, course: Measurement, soc0: float
+) -> Array | None:
+    """(n, k) V per standard deviation of each parameter's prior, by one-sided differences within its bounds; what is of
+    single records moves nothing. None where the fit cannot be simulated, or not beside one of them."""
 
-    def voltage_v(x: Array) -> Array:
-        effects = problem.active(values_of(fit.free, x))
-        return problem.run(course, soc0, effects, "linear").voltage_v
+    def voltage_v(x: Array) -> Array | None:
+        try:
+            return problem.run(course, soc0, problem.active(values_of(fit.free, x)), "linear").voltage_v
+        except AesiError:
+            return None
 
     x = fit.point.x
     held = voltage_v(x)
+    if held is None:
+        return None
     slopes = np.zeros((len(held), len(x)))
     for j, one in enumerate(fit.free):
-        if one.record is None:
-            there = x.copy()
-            there[j] += STEP if x[j] + STEP <= one.bounds[1] else -STEP
-            slopes[:, j] = (voltage_v(there) - held) / (there[j] - x[j])
-    return np.sqrt(np.einsum("ij,jk,ik->i", slopes, fit.score.covariance, slopes))
+        if one.record is not None:
+            continue
+        sides = (STEP, -STEP) if x[j] + STEP <= one.bounds[1] else (-STEP, STEP)
+        beside = ((h, voltage_v(x + h * (np.arange(len(x)) == j))) for h in sides)
+        found = next(((there - held) / h for h, there in beside if there is not None), None)
+        if found is None:
+            return None
+        slopes[:, j] = found
+    return slopes

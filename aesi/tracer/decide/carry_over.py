@@ -75,9 +75,9 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
 def _tells(problem: InverseProblem) -> Array:
     """(n,) how far the error of a model in each row tells of a fault of the model where its record is left out.
 
-    The record then begins at the state of charge that its first voltage is read as. Where what that is uncertain by is
-    worth more than models of measured cells are off by, as on the knee at the end of a discharge, an error is no
-    evidence of harm. What is left out of a single record begins where the rest of it ends.
+    How such a record begins (`ModelState.simulated`) is uncertain. Where that is worth more than models of measured
+    cells are off by, as on the knee at the end of a discharge, an error is no evidence of harm. What is left out of a
+    single record begins where the rest of it ends.
     """
     if len(problem.records) == 1:
         return np.ones(len(problem.measured))

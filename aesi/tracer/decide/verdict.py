@@ -25,6 +25,8 @@ GROUP_SIZE = 3
 """Names that a group of look-alikes shows at most; the others are told in a note."""
 MOST_SDS = 50.0
 """Where nothing comes close."""
+RANGE_OF = {"rate": "current", "charge": "charge"}
+"""By what the blocks of a partition are left out together, in words."""
 FORETOLD_SHARE = 0.5
 """Of the rows of conditions that are left out, that the others have to foretell. A convention, see `Thresholds` and
 `decide.written.Option` for what was seen on either side of it."""
@@ -40,8 +42,8 @@ class Thresholds:
     alike_sds, alike_nats : hypotheses that lag by fewer standard deviations of the paired block differences, or by
     fewer nats, are not told apart.
     foretold_share : of the rows, that a hypothesis has to foretell where ranges of the current or of charge are left
-    out. 31 right ones foretold 69 to 98 % on development cases of `aesi bench blind`, what fits a smooth discharge of a
-    measured cell to its noise (the NMC cell's at 1C and C/20, cut at 50 to 85 %) 9 to 12 %.
+    out; either bears it out. 31 right ones foretold 69 to 98 % on development cases of `aesi bench blind`, what fits a
+    smooth discharge of a measured cell to its noise (the NMC cell's at 1C and C/20, cut at 50 to 85 %) 9 to 12 %.
     """
 
     noise_share: float = 0.45
@@ -105,14 +107,14 @@ def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, all
     no other block has been.
     """
     usual = PRIORS[problem.trust].median
-    counts = _counts(problem, prediction_sd_v(problem, blocks, one, usual), allowed_v)
+    counts = told_share(problem.white_v, prediction_sd_v(problem, blocks, one, usual), allowed_v)
     square = float(np.mean(counts * held_out_residual(blocks, one) ** 2))
     return beyond(float(np.sqrt(square)), problem.noise_v)
 
 
-def _counts(problem: InverseProblem, sd_v: Array, allowed_v: float) -> Array:
-    """(n,) how far each row counts that is predicted with such a standard deviation (V)."""
-    told_v2 = problem.white_v**2 + allowed_v**2
+def told_share(white_v: Array | float, sd_v: Array, allowed_v: float) -> Array:
+    """(n,) how far each row counts that is predicted with such a standard deviation (V), beside noise of `white_v`."""
+    told_v2 = white_v**2 + allowed_v**2
     return np.asarray(told_v2 / (told_v2 + sd_v**2))
 
 
@@ -127,7 +129,7 @@ def foretold_share(
     """
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
     sd_v = prediction_sd_v(problem, blocks, one, most, partition)
-    return float(np.mean(_counts(problem, sd_v, allowed_v)))
+    return float(np.mean(told_share(problem.white_v, sd_v, allowed_v)))
 
 
 def tolerance_v(problem: InverseProblem, thresholds: Thresholds) -> float:
@@ -155,12 +157,14 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
         )
         return Verdict("none", (), (), 0.0, left, allowed, reason, -best_gain(path))
     conditions = [name for name in ("rate", "charge") if name in path.blocks.folds]
-    tested = max(foretold_share(path.problem, path.blocks, path.chosen, allowed, name) for name in conditions)
+    tested, by = max(
+        (foretold_share(path.problem, path.blocks, path.chosen, allowed, name), name) for name in conditions
+    )
     if tested < thresholds.foretold_share:
         reason = (
             f"{' + '.join(path.chosen.hypothesis)} fits the data to {1e3 * left:.2f} mV beyond the noise, and so would "
-            f"much else: of a range of charge that the fit has not seen it foretells {100 * tested:.0f} % of the rows; "
-            "a record with other currents would put it to the test"
+            f"much else: of a range of {RANGE_OF[by]} that the fit has not seen it foretells {100 * tested:.0f} % of "
+            "the rows; a record with other currents would put it to the test"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, 0.0)
     groups, margin = look_alikes(path, thresholds, allowed)

@@ -58,7 +58,7 @@ def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> b
     those that they have, other records bear it out, or not. One record does as far as its ranges of charge foretell
     each other; where own parameters are open, as they are known by how they answer to the current, also its ranges of
     current."""
-    if foretold_beyond(problem, fit, MEASURED_V) < FORETOLD_SHARE:
+    if foretold_beyond(problem, blocks, fit, MEASURED_V) < FORETOLD_SHARE:
         return False
     if len(problem.records) > 1:
         return True

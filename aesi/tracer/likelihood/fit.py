@@ -219,6 +219,24 @@ def held_out_residual(blocks: Blocks, fit: LinearForm) -> Array:
     return fit.point.residual_v - np.einsum("ij,ij->i", fit.point.jacobian_v, shifts)
 
 
+def _posterior(
+    problem: InverseProblem,
+    blocks: Blocks,
+    fit: LinearForm,
+    size: Size,
+    folds: tuple[tuple[int, ...], ...] = (),
+) -> Posterior:
+    """Of the parameters, and of what the file may be off by, where the model errs by as much as `size`."""
+    white, log_det = whitened(problem, blocks, fit.point.table(), size)
+    return Posterior(block_sums(blocks, white, log_det), fit.point.padded_x, folds)
+
+
+def covariance_at(problem: InverseProblem, blocks: Blocks, fit: LinearForm, size: Size) -> Array:
+    """(m, m) of the parameters, in standard deviations of their priors, where the model errs by as much as `size`."""
+    own = slice(0, len(fit.point.x))
+    return _posterior(problem, blocks, fit, size).covariance[own, own]
+
+
 def prediction_sd_v(
     problem: InverseProblem, blocks: Blocks, fit: LinearForm, size: Size, partition: str = "block"
 ) -> Array:
@@ -228,9 +246,8 @@ def prediction_sd_v(
     partition : of `blocks.folds`, in which each block is left out once.
     """
     x, jacobian = fit.point.x, fit.point.jacobian_v
-    white, log_det = whitened(problem, blocks, fit.point.table(), size)
     folds = blocks.folds[partition]
-    posterior = Posterior(block_sums(blocks, white, log_det), fit.point.padded_x, folds)
+    posterior = _posterior(problem, blocks, fit, size, folds)
     out = np.empty(len(jacobian))
     for fold, covariance in zip(folds, posterior.covariances_without, strict=True):
         rows = np.isin(blocks.of_row, fold)

@@ -43,9 +43,11 @@ class ModelState:
     def simulated(self, record: PreparedRecord, index: int | None, thin: bool) -> Run:
         """One record.
 
-        index : place among the fitted records, None for one that was not; its state of charge is then the one given,
-        or the one at which this model rests at its first voltage.
+        index : place among the fitted records, None for one that was not. That goes on from a fitted one where it
+        continues it; else its cell has the file's capacity, and it begins at the state of charge that was given, of a
+        full charge where the fitted full charges begin, or where this model rests at its first voltage.
         """
+        index = record.continues if index is None else index
         data, hold = (record.thin, record.thin_hold) if thin else (record.data, record.hold)
         effects, run = self.effects(record.good), self.problem.run
         if self.values is not None and index is not None:

@@ -8,11 +8,9 @@ import numpy as np
 
 from aesi.constants import MV_PER_V
 from aesi.tracer.decide.verdict import Verdict, beyond
+from aesi.tracer.decide.written import AS_GOOD
 from aesi.tracer.report.outcome import NAMES, FileOutcome, State
 
-WORSE_SHARE = 1.05
-"""Where the written model leaves so many times as much of the test part as another one, the warning is against using it
-there. A convention, as in `decide.carry_over`; it decides these words alone."""
 OTHERS: tuple[State, ...] = ("before", "recalibrated")
 
 
@@ -46,7 +44,7 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
     if less:
         model = "the model with what was found" if verdict.effects else NAMES["after"]
         others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
-        advice = ": do not use it there." if after_mv > WORSE_SHARE * min(less.values()) else "."
+        advice = ": do not use it there." if after_mv > AS_GOOD * min(less.values()) else "."
         out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
     return tuple(out)
 

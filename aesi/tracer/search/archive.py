@@ -63,8 +63,9 @@ class Archive:
 
 
 def fit_name(problem: InverseProblem, kind: str, hypothesis: Sequence[str]) -> str:
-    """Of a fit in the archive: its kind, what is believed of the own parameters, and its effects in order."""
-    return f"{kind} {problem.trust}: {'+'.join(hypothesis)}"
+    """Of a fit in the archive: its kind, what is believed of the own parameters and records, its effects in order."""
+    ages = ", several ages" if problem.several_ages else ""
+    return f"{kind} {problem.trust}{ages}: {'+'.join(hypothesis)}"
 
 
 def context_of(problem: InverseProblem) -> str:
@@ -77,7 +78,8 @@ def context_of(problem: InverseProblem) -> str:
     ]
     text += [f"fixed {active.values} {identity(active.effect)}" for active in problem.fixed]
     text += [
-        f"{r.data.digest} {r.thin.digest} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}" for r in problem.records
+        f"{r.data.digest} {r.thin.digest} {r.thin_hold} {r.n_fit} {r.soc0} {r.soc0_sd} {r.noise_v}"
+        for r in problem.records
     ]
     text += ["good" for r in problem.records if r.good]
     return hashlib.sha256("\n".join(text).encode()).hexdigest()[:16]

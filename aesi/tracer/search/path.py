@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,12 +49,9 @@ class Path:
 
     def explanations(self) -> list[Explanation]:
         """All that was tried, each at its best: fits with the whole model before first-order ones."""
-        best: dict[frozenset[str], Explanation] = {frozenset(): self.base}
-        for step in self.steps:
-            tried: list[Explanation] = [*step.grown, *step.fitted]
-            for one in tried:  # a full fit takes the place of a linear one
-                best[frozenset(one.hypothesis)] = one
-        return list(best.values())
+        linear = _best([one for step in self.steps for one in step.grown])
+        fits = [one for step in self.steps for one in (*step.parents, *step.fitted) if not one.as_declared]
+        return list({**linear, **_best([*fits, self.base])}.values())
 
     @property
     def admission_nats(self) -> float:
@@ -64,6 +61,16 @@ class Path:
     def gain(self, one: Explanation) -> float:
         """Nats that a hypothesis says more than the base."""
         return one.score.total - self.base.score.total
+
+
+def _best(tried: Sequence[Explanation]) -> dict[frozenset[str], Explanation]:
+    """Of each set of effects, whatever their order, the one that says most of unseen data."""
+    best: dict[frozenset[str], Explanation] = {}
+    for one in tried:
+        known = best.setdefault(frozenset(one.hypothesis), one)
+        if one.score.total > known.score.total:
+            best[frozenset(one.hypothesis)] = one
+    return best
 
 
 Report = Callable[[InverseProblem, Explanation, float], None]

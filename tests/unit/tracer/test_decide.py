@@ -410,3 +410,32 @@ def test_the_map_gives_the_frequency_that_it_was_fitted_to():
     truth = FrequencyMap(0.5, 0.8, 0)
     for margin in (-2.0, 0.0, 2.0):
         assert found.frequency(margin) == pytest.approx(truth.frequency(margin), abs=0.04)
+
+
+def test_an_archive_knows_how_the_current_runs_between_rows(path):
+    (record,) = path.problem.records
+    other = "linear" if record.thin_hold == "backward" else "backward"
+    held = replace(path.problem, records=(replace(record, thin_hold=other),))
+    assert context_of(held) != context_of(path.problem)
+
+
+def test_the_resistance_that_a_file_is_off_by_does_not_come_from_the_joints_of_records(cell, few):
+    time = np.arange(0.0, 1500.0, 4.0)
+
+    def discharge(rate_c, soc0):
+        current = np.full(len(time), rate_c * cell.nominal_capacity_ah)
+        voltage = simulate(cell, time, current, soc0=soc0).voltage_v
+        return Measurement(time, current, voltage, name=f"{rate_c}")
+
+    records = prepare_all(cell, [discharge(1.0, 0.6), discharge(0.5, 0.95)], None, 0.0)
+    contacts = InverseProblem(cell, records, few, trust="measured").off_at_seconds(())[:, 0]
+    assert np.abs(contacts).max() < 1e-6  # nothing steps within a record
+
+
+def test_a_fit_with_the_whole_model_stands_before_a_linear_one_whatever_their_order(path):
+    grown = next(one for one in path.steps[0].grown if one.hypothesis == path.chosen.hypothesis)
+    again = replace(grown, score=replace(grown.score, total=path.chosen.score.total + 1.0))
+    later = replace(path, steps=(*path.steps, Step((path.chosen,), (again,), (), None)))
+    told = {one.hypothesis: one for one in later.explanations()}
+    assert told[path.chosen.hypothesis] is path.chosen
+    assert () in told

@@ -134,13 +134,18 @@ def test_quantised_data_have_at_least_the_noise_of_the_quantum():
     assert noise_floor_v(voltage, np.ones(3000)) >= 0.01 / np.sqrt(12) * 0.999
 
 
-def test_a_continuation_is_judged_only_after_what_was_seen(cell):
+@pytest.mark.parametrize("degc", [None, 20.0])
+def test_a_continuation_is_judged_only_after_what_was_seen(cell, degc):
     time = np.arange(900.0)
-    whole = measured(cell, time, np.where(time < 30, 0.0, 5.0))
+    kelvin = None if degc is None else degc + 0.01 * time
+    whole = measured(cell, time, np.where(time < 30, 0.0, 5.0), temperature_degc=kelvin)
     seen, rest = whole.between(0, 600), whole.between(600, 900)
     for test in (whole, rest):
         record = prepare_test(cell, test, [seen], None)
         assert record.lead_rows == 600
         assert len(record.data) == 900
+        assert record.continues == 0
+        assert (record.data.temperature_degc is None) == (degc is None)
     other = replace(rest, time_s=rest.time_s + 5000.0, current_a=np.zeros(300))
-    assert prepare_test(cell, other, [seen], None).lead_rows == 0
+    stranger = prepare_test(cell, other, [seen], None)
+    assert (stranger.lead_rows, stranger.continues) == (0, None)

@@ -10,8 +10,9 @@ from aesi.records import Measurement
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE
 from aesi.tracer.case.problem import SHARE_SD, InverseProblem, share_of
-from aesi.tracer.case.records import prepare_all
+from aesi.tracer.case.records import prepare_all, prepare_test
 from aesi.tracer.decide.beyond import foretold_beyond
+from aesi.tracer.decide.evidence import of_several_ages
 from aesi.tracer.decide.written import Option
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
@@ -35,7 +36,7 @@ def discharge(cell):
 
 
 def fitted(cell, few, records, trust):
-    problem = InverseProblem(cell, prepare_all(cell, records, 1.0, 0.0), few, trust=trust)
+    problem = InverseProblem(cell, prepare_all(cell, records, 1.0, 0.0), few, trust=trust, ages=True)
     blocks = blocks_of(problem)
     return problem, blocks, base_of(problem, blocks, Archive(None, ""))
 
@@ -59,27 +60,50 @@ def test_each_of_several_records_of_a_measured_cell_has_a_capacity_of_its_own(ce
     assert sum(one.owner == CAPACITY_SHARE and one.sd == SHARE_SD for one in problem.free(())) == 2
 
 
+def test_what_continues_a_record_goes_on_in_its_state(cell, few, discharge):
+    whole = discharge(0.96, name="later")
+    records = [discharge(name="first"), whole.between(0.0, 1700.0)]
+    problem, _, fit = fitted(cell, few, records, "loose")
+    rest = prepare_test(cell, whole.between(1700.0, 4000.0), records, 1.0)
+    assert (rest.continues, rest.lead_rows) == (1, len(records[1]))
+    state = ModelState.of(problem, fit)
+
+    def left_v(record):
+        run = state.simulated(record, None, thin=False)
+        return np.sqrt(np.mean((run.voltage_v - record.data.voltage_v)[rest.lead_rows : -20] ** 2))
+
+    assert left_v(rest) < 0.3 * left_v(replace(rest, continues=None))
+
+
 def test_of_one_record_alone_what_the_cell_has_lost_is_left_to_effects(cell, few, discharge):
     problem, _, fit = fitted(cell, few, [discharge(0.98)], "loose")
     assert not any(one.owner == CAPACITY_SHARE for one in problem.free(()))
     assert share_of(fit.values, 0) == 1.0
 
 
+def test_records_are_of_several_ages_where_they_say_so(cell, few, discharge):
+    def told(share):
+        records = prepare_all(cell, [discharge(share, name="later"), discharge(name="first")], 1.0, 0.0)
+        return of_several_ages(InverseProblem(cell, records, few), Archive(None, ""))
+
+    assert told(0.96)
+    assert not told(1.0)
+
+
 def test_what_says_nothing_of_charges_that_no_record_has_been_at_is_not_written(cell, few, discharge):
     half = [discharge(until=0.5), discharge(until=0.45)]
-    problem, blocks, loose = fitted(cell, few, half, "loose")
-    held, _, exact = fitted(cell, few, half, "exact")
-    assert foretold_beyond(problem, loose, MEASURED_V) < foretold_beyond(held, exact, MEASURED_V) == 1.0
-    assert foretold_beyond(problem, loose, 1e3) == 1.0
-    assert foretold_beyond(problem, loose, 1e-9) == 0.0
-    assert Option.of(held, blocks, exact).tested
-    unsure = replace(loose, score=replace(loose.score, covariance=1e4 * loose.score.covariance))
-    assert not Option.of(problem, blocks, unsure).tested
+    problem, blocks, fit = fitted(cell, few, half, "loose")
+    untold = replace(fit, point=replace(fit.point, jacobian_v=1e-9 * fit.point.jacobian_v))
+    share, as_believed = (foretold_beyond(problem, blocks, one, MEASURED_V) for one in (fit, untold))
+    assert as_believed < 0.5 < share < 1.0
+    assert foretold_beyond(problem, blocks, untold, 10.0) == pytest.approx(1.0, abs=1e-3)
+    assert Option.of(problem, blocks, fit).tested
+    assert not Option.of(problem, blocks, untold).tested
 
 
 def test_where_the_records_have_been_everywhere_nothing_is_beyond_them(cell, few):
     time = np.arange(0.0, 3600.0, 4.0)
     current = np.full(len(time), 1.02 * cell.capacity_ah)
     empty = Measurement(time, current, simulate(cell, time, current, 1.0, on_depletion="clip").voltage_v)
-    problem, _, fit = fitted(cell, few, [empty], "loose")
-    assert foretold_beyond(problem, fit, 1e-9) == 1.0
+    problem, blocks, fit = fitted(cell, few, [empty], "loose")
+    assert foretold_beyond(problem, blocks, fit, 1e-9) == 1.0
