@@ -72,7 +72,7 @@ def test_what_continues_a_record_goes_on_in_its_state(cell, few, discharge):
         run = state.simulated(record, None, thin=False)
         return np.sqrt(np.mean((run.voltage_v - record.data.voltage_v)[rest.lead_rows : -20] ** 2))
 
-    assert left_v(rest) < 0.3 * left_v(replace(rest, continues=None))
+    assert left_v(rest) < 0.5 * left_v(replace(rest, continues=None))
 
 
 def test_of_one_record_alone_what_the_cell_has_lost_is_left_to_effects(cell, few, discharge):
