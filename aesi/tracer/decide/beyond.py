@@ -17,7 +17,7 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import values_of
-from aesi.tracer.case.problem import STEP, InverseProblem
+from aesi.tracer.case.problem import INDEPENDENT_CHARGE, STEP, InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, full_course, temperatures_degc
 from aesi.tracer.decide.verdict import told_share
 from aesi.tracer.likelihood.fit import FittedHypothesis, covariance_at
@@ -27,9 +27,10 @@ from aesi.tracer.likelihood.model_error import PRIORS
 def foretold_beyond(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allowed_v: float
 ) -> float:
-    """As `verdict.foretold_share`, of states of charge outside those of the records: the rows of full discharges and
-    charges at ordinary rates there, between the limits of voltage, at the temperatures of the records. 1 where the
-    records have been everywhere; nought where the fit cannot be simulated there."""
+    """As `verdict.foretold_share`, of states of charge further from those of the records than the error of a model
+    lasts: the rows of full discharges and charges at ordinary rates there, between the limits of voltage, at the
+    temperatures of the records. 1 where the records have been everywhere; nought where the fit cannot be simulated
+    there."""
     courses = list(_unseen(problem))
     if not courses:
         return 1.0
@@ -56,7 +57,7 @@ def _unseen(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, f
         except AesiError:
             continue
         soc, voltage = run.series["soc"], run.voltage_v
-        rows = (soc < seen.min()) | (soc > seen.max())
+        rows = (soc < seen.min() - INDEPENDENT_CHARGE) | (soc > seen.max() + INDEPENDENT_CHARGE)
         rows &= (
             (soc > 0.0) & (soc < 1.0) & (voltage > cell.lower_voltage_v) & (voltage < cell.upper_voltage_v)
         )
