@@ -9,8 +9,8 @@ import numpy as np
 
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem
-from aesi.tracer.decide.beyond import foretold_beyond
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
+from aesi.tracer.decide.in_use import foretold_in_use
 from aesi.tracer.decide.verdict import FORETOLD_SHARE, foretold_share
 from aesi.tracer.likelihood.fit import FittedHypothesis
 from aesi.tracer.likelihood.model_error import MEASURED_V
@@ -54,11 +54,10 @@ class Option:
 
 
 def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> bool:
-    """Could these data have spoken against a fit? Not where it says nothing of states of charge that they lack. Within
-    those that they have, other records bear it out, or not. One record does as far as its ranges of charge foretell
-    each other; where own parameters are open, as they are known by how they answer to the current, also its ranges of
-    current."""
-    if foretold_beyond(problem, blocks, fit, MEASURED_V) < FORETOLD_SHARE:
+    """Could these data have spoken against a fit? Not where it says nothing of ordinary use. Beyond that other records
+    bear it out, or not; one record does as far as its ranges of charge foretell each other, and where own parameters
+    are open, as they are known by how they answer to the current, also its ranges of current."""
+    if foretold_in_use(problem, blocks, fit, MEASURED_V) < FORETOLD_SHARE:
         return False
     if len(problem.records) > 1:
         return True

@@ -1,4 +1,4 @@
-"""Records of one cell at several ages, and states of charge at which no record has been."""
+"""Records of one cell at several ages, and what a fit says of ordinary use."""
 
 from dataclasses import replace
 
@@ -11,8 +11,8 @@ from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.free_parameter import CAPACITY_SHARE
 from aesi.tracer.case.problem import SHARE_SD, InverseProblem, share_of
 from aesi.tracer.case.records import prepare_all, prepare_test
-from aesi.tracer.decide.beyond import foretold_beyond
 from aesi.tracer.decide.evidence import of_several_ages
+from aesi.tracer.decide.in_use import foretold_in_use
 from aesi.tracer.decide.written import Option
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
@@ -90,20 +90,12 @@ def test_records_are_of_several_ages_where_they_say_so(cell, few, discharge):
     assert not told(1.0)
 
 
-def test_what_says_nothing_of_charges_that_no_record_has_been_at_is_not_written(cell, few, discharge):
+def test_what_says_nothing_of_ordinary_use_is_not_written(cell, few, discharge):
     half = [discharge(until=0.5), discharge(until=0.45)]
     problem, blocks, fit = fitted(cell, few, half, "loose")
     untold = replace(fit, point=replace(fit.point, jacobian_v=1e-9 * fit.point.jacobian_v))
-    share, as_believed = (foretold_beyond(problem, blocks, one, MEASURED_V) for one in (fit, untold))
+    share, as_believed = (foretold_in_use(problem, blocks, one, MEASURED_V) for one in (fit, untold))
     assert as_believed < 0.5 < share < 1.0
-    assert foretold_beyond(problem, blocks, untold, 10.0) == pytest.approx(1.0, abs=1e-3)
+    assert foretold_in_use(problem, blocks, untold, 10.0) == pytest.approx(1.0, abs=1e-3)
     assert Option.of(problem, blocks, fit).tested
     assert not Option.of(problem, blocks, untold).tested
-
-
-def test_where_the_records_have_been_everywhere_nothing_is_beyond_them(cell, few):
-    time = np.arange(0.0, 3600.0, 4.0)
-    current = np.full(len(time), 1.02 * cell.capacity_ah)
-    empty = Measurement(time, current, simulate(cell, time, current, 1.0, on_depletion="clip").voltage_v)
-    problem, blocks, fit = fitted(cell, few, [empty], "loose")
-    assert foretold_beyond(problem, blocks, fit, 1e-9) == 1.0

@@ -1,4 +1,4 @@
-"""What a fit says of states of charge that no record has been at.
+"""What a fit says of ordinary use: full discharges and charges, at whatever states of charge and currents records are.
 
     sd(t)^2 = s(t) C s(t)'          s the slopes of the voltage over the parameters, C their covariance in the fit   (1)
 
@@ -17,39 +17,34 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import values_of
-from aesi.tracer.case.problem import INDEPENDENT_CHARGE, STEP, InverseProblem
+from aesi.tracer.case.problem import STEP, InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, full_course, temperatures_degc
 from aesi.tracer.decide.verdict import told_share
 from aesi.tracer.likelihood.fit import FittedHypothesis, covariance_at
 from aesi.tracer.likelihood.model_error import PRIORS
 
 
-def foretold_beyond(
+def foretold_in_use(
     problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis, allowed_v: float
 ) -> float:
-    """As `verdict.foretold_share`, of states of charge further from those of the records than the error of a model
-    lasts: the rows of full discharges and charges at ordinary rates there, between the limits of voltage, at the
-    temperatures of the records. 1 where the records have been everywhere; nought where the fit cannot be simulated
-    there."""
-    courses = list(_unseen(problem))
-    if not courses:
-        return 1.0
+    """As `verdict.foretold_share`, of full discharges and charges at ordinary rates, between the limits of voltage and
+    at the temperatures of the records; nought where the fit cannot be simulated there, 1 where the declared model
+    cannot."""
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
     covariance = covariance_at(problem, blocks, fit, most)
     told = []
-    for rows, course, soc0 in courses:
+    for rows, course, soc0 in _courses(problem):
         slopes = _slopes_v(problem, fit, course, soc0)
         if slopes is None:
             return 0.0
         sd_v = np.sqrt(np.einsum("ij,jk,ik->i", slopes[rows], covariance, slopes[rows]))
         told.append(told_share(problem.noise_v, sd_v, allowed_v))
-    return float(np.mean(np.concatenate(told)))
+    return float(np.mean(np.concatenate(told))) if told else 1.0
 
 
-def _unseen(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, float]]:
-    """Rows of full courses where no record has been, as the declared model goes through them; those of which there are
-    some and that it can go through."""
-    cell, seen = problem.cell, problem.declared_soc
+def _courses(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, float]]:
+    """The courses that the declared model can go through: rows between the limits, current, initial state of charge."""
+    cell = problem.cell
     for degc, rate in product(temperatures_degc(problem), ORDINARY_C):
         course, soc0 = full_course(cell, rate, degc)
         try:
@@ -57,10 +52,7 @@ def _unseen(problem: InverseProblem) -> Iterator[tuple[BoolArray, Measurement, f
         except AesiError:
             continue
         soc, voltage = run.series["soc"], run.voltage_v
-        rows = (soc < seen.min() - INDEPENDENT_CHARGE) | (soc > seen.max() + INDEPENDENT_CHARGE)
-        rows &= (
-            (soc > 0.0) & (soc < 1.0) & (voltage > cell.lower_voltage_v) & (voltage < cell.upper_voltage_v)
-        )
+        rows = (soc > 0.0) & (soc < 1.0) & (voltage > cell.lower_voltage_v) & (voltage < cell.upper_voltage_v)
         if rows.any():
             yield rows, course, soc0
 
