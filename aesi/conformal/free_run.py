@@ -56,8 +56,9 @@ SCHEMA = "aesi.free_run_bands/8"
 class FreeRunBands:
     """Bands at miss rate `alpha` for each calibrated horizon, shortest first.
 
-    seen : what the model was fitted to.  root : what that leaves open of the physics, energies_j_mol : what is open of
-    its change with temperature (parameter_spread.py). Each is None where nothing is known of it.
+    seen : what the model was fitted to.  root : what that leaves open of the first parameters that a record has slopes
+    of, energies_j_mol : what is open of the change of parameters with temperature (parameter_spread.py). Each is None
+    where nothing is known of it.
     """
 
     alpha: float
@@ -146,9 +147,10 @@ class FreeRunBands:
         """(n,) V, what the fitted rows leave open of the physics along a record; nought where that is not known.
 
         Raises InputError for a record without the slopes that it takes."""
-        return (
-            np.zeros(len(series)) if self.root is None else spread(_slopes(series, len(self.root)), self.root)
-        )
+        if self.root is None:
+            return np.zeros(len(series))
+        known = len(self.root)
+        return spread(_slopes(series, known)[:, :known], self.root)
 
     def thermal(self, series: ErrorSeries) -> Array:
         """(n,) V, what the fitted temperatures leave open of the physics along a record; nought where that is not
@@ -157,7 +159,8 @@ class FreeRunBands:
         Raises InputError for a record without the slopes that it takes."""
         if self.energies_j_mol is None or self.seen is None:
             return np.zeros(len(series))
-        slopes = _slopes(series, len(self.energies_j_mol))
+        known = len(self.energies_j_mol)
+        slopes = _slopes(series, known)[:, :known]
         return thermal_spread(slopes, self.energies_j_mol, self.seen.per_energy(series.temperature_degc))
 
     def intervals(
@@ -213,8 +216,8 @@ class FreeRunBands:
 
 
 def _slopes(series: ErrorSeries, count: int) -> Array:
-    """(n, count) V."""
-    if series.slopes_v is None or series.slopes_v.shape[1] != count:
+    """(n, at least count) V."""
+    if series.slopes_v is None or series.slopes_v.shape[1] < count:
         raise InputError(
             f"{series.name}: the band asks for {count} slopes of the physics; run the experiment again."
         )

@@ -7,15 +7,16 @@ what the fitted rows leave open of the parameters, times that, is what they leav
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.parameters import RATE_ENERGY_SD, SALT_EA, SOLID_EA
+from aesi.calibration.parameters import FILM_ENERGY_SD, RATE_ENERGY_SD, SALT_EA, SOLID_EA
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, simulate
 from aesi.physics.balance import same_rest
+from aesi.physics.cell.relations import scaled
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import model_with
 from aesi.records import Hold, Measurement, Run
@@ -23,13 +24,14 @@ from aesi.records import Hold, Measurement, Run
 STEP = 0.05
 """Of a difference quotient, in deviations."""
 
-SOC0, CONTACT = "soc0", "contact"
+SOC0, CONTACT, FILM = "soc0", "contact", "film"
 
 
 @dataclass(frozen=True)
 class FileParameter:
-    """owner : an effect of the catalogue, or SOC0 or CONTACT.  deviation : of its value, of its logarithm where `log`;
-    of the contact resistance in V at a current of 1C.  energy_j_mol : deviation of the activation energy of a rate."""
+    """owner : an effect of the catalogue, or SOC0, CONTACT or FILM.  deviation : of its value, of its logarithm where
+    `log`; of the contact resistance in V at a current of 1C.  energy_j_mol : deviation of the activation energy of a
+    rate, or of the film of an electrode (its name)."""
 
     owner: str
     name: str
@@ -65,8 +67,10 @@ KNOBS = (
     *(FileParameter(owner, "loss", 0.0003) for owner in BALANCE),
     *_waves(),
 )
-ENERGIES_J_MOL = np.array([knob.energy_j_mol / knob.deviation for knob in KNOBS])
-"""(n_knobs,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
+FILMS = tuple(FileParameter(FILM, side, STEP, True, FILM_ENERGY_SD) for side in ("negative", "positive"))
+"""No fit moves them, which at one temperature are like contacts; they change with it as rates do."""
+ENERGIES_J_MOL = np.array([knob.energy_j_mol / knob.deviation for knob in (*KNOBS, *FILMS)])
+"""(n_slopes,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
 ALL = tuple(range(len(KNOBS)))
 INITIAL_STATE = (0,)
 RESISTOR = (1,)
@@ -109,21 +113,30 @@ class PhysicsStart:
 def deviating(
     declared: Cell, effects: tuple[ActiveEffect, ...], free: Sequence[int] | Array, z: Array, model: ModelName
 ) -> PhysicsStart:
-    """The declared physics with its free knobs moved by z (n_free,) deviations."""
-    x = np.zeros(len(KNOBS))
+    """The declared physics with its free knobs, or films, moved by z (n_free,) deviations."""
+    x = np.zeros(len(ENERGIES_J_MOL))
     x[np.array(free)] = z
     values: dict[str, dict[str, float]] = {}
-    for knob, deviations in zip(KNOBS, x, strict=True):
+    for knob, deviations in zip((*KNOBS, *FILMS), x, strict=True):
         if deviations != 0.0:
             moved = float(deviations) * knob.deviation
             values.setdefault(knob.owner, {})[knob.name] = float(np.exp(moved)) if knob.log else moved
     shift = values.pop(SOC0, {}).get("shift", 0.0)
     volts_at_1c = values.pop(CONTACT, {}).get("resistance_ohm", 0.0)
+    films = values.pop(FILM, {})
     added = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
     cell = model_with(declared, added).cell
     ohm = declared.contact_resistance_ohm + volts_at_1c / declared.nominal_capacity_ah
-    cell = replace(cell, contact_resistance_ohm=ohm)
+    cell = _with_films(replace(cell, contact_resistance_ohm=ohm), films)
     return PhysicsStart(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
+
+
+def _with_films(cell: Cell, factors: Mapping[str, float]) -> Cell:
+    """factors : side of an electrode -> times its film."""
+    n, p = cell.negative, cell.positive
+    return cell.with_negative(film_ohm_m2=scaled(n.film_ohm_m2, factors.get("negative", 1.0))).with_positive(
+        film_ohm_m2=scaled(p.film_ohm_m2, factors.get("positive", 1.0))
+    )
 
 
 def slopes_v(
@@ -135,11 +148,12 @@ def slopes_v(
     model: ModelName,
     voltage_v: Array,
 ) -> Array:
-    """(n, n_knobs) V a deviation, how the voltage_v (n,) of the record under the cell moves with each knob.
+    """(n, n_slopes) V a deviation, how the voltage_v (n,) of the record under the cell moves with each knob and film.
 
     soc0 : in the windows of the cell.  Where a neighbour runs empty its stoichiometries are held.
     """
-    moved = (deviating(cell, effects, ALL, STEP * one, model) for one in np.eye(len(KNOBS)))
+    one_each = np.eye(len(ENERGIES_J_MOL))
+    moved = (deviating(cell, effects, range(len(one_each)), STEP * one, model) for one in one_each)
     return np.column_stack(
         [(each.simulate(record, soc0, hold).voltage_v - voltage_v) / STEP for each in moved]
     )

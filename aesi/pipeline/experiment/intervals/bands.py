@@ -15,7 +15,7 @@ from aesi.conformal.parameter_spread import covariance_root, spread
 from aesi.numerics.typing import Array, BoolArray
 from aesi.numerics.visited import Visited
 from aesi.pipeline.experiment.recalibrate import MEMORY_S, MODEL_ERROR_V
-from aesi.pipeline.product.deviations import ENERGIES_J_MOL
+from aesi.pipeline.product.deviations import ENERGIES_J_MOL, KNOBS
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
 from aesi.sparse.yardsticks import Bare, Persistence
@@ -147,14 +147,13 @@ def _seen(train: Sequence[ErrorSeries]) -> Visited:
 def _root(
     train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE
 ) -> Array | None:
-    """By the training records without the given rows of one of them, where that is one; None without slopes."""
-    slopes = [
-        record.slopes_v[_others(len(record), rows)]
-        if left_out is not None and record.name == left_out.name
-        else record.slopes_v
-        for record in train
-        if record.slopes_v is not None
-    ]
+    """Of the knobs, by the training records without the given rows of one of them, where that is one; None without
+    slopes."""
+    slopes = []
+    for record in train:
+        if record.slopes_v is not None:
+            held = left_out is not None and record.name == left_out.name
+            slopes.append(record.slopes_v[_others(len(record), rows) if held else slice(None), : len(KNOBS)])
     return covariance_root(slopes, train[0].dt_s / (MEMORY_S * MODEL_ERROR_V**2)) if slopes else None
 
 
@@ -162,7 +161,7 @@ def _spread(train: Sequence[ErrorSeries], series: ErrorSeries, rows: slice) -> A
     """(n,) V along a record, by the slopes of the physics that is served, of a fit to the other rows; 0 without."""
     root = _root(train, series, rows)
     slopes = next((each.slopes_v for each in train if each.name == series.name), series.slopes_v)
-    return np.zeros(len(series)) if root is None or slopes is None else spread(slopes, root)
+    return np.zeros(len(series)) if root is None or slopes is None else spread(slopes[:, : len(root)], root)
 
 
 def _steps(series: ErrorSeries, horizon_s: float) -> int:
