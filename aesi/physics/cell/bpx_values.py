@@ -33,9 +33,9 @@ FARTHEST_V = 1.0
 0.18 V in LFP's, which falls steeply there; who cycles a part of the range cuts off some 0.6 V less. Swapped electrodes
 are 5.9 V off and more."""
 LEAST_ENERGY_J_MOL = 600.0
-"""Of an activation energy that is declared: 4 to 89 kJ/mol in the shipped files that are no fits and in twelve published
-sets (of PyBaMM), which without the kilo are 4 to 89; this is the middle of 89 and 4,000 on a logarithmic scale. A fit
-may end on any, down to none."""
+"""Of an activation energy that is declared: 4 to 89 kJ/mol in the shipped files that are no fits and in twelve
+published sets (of PyBaMM), which without the kilo are 4 to 89; this is the middle of 89 and 4,000 on a logarithmic
+scale. A fit may end on any, down to none."""
 KILO = 1000.0
 LARGEST_ENTROPIC_V_K = 0.01
 """Within the window of an electrode 4e-5 to 6e-4 V/K in the shipped files and in four published sets (of PyBaMM) and
