@@ -225,6 +225,15 @@ def measurements(
     return tuple(out)
 
 
+def check_once(option: str, paths: list[Path]) -> None:
+    """Raises InputError for a file that is given twice."""
+    seen = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise InputError(f"{option} {path} is there twice; give it once.")
+        seen.add(path.resolve())
+
+
 def by_file(option: str, pairs: list[str] | None, paths: list[Path]) -> dict[str, float]:
     """`FILE=NUMBER` pairs as numbers by record of the files `paths`."""
     return _by_file(option, pairs, paths, _finite, "NUMBER")

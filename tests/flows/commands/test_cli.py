@@ -21,6 +21,7 @@ from flows.commands.options import dates, day
 
 LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
 SIMULATE = ("simulate", "--cell", LG_M50, "--current", "i.csv", "--out", "o.csv")
+CALIBRATE = ("calibrate", "--cell", LG_M50, "--data", "d.csv", "--out", "n.json")
 
 
 def test_version(call):
@@ -82,6 +83,15 @@ def test_usage_errors_are_exit_code_2(call, arguments):
             [*SIMULATE, "--effect", "series_resistance:resistance_ohm=1e-3,resistance_ohm=2e-3"],
             "resistance_ohm is there twice; give it once",
         ),
+        ([*SIMULATE[:-1], "-"], "--out -: name a place to write to; the standard output is /dev/stdout"),
+        (
+            [*SIMULATE[:-1], "o.csv.zip"],
+            "--out o.csv.zip: what is written is a CSV; give a name that ends in",
+        ),
+        (["data", "get", "lg_m50t_w8", "--out", "-"], "--out -: name a place"),
+        ([*CALIBRATE, "--data", "./d.csv"], "--data d.csv is there twice; give it once"),
+        ([*CALIBRATE, "--impedance", "z.csv"], "There is no file z.csv"),
+        ([*CALIBRATE, "--temperature", "e.csv=10"], "--temperature e.csv=...: there is no such record"),
         (["run", "."], ". is a folder; give an experiment file"),
     ],
 )
