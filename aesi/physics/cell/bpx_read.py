@@ -65,6 +65,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         raise CellError(
             f"{where}: the section 'User-defined' is {type(user).__name__}, and has to hold names and values."
         )
+    _check_initial_soc(initial, where)
     return CellParameters(
         negative=_electrode(parts["Negative electrode"], user, "Negative", where),
         separator=_separator(parts["Separator"]),
@@ -92,6 +93,14 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         references=str(header.get("References") or ""),
         unread=unread(v1),
     )
+
+
+def _check_initial_soc(initial: Fields, where: str) -> None:
+    """A simulation is told its own start; what is no share is of another unit, and so may be what is beside it."""
+    name = "Initial state-of-charge"
+    soc = _optional(initial, name)
+    if soc is not None and not 0.0 <= soc <= 1.0:
+        raise CellError(f"{where}: {name} = {soc:g} has to be from 0 (empty) to 1 (full); 90 % is 0.9.")
 
 
 def _kelvin(fields: Fields, name: str, without: float) -> float:

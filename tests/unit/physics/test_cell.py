@@ -115,6 +115,54 @@ def test_a_missing_field_is_named(content):
     assert "Thickness [m]" in fault(content)
 
 
+@pytest.mark.parametrize(
+    ("section", "taken", "given", "sentence"),
+    [
+        (
+            "Positive electrode",
+            "Thickness [m]",
+            {"Thickness m": 1e-5},
+            r"'Positive electrode > Thickness \[m\]' is missing, and 'Thickness m' there is no field of BPX; rename",
+        ),
+        (
+            "Cell",
+            "",
+            {"Foo [m]": 1.0},
+            r"'Cell > Foo \[m\]' is no field of BPX there; take it out, or put it into",
+        ),
+        ("Cell", "", {"Density [kg/m3]": 1.0}, r"no field of BPX there; did you mean 'Density \[kg.m-3\]'\?"),
+        ("Separator", "", {"Conductivity [S.m-1]": 1.0}, "no field of BPX there; take it out"),
+        ("Cell", "", {"Volume [m3]": [1]}, r"Cell > Volume \[m3\] = \[1\] has to be a valid number\."),
+        (
+            "Electrolyte",
+            "",
+            {"Diffusivity [m2.s-1]": {"x": [0, 1], "z": [1, 2]}},
+            r"Electrolyte, Diffusivity \[m2.s-1\] is dict; give a number, an expression in x or a table",
+        ),
+    ],
+)
+def test_what_fails_the_schema_was_told_in_words_of_the_schema(content, section, taken, given, sentence):
+    fields = content["Parameterisation"][section]
+    fields.pop(taken, None)
+    fields.update(given)
+    with pytest.raises(CellError, match=sentence):
+        Cell.from_bpx(content)
+
+
+@pytest.mark.parametrize("soc", [2, -0.1, 95])
+def test_a_state_of_charge_that_is_no_share_is_refused(content, soc):
+    content["State"]["Initial conditions"]["Initial state-of-charge"] = soc
+    assert f"Initial state-of-charge = {soc} has to be from 0 (empty) to 1 (full)" in fault(content)
+
+
+def test_of_a_field_that_is_there_twice_the_last_was_taken_without_a_word(content, tmp_path):
+    text = json.dumps(content)
+    path = tmp_path / "cell.json"
+    path.write_text(text.replace('"Porosity": ', '"Porosity": 0.3, "Porosity": ', 1))
+    with pytest.raises(CellError, match=r"cell\.json: the field 'Porosity' is there twice in one section"):
+        Cell.from_bpx(path)
+
+
 def test_a_missing_concentration_is_named(content):
     del content["State"]["Initial conditions"]["Initial electrolyte concentration [mol.m-3]"]
     assert "Initial electrolyte concentration" in fault(content)
@@ -347,9 +395,10 @@ def test_text_instead_of_a_number_is_refused(content):
     assert "Nominal cell capacity" in fault(content)
 
 
-def test_no_version_is_refused(content):
-    del content["Header"]["BPX"]
-    assert "version" in fault(content)
+@pytest.mark.parametrize("version", ["9.9", 2.0, "1", "x", None])
+def test_a_version_that_is_not_read_is_refused(content, version):
+    content["Header"]["BPX"] = version
+    assert f"version of BPX in its Header is {version!r}, and versions 0.x and 1.x are read" in fault(content)
 
 
 def test_code_in_an_open_circuit_potential_is_refused_and_not_run(content, tmp_path):
