@@ -6,7 +6,8 @@ sentence and an exit code. An expected failure inside a search is a value, `aesi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 
 class AesiError(Exception):
@@ -63,3 +64,13 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     near = get_close_matches(name, list(known), n=1)
     return f"; did you mean {near[0]!r}?" if near else "."
+
+
+def wanted(fault: Mapping[str, Any]) -> str:
+    """How a sentence about a value goes on that a schema refuses: "has to be less than 1".
+
+    fault : as pydantic's ValidationError.errors() has it.
+    """
+    said = fault["msg"].rstrip(".").split(", unable to ")[0].split(", got ")[0]
+    own = said.removeprefix("Input should ")
+    return f"has to {own}" if own != said else said[:1].lower() + said[1:]

@@ -16,8 +16,9 @@ from aesi.errors import AesiError
 from flows.base import environment
 from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
 from flows.commands import batch, bench, cell, data, effects, experiment
+from flows.commands.command import App
 
-app = typer.Typer(
+app = App(
     name="aesi",
     help="Hybrid lithium-ion cell models: physics, a sparse correction of its error, intervals, and a tracer "
     "that names the missing physics.",
@@ -106,7 +107,8 @@ def _os_sentence(error: OSError) -> str:
     """What the system refused; of the workspace, where else it can be."""
     place = error.filename or "a file"
     words = f"{place}: {error.strerror or error}"
-    if str(place).startswith(str(environment.workspace())) and error.errno in CLOSED:
+    home = environment.workspace()
+    if str(place).startswith(str(home)) and (error.errno in CLOSED or not home.is_dir()):
         words += (
             "; runs and their tracking are kept in the current folder, or in the one that AESI_HOME names"
         )

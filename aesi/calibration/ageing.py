@@ -63,13 +63,19 @@ class Ageing:
     def of(cls, records: Sequence[Prepared], dates: Mapping[str, date], as_of: date | None = None) -> Ageing:
         """dates : by record name.  as_of : day of the file's state; None takes the last with a load.
 
-        Raises DataError for a date of a record that is not there, and for a day without any date.
+        Raises DataError for a date of a record that is not there, for a day without any date, and for one outside
+        those of the records: what a cell lost until then, none of them shows.
         """
         check_dates([r.name for r in records], dates)
         if as_of is not None and not dates:
             raise DataError(f"--as-of {as_of}: no record has a date; give theirs, --date FILE=YYYY-MM-DD.")
         days = [dates.get(r.name) for r in records]
         told = [d for d in days if d is not None]
+        if as_of is not None and not min(told) <= as_of <= max(told):
+            raise DataError(
+                f"--as-of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the "
+                "cell was on another day; give a day from the first to the last of them."
+            )
         loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
         day = as_of or max(loaded or told, default=None)
         chain = np.eye(len(records))

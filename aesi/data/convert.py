@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.data.channels.implausible import USUAL_RESISTANCE_OHM_AH, step_resistance_ohm
+from aesi.data.channels.implausible import ENOUGH_STEPS, USUAL_RESISTANCE_OHM_AH, step_resistance_ohm
 from aesi.data.read import read
 from aesi.data.reading import Reading
 from aesi.errors import DataError
@@ -35,14 +36,19 @@ BDF_NAMES = {
 
 
 def write_csv(path: Path, table: pd.DataFrame, digits: int = DIGITS) -> None:
-    """Write a table whole, its first column with all digits of its numbers, the others with so many.
+    """Write a table whole, its first column with all digits of its numbers, the others with so many; compressed where
+    the name ends in .gz.
 
     table : the first column is the time in s, or another that rises.  digits : significant ones.
     Raises OSError where the file cannot be written.
     """
     time = table.columns[0]
     shown = table.assign(**{time: [f"{stamp:.{TIME_DIGITS}g}" for stamp in table[time]]})
-    write_whole(path, shown.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n"))
+    text = shown.to_csv(index=False, float_format=f"%.{digits}g", lineterminator="\n")
+    zipped = path.suffix.lower() == ".gz"
+    write_whole(
+        path, gzip.compress(text.encode(), mtime=0) if zipped else text
+    )  # without the hour, as a CSV is
 
 
 def convert_file(
@@ -93,7 +99,11 @@ def _size_line(record: Measurement) -> list[str]:
     columns = {"time_s": record.time_s, "current_a": record.current_a, "voltage_v": record.voltage_v}
     resistance = step_resistance_ohm(columns)
     if resistance is None:
-        return []
+        return [
+            "Of what cells it can be, and so the unit of the current, is not told: fewer than "
+            f"{ENOUGH_STEPS} steps of the current are clear, or the voltage does not follow them; --cell FILE checks "
+            "it."
+        ]
     low, high = (each / resistance for each in USUAL_RESISTANCE_OHM_AH)
     return [
         f"Steps of the current show {1e3 * resistance:.3g} mohm, as cells of {low:.2g} to {high:.2g} Ah do; if it is "

@@ -31,6 +31,9 @@ NO_DOUBLE_LAYER = (
     f"at once: above some {INSTANT_HZ:g} Hz there is no arc, and |Z| is too large."
 )
 
+MOST_FREQUENCIES, HIGHEST_HZ = 100_000, 1e9
+"""Of `--frequencies`: sweeps have some tens to hundreds and end at some megahertz, beyond which leads are seen and no
+cell. Conventions: far more rows than these fill the memory, and take hours."""
 ASSUMED_DEGC = 25.0
 """Of a spectrum whose temperature was not measured; it is said."""
 
@@ -96,6 +99,11 @@ def read_frequencies(text: str) -> Array:
             ) from None
         if not 0.0 < low < high < np.inf or n < 2:
             raise InputError(f"--frequencies {text}: needs 0 < LOW < HIGH in Hz and at least two of them.")
+        if high > HIGHEST_HZ or n > MOST_FREQUENCIES:
+            raise InputError(
+                f"--frequencies {text}: at most {MOST_FREQUENCIES:,} frequencies up to {HIGHEST_HZ:g} Hz are worked "
+                "out; give a smaller N or HIGH."
+            )
         return np.geomspace(low, high, n)
     table = open_table(text)
     if "frequency_hz" not in table.header:

@@ -7,10 +7,13 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from inspect import signature
+from pathlib import Path
 from typing import Any
 
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 from aesi.errors import InputError
+from aesi.numerics.files.whole import check_writable
+from flows.benchmarks.page import check_page
 
 BENCHMARKS = OF_THE_PACKAGE | {
     "blind": "flows.benchmarks.blind",
@@ -28,6 +31,10 @@ PEERS = {"spci": {"mapie": "mapie>=1.5"}, "scale": {"distributed": "dask[distrib
 """Name -> packages beyond those of the project that its peers come from, and what installs each."""
 
 
+PLACES = ("write", "report", "keep")
+"""Options that name what a benchmark writes: a page, a page, and a folder."""
+
+
 def missing(names: Iterable[str]) -> dict[str, str]:
     """Package -> what installs it, of the packages that these benchmarks need and that are not here."""
     needed = {package: source for name in names for package, source in PEERS.get(name, {}).items()}
@@ -37,12 +44,28 @@ def missing(names: Iterable[str]) -> dict[str, str]:
 def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     """Lines of one benchmark, as they come.
 
-    Raises InputError for an option that it does not have.
+    Raises InputError for an option that it does not have, and for a place that cannot be written to.
     """
-    benchmark = import_module(BENCHMARKS[name]).run
-    known = signature(benchmark).parameters
+    module = import_module(BENCHMARKS[name])
+    known = signature(module.run).parameters
     for option in options:
         if option not in known:
             there = ", ".join(known) or "none"
             raise InputError(f"--set {option}: `aesi bench {name}` has no such option; it has: {there}.")
-    yield from benchmark(**options)
+    _check_places({option: str(options[option]) for option in PLACES if options.get(option) is not None})
+    if options.get("write") is not None:
+        check_page(str(options["write"]), module.BEGIN, module.END)
+    yield from module.run(**options)
+
+
+def _check_places(places: dict[str, str]) -> None:
+    """Of what is written after the work, or through it.  Raises InputError where one cannot be."""
+    for option, place in places.items():
+        try:
+            if option != "keep" and Path(place).is_dir():
+                raise InputError(f"--set {option}={place} is a folder; name a file.")
+            check_writable(Path(place, "row.json") if option == "keep" else Path(place))
+        except OSError as error:
+            raise InputError(
+                f"--set {option}={place} cannot be written ({error.filename}: {error.strerror}); name another place."
+            ) from None

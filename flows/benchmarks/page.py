@@ -5,6 +5,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from aesi.errors import InputError
+
+
+def check_page(page: str, begin: str, end: str) -> None:
+    """Raises InputError where `write_between` has no page with both marks to write to."""
+    try:
+        text = Path(page).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"--set write={page}: no page that can be read ({getattr(error, 'strerror', None) or 'it is no text'}); "
+            "name one that is there."
+        ) from None
+    if not 0 <= text.find(begin) < text.find(end):
+        raise InputError(
+            f"--set write={page}: the page has no lines {begin} and, below it, {end}, between which the table is "
+            "written; add them."
+        )
+
 
 def write_between(page: str, begin: str, end: str, lines: Sequence[str]) -> None:
     """Put lines of Markdown between the marks `begin` and `end` of a page, in the place of what stood there."""

@@ -115,20 +115,18 @@ def calibrate(
 ) -> None:
     """Fit the physics model's own parameters to measurements of any temperatures together."""
     outputs.check_json(out, [cell, *data])
+    options.check_once("--data", data)
+    temperatures = options.by_file("--temperature", temperature, data)
+    days, day = options.dates(dates, data), options.day("--as-of", as_of)
+    ends = options.by_file("--until", until, data)
+    spectra = options.spectra(impedance)
     options.say_reading(data)
     from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
 
-    conditions = Conditions(
-        soc0,
-        options.by_file("--temperature", temperature, data),
-        options.dates(dates, data),
-        options.day("--as-of", as_of),
-        model,
-    )
-    request = Request(conditions, options.spectra(impedance), posterior, seed, title)
-    records = options.measurements(data, reading, hold, options.by_file("--until", until, data))
+    request = Request(Conditions(soc0, temperatures, days, day, model), spectra, posterior, seed, title)
+    records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)
 
 

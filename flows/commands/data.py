@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal
 import typer
 
 from flows.commands import complete, options, outputs
+from flows.commands.command import App
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+app = App(no_args_is_help=True, rich_markup_mode=None)
 
 
 @app.command("list")

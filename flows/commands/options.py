@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import typer
 
-from aesi.errors import InputError
+from aesi.errors import CellError, InputError
 
 if TYPE_CHECKING:
     from aesi.data.reading import Reading
@@ -39,6 +39,18 @@ def share(option: str) -> Callable[[float | None], float | None]:
     return checked
 
 
+def _share_of_health(value: float | None) -> float | None:
+    """Lets a state of health through.  Raises InputError, naming the option, for one that is none."""
+    if value is not None:
+        from aesi.physics.cell.parts import checked_soh
+
+        try:
+            checked_soh(value)
+        except CellError as error:
+            raise InputError(f"--soh {value:g}: {error}") from None
+    return value
+
+
 Soc0 = Annotated[
     float | None,
     typer.Option("--soc0", callback=share("--soc0"), help="State of charge at the first row, from 0 to 1."),
@@ -47,6 +59,7 @@ Soh = Annotated[
     float | None,
     typer.Option(
         "--soh",
+        callback=_share_of_health,
         help="State of health: share of the cell file's capacity that the cell had when this was measured.",
     ),
 ]
@@ -212,6 +225,15 @@ def measurements(
     return tuple(out)
 
 
+def check_once(option: str, paths: list[Path]) -> None:
+    """Raises InputError for a file that is given twice."""
+    seen = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise InputError(f"{option} {path} is there twice; give it once.")
+        seen.add(path.resolve())
+
+
 def by_file(option: str, pairs: list[str] | None, paths: list[Path]) -> dict[str, float]:
     """`FILE=NUMBER` pairs as numbers by record of the files `paths`."""
     return _by_file(option, pairs, paths, _finite, "NUMBER")
@@ -308,16 +330,16 @@ def added_effects(texts: list[str] | None, files: list[Path] | None) -> tuple[Ac
 
 def _effect_values(text: str) -> tuple[str, dict[str, float]]:
     """`id:parameter=value,...` as the id and its values."""
-    name, _, rest = text.partition(":")
+    name, colon, rest = text.partition(":")
     values: dict[str, float] = {}
-    for item in filter(None, rest.split(",")):
-        parameter, equals, value = item.partition("=")
+    for item in rest.split(",") if colon else ():
+        parameter, _, value = (part.strip() for part in item.partition("="))
+        if parameter in values:
+            raise InputError(f"--effect {text}: {parameter} is there twice; give it once.")
         try:
-            values[parameter.strip()] = float(value)
+            values[parameter] = float(value)
         except ValueError:
             raise InputError(
                 f"--effect {text}: {item!r} has to read parameter=number, as in series_resistance:resistance_ohm=1e-3."
             ) from None
-        if not equals:
-            raise InputError(f"--effect {text}: {item!r} has to read parameter=number.")
     return name, values

@@ -15,7 +15,10 @@ MODEL = "model"
 PAGES = (".html", ".htm")
 SUMMARY = "summary.json"
 """Beside a model it is that of a run."""
-OTHER_FORMATS = (".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5")
+OTHER_FORMATS = (
+    *(".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5"),
+    *(".zip", ".bz2", ".xz", ".zst", ".7z", ".tar", ".tgz"),
+)
 
 
 def check_file(out: Path, inputs: Sequence[Path] = (), written: Sequence[Path] = ()) -> None:
@@ -43,7 +46,7 @@ def check_table(out: Path, inputs: Sequence[Path] = ()) -> None:
     """As `check_file`, of a CSV.  Raises InputError also where the name promises another format."""
     check_file(out, inputs)
     if out.suffix.lower() in OTHER_FORMATS:
-        raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv.")
+        raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv or .csv.gz.")
 
 
 def check_json(out: Path, inputs: Sequence[Path] = ()) -> None:
@@ -93,7 +96,9 @@ def _lies_in(file: Path, place: Path) -> bool:
 
 @contextmanager
 def _refused(out: Path, option: str = "--out") -> Iterator[None]:
-    """What the system refuses, as a sentence about the option."""
+    """What the system refuses, as a sentence about the option; and `-`, which elsewhere is the standard output."""
+    if str(out) == "-":
+        raise InputError(f"{option} -: name a place to write to; the standard output is /dev/stdout.")
     try:
         yield
     except OSError as error:

@@ -76,6 +76,11 @@ def _times(table: TableFile, mapped: Mapped, name: str) -> Array:
 
 def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, notes: list[str]) -> None:
     """Turn the current of `data` discharge-positive, in place, and say where that took a turn."""
+    if reading.state_words and "state" not in mapped.position:
+        raise DataError(
+            f"{table.path.name}: --state-word says what words of a column mean, and no column is known to say which "
+            f'way the current flows; name it: --state "NAME". There are: {", ".join(map(repr, table.header))}.'
+        )
     current = data["current_a"]
     asked = "state" in reading.columns
     signed = np.nanmin(current, initial=0.0) < -ZERO_SHARE * np.nanmax(np.abs(current), initial=0.0)

@@ -18,6 +18,8 @@ XLSX_MAGIC = b"PK\x03\x04"
 XLS_MAGIC = b"\xd0\xcf\x11\xe0"
 JSON_MAGIC = b"{"
 MATLAB_MAGIC = (b"MATLAB", b"\x89HDF")
+PROMISES = {".xlsx": "workbook", ".xls": "workbook", ".parquet": "Parquet file", ".gz": "gzip file"}
+"""Suffixes of what is told by its first bytes, and what they promise."""
 
 
 def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
@@ -56,7 +58,16 @@ def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
         )
     from aesi.data.readers.text import TextTable
 
-    return TextTable(file, compressed=magic.startswith(GZIP_MAGIC), wanted=wanted)
+    compressed = magic.startswith(GZIP_MAGIC)
+    if compressed or suffix not in PROMISES:
+        return TextTable(file, compressed=compressed, wanted=wanted)
+    said = f"its name ends in {suffix}, but it is text and no {PROMISES[suffix]}"
+    try:
+        table = TextTable(file, compressed=False, wanted=wanted)
+    except DataError as error:
+        raise DataError(f"{file.name}: {said}, and cannot be read as that either: {error}") from None
+    table.notes = (*table.notes, f"{said[0].upper()}{said[1:]}; read as text.")
+    return table
 
 
 def _first_bytes(file: Path) -> bytes:

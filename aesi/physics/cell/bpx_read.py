@@ -11,7 +11,7 @@ from aesi.errors import CellError
 from aesi.physics.cell.bpx_schema import load_bpx
 from aesi.physics.cell.bpx_transport import check_kinetics, check_transport
 from aesi.physics.cell.bpx_unread import unread
-from aesi.physics.cell.bpx_values import check_values
+from aesi.physics.cell.bpx_values import check_energies, check_values
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,
@@ -48,6 +48,8 @@ def read_bpx(source: str | PathLike[str] | Mapping[str, Any], fitted: bool = Fal
     if not fitted:
         check_transport(cell, where)
         check_kinetics(cell, where)
+        if not cell.fitted_with:
+            check_energies(cell, where)
     return cell
 
 
@@ -63,6 +65,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         raise CellError(
             f"{where}: the section 'User-defined' is {type(user).__name__}, and has to hold names and values."
         )
+    _check_initial_soc(initial, where)
     return CellParameters(
         negative=_electrode(parts["Negative electrode"], user, "Negative", where),
         separator=_separator(parts["Separator"]),
@@ -84,12 +87,20 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         heat_transfer_w_m2_k=_optional(thermal, HEAT_TRANSFER),
         contact_resistance_ohm=_own_number(user, CONTACT_RESISTANCE, where),
         capacity_shares=_shares(user, where),
-        fitted_with=next((model for model, field in FITTED_WITH.items() if user.get(field)), ""),
+        fitted_with=_fitted_with(user, where),
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
         unread=unread(v1),
     )
+
+
+def _check_initial_soc(initial: Fields, where: str) -> None:
+    """A simulation is told its own start; what is no share is of another unit, and so may be what is beside it."""
+    name = "Initial state-of-charge"
+    soc = _optional(initial, name)
+    if soc is not None and not 0.0 <= soc <= 1.0:
+        raise CellError(f"{where}: {name} = {soc:g} has to be from 0 (empty) to 1 (full); 90 % is 0.9.")
 
 
 def _kelvin(fields: Fields, name: str, without: float) -> float:
@@ -103,15 +114,28 @@ def _optional(fields: Fields, name: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _own_number(user: Fields, name: str, where: str, least: float = -math.inf) -> float:
+def _own_number(user: Fields, name: str, where: str) -> float:
     """A number of the section User-defined, which the schema leaves unchecked; 0 where it has none of that name."""
     value = user.get(name)
     if value is None:
         return 0.0
-    if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < math.inf:
-        wanted = "a number" if least < 0.0 else f"a number from {least:g} on"
-        raise CellError(f"{where}: User-defined: {name} = {value!r} has to be {wanted}.")
+    if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value < math.inf:
+        raise CellError(f"{where}: User-defined: {name} = {value!r} has to be a number from 0 on.")
     return float(value)
+
+
+def _fitted_with(user: Fields, where: str) -> str:
+    marks = {model: _own_number(user, field, where) for model, field in FITTED_WITH.items()}
+    for model, mark in marks.items():
+        if mark not in (0.0, 1.0):
+            raise CellError(f"{where}: User-defined: {FITTED_WITH[model]} = {mark:g} has to be 1 or 0.")
+    marked = [model for model, mark in marks.items() if mark]
+    if len(marked) > 1:
+        both = " and ".join(repr(FITTED_WITH[model]) for model in marked)
+        raise CellError(
+            f"{where}: User-defined: {both} are both 1; leave the one that the parameters are of."
+        )
+    return "".join(marked)
 
 
 def _shares(user: Fields, where: str) -> tuple[tuple[str, float], ...]:
@@ -150,7 +174,7 @@ def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode
         ocp=relation(fields["OCP [V]"], f"{what}, OCP [V]"),
         rate_constant=float(fields["Reaction rate constant [mol.m-2.s-1]"]),
         entropic=optional_relation("Entropic change coefficient [V.K-1]") or Constant(0.0),
-        double_layer_f_m2=_own_number(user, DOUBLE_LAYERS[side], where, least=0.0),
+        double_layer_f_m2=_own_number(user, DOUBLE_LAYERS[side], where),
         film_ohm_m2=NO_FILM if film is None else relation(film, f"{where}: {FILM_RESISTANCES[side]}"),
         film_ea_j_mol=_own_number(user, FILM_ENERGIES[side], where),
         rate_factor=UNITY if factor is None else relation(factor, f"{where}: {RATE_FACTORS[side]}"),

@@ -9,17 +9,28 @@ from __future__ import annotations
 
 import copy
 import json
+import re
+import reprlib
 import warnings
 from collections.abc import Mapping
+from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from aesi.errors import CellError
+from aesi.errors import CellError, did_you_mean, wanted
 from aesi.physics.cell.relations import relation
 
 STANDIN_TABLE = {"x": [0.0, 1.0], "y": [1.0, 0.0]}
 OCP_FIELDS = ("OCP [V]", "OCP (lithiation) [V]", "OCP (delithiation) [V]")
+OF_ELECTRODES = (*OCP_FIELDS, "Diffusivity [m2.s-1]", "Entropic change coefficient [V.K-1]")
+RELATIONS = {
+    "Negative electrode": OF_ELECTRODES,
+    "Positive electrode": OF_ELECTRODES,
+    "Electrolyte": ("Conductivity [S.m-1]", "Diffusivity [m2.s-1]"),
+}
+"""Section -> its fields that may be functions."""
+VERSIONS = r"[01]\.\d+(\.\d+)?"
 
 
 def load_bpx(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, Any], str]:
@@ -47,14 +58,30 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
             f"{path} is not text ({error.reason} at byte {error.start}), so no BPX file; is it a record?"
         ) from None
     try:
-        raw = json.loads(text)
+        raw = json.loads(text, object_pairs_hook=_each_once)
     except json.JSONDecodeError as error:
         raise CellError(
             f"{path} is not JSON ({error.msg} in line {error.lineno}), so no BPX file; is it a record?"
         ) from None
+    except _Twice as error:
+        raise CellError(f"{path}: the field {error} is there twice in one section; leave one.") from None
     if not isinstance(raw, dict):
         raise CellError(f"{path} does not hold a BPX object with a Header and a Parameterisation.")
     return raw, str(path)
+
+
+class _Twice(Exception):
+    """A name that an object of JSON has twice."""
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Of two values of one name `json` takes the last, and tells nobody."""
+    content: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in content:
+            raise _Twice(repr(name))
+        content[name] = value
+    return content
 
 
 def _as_v1(raw: dict[str, Any], where: str) -> dict[str, Any]:
@@ -63,6 +90,13 @@ def _as_v1(raw: dict[str, Any], where: str) -> dict[str, Any]:
     if not isinstance(raw.get("Parameterisation"), dict):
         raise CellError(
             f"{where}: no 'Parameterisation' section; a BPX file needs Header and Parameterisation."
+        )
+    header = raw.get("Header")
+    version = header.get("BPX") if isinstance(header, dict) else None
+    if not re.fullmatch(VERSIONS, str(version)):
+        raise CellError(
+            f"{where}: the version of BPX in its Header is {version!r}, and versions 0.x and 1.x are read; the field "
+            'is "BPX": "1.1.0".'
         )
     try:
         return convert_v0_to_v1(raw) if is_legacy_bpx(raw) else raw
@@ -91,11 +125,12 @@ def _check_schema(v1: dict[str, Any], where: str) -> None:
     shown = copy.deepcopy(v1)
     shown.pop("Validation", None)
     shown["Parameterisation"].pop("User-defined", None)
-    for section in ("Negative electrode", "Positive electrode"):
+    for section, names in RELATIONS.items():
         fields = shown["Parameterisation"][section]
-        for name in OCP_FIELDS:
+        for name in names:
             if name in fields:
                 relation(fields[name], f"{where}: {section}, {name}")
+            if name in fields and name in OCP_FIELDS:
                 fields[name] = STANDIN_TABLE
     try:
         with warnings.catch_warnings():
@@ -111,8 +146,43 @@ def _first_fault(error: Any) -> str:
     faults = error.errors()
     # Where several forms of an electrode were tried, the faults of a missing field name the field itself.
     first = min(faults, key=lambda fault: fault["type"] != "missing")
-    place = " > ".join(str(part) for part in first["loc"])
-    more = f" (and {len(faults) - 1} more)" if len(faults) > 1 else ""
+    known = _known_fields()
+    place = _place(first, known)
+    others = len({_place(fault, known) for fault in faults}) - 1
+    more = f" (and {others} more)" if others else ""
+    name = str(first["loc"][-1]) if first["loc"] else ""
     if first["type"] == "missing":
-        return f"the field {place!r} is missing{more}."
-    return f"{place or 'the file'}: {first['msg'].rstrip('.')}{more}."
+        beside = [
+            fault["loc"][-1]
+            for fault in faults
+            if fault["type"] == "extra_forbidden" and fault["loc"][:-1] == first["loc"][:-1]
+        ]
+        misspelt = get_close_matches(name, beside, n=1)
+        if misspelt:
+            return f"the field {place!r} is missing, and {misspelt[0]!r} there is no field of BPX; rename it."
+        return f"the field {place!r} is missing{more}; give it."
+    if first["type"] == "extra_forbidden":
+        hint = did_you_mean(name, () if name in known else known)
+        if hint == ".":
+            hint = "; take it out, or put it into the section 'User-defined'."
+        return f"{place!r} is no field of BPX there{more}{hint}"
+    if first["type"] == "value_error":
+        return f"{place or 'the file'}: {str(first['ctx']['error']).rstrip('.')}{more}."
+    return f"{place or 'the file'} = {reprlib.repr(first['input'])} {wanted(first)}{more}."
+
+
+def _place(fault: Mapping[str, Any], known: set[str]) -> str:
+    """The sections and the field; where a field may be of several types, pydantic has each of them below it."""
+    parts = [str(part) for part in fault["loc"]]
+    while len(parts) > 1 and fault["type"] != "extra_forbidden" and parts[-1] not in known:
+        parts.pop()
+    return " > ".join(parts)
+
+
+def _known_fields() -> set[str]:
+    """The names of all fields and sections of BPX."""
+    from bpx import schema
+    from pydantic import BaseModel
+
+    models = (one for one in vars(schema).values() if isinstance(one, type) and issubclass(one, BaseModel))
+    return {field.alias for model in models for field in model.model_fields.values() if field.alias}

@@ -5,6 +5,7 @@ Sign convention of the whole package: current is positive on discharge.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -238,8 +239,8 @@ def checked_soh(soh: float) -> float:
     return soh
 
 
-def require_positive(what: str, **values: float) -> None:
-    """Raise CellError for the first value that is not a positive number."""
+def require_positive(what: str, values: Mapping[str, float]) -> None:
+    """values : by field of the file.  Raises CellError for the first that is not a positive number."""
     for name, value in values.items():
         if not value > 0 or not np.isfinite(value):
             raise CellError(f"{what}: {name} = {value:g} has to be a positive number.")

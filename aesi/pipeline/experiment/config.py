@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 from pydantic import BaseModel, Field, ValidationError, field_validator, model_validator
 
-from aesi.errors import ConfigError
+from aesi.errors import ConfigError, wanted
 from aesi.pipeline.experiment.sections import (
     CellConfig,
     ConformalConfig,
@@ -132,6 +132,8 @@ def read_experiment(path: str | Path, overrides: Sequence[str] = ()) -> Experime
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
         raise ConfigError(f"{path}: there is no such experiment file.{_neighbours(path)}") from None
+    except IsADirectoryError:
+        raise ConfigError(f"{path} is a folder; give an experiment file.{_neighbours(path / 'x')}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read as text ({error}).") from None
     try:
@@ -207,11 +209,7 @@ def _sentence(detail: ErrorDetails) -> str:
     found = detail["input"]
     if detail["type"] in ("model_type", "model_attributes_type"):
         return f"{key} = {found!r} is not admissible: it takes keys: {', '.join(_keys_at(location))}."
-    return f"{key} = {found!r} is not admissible: {_lower_first(detail['msg'].rstrip('.'))}."
-
-
-def _lower_first(text: str) -> str:
-    return text[:1].lower() + text[1:]
+    return f"{key} = {found!r} is not admissible: it {wanted(detail)}."
 
 
 def _keys_at(location: Sequence[str]) -> list[str]:

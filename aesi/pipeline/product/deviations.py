@@ -127,7 +127,8 @@ def deviating(
     added = tuple(CATALOGUE[owner].activate_only(**given) for owner, given in values.items())
     cell = model_with(declared, added).cell
     ohm = declared.contact_resistance_ohm + volts_at_1c / declared.nominal_capacity_ah
-    cell = _with_films(replace(cell, contact_resistance_ohm=ohm), films)
+    # A fit may take the whole contact away, and rounding leave less than none, which no file may declare.
+    cell = _with_films(replace(cell, contact_resistance_ohm=max(ohm, 0.0)), films)
     return PhysicsStart(declared, cell, effects, shift, tuple(np.asarray(z).tolist()), model)
 
 

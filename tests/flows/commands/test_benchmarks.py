@@ -104,6 +104,33 @@ def test_blind_cases_are_tracked_with_their_confusion(tracked, monkeypatch, tmp_
     assert json.loads(Path(path).read_text()) == {"none": {"none": 3}} == last["confusion"]
 
 
+@pytest.mark.parametrize(
+    ("option", "words"),
+    [
+        ("write=none.md", r"no page that can be read \(No such file or directory\); name one that is there"),
+        (
+            "write=page.md",
+            "the page has no lines <!-- table of aesi bench real --> and, below it, <!-- end of real",
+        ),
+        ("write=.", "--set write=. is a folder; name a file"),
+        ("report=page.md/report.html", "cannot be written .*page.md: Not a directory.; name another place"),
+        (
+            "keep=page.md",
+            "--set keep=page.md cannot be written .*page.md: Not a directory.; name another place",
+        ),
+    ],
+)
+def test_a_place_that_cannot_be_written_was_told_after_all_the_work(
+    workspace, monkeypatch, tmp_path, option, words
+):
+    monkeypatch.setattr("flows.benchmarks.real.tracked", lambda *_: pytest.fail("it was started"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "page.md").write_text("<!-- end of real -->\n<!-- table of aesi bench real -->\n")
+    name, _, place = option.partition("=")
+    with pytest.raises(InputError, match=words):
+        next(benchmarks.run("real", **{name: place}))
+
+
 @pytest.mark.slow
 def test_blind_cases_spread_over_processes(tracked):
     cells = Path(__file__).resolve().parents[3] / "experiments" / "cells"

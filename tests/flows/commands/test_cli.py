@@ -20,6 +20,8 @@ from flows import cli
 from flows.commands.options import dates, day
 
 LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
+SIMULATE = ("simulate", "--cell", LG_M50, "--current", "i.csv", "--out", "o.csv")
+CALIBRATE = ("calibrate", "--cell", LG_M50, "--data", "d.csv", "--out", "n.json")
 
 
 def test_version(call):
@@ -28,7 +30,7 @@ def test_version(call):
 
 @pytest.mark.parametrize(
     "arguments",
-    [["fly"], ["run"], ["run", "a", "b"], ["simulate"], ["tables", "x", "--format", "xls"], ["--nope"]],
+    [["fly"], ["run"], ["run", "a", "b"], ["simulate"], ["simulate", "--cell"], ["--nope"]],
 )
 def test_usage_errors_are_exit_code_2(call, arguments):
     code, out, err = call(*arguments)
@@ -70,6 +72,27 @@ def test_usage_errors_are_exit_code_2(call, arguments):
             ["impedance", "--cell", LG_M50, "--soc", "50", "--frequencies", "1:10:3", "--out", "z.csv"],
             "--soc 50: a state of charge is a share of the capacity",
         ),
+        (["discover", "--holdout", "0.95"], "--holdout 0.95: it has to be less than or equal to 0.9.\n"),
+        (["discover", "--max-effects", "x"], "--max-effects x: it has to be a valid integer.\n"),
+        (["tables", "x", "--format", "xls"], "--format: 'xls' is not one of 'md', 'tex', 'csv'.\n"),
+        ([*SIMULATE, "--soh", "95"], "--soh 95: a state of health of 95: it is the share"),
+        ([*SIMULATE, "--soc0", "0.9", "--soc0", "0.8"], "--soc0 is there twice; give it once"),
+        (["data", "convert", "a.csv", "--out", "b.csv", "--out", "c.csv"], "--out is there twice"),
+        ([*SIMULATE, "--effect", "series_resistance:"], "'' has to read parameter=number"),
+        (
+            [*SIMULATE, "--effect", "series_resistance:resistance_ohm=1e-3,resistance_ohm=2e-3"],
+            "resistance_ohm is there twice; give it once",
+        ),
+        ([*SIMULATE[:-1], "-"], "--out -: name a place to write to; the standard output is /dev/stdout"),
+        (
+            [*SIMULATE[:-1], "o.csv.zip"],
+            "--out o.csv.zip: what is written is a CSV; give a name that ends in",
+        ),
+        (["data", "get", "lg_m50t_w8", "--out", "-"], "--out -: name a place"),
+        ([*CALIBRATE, "--data", "./d.csv"], "--data d.csv is there twice; give it once"),
+        ([*CALIBRATE, "--impedance", "z.csv"], "There is no file z.csv"),
+        ([*CALIBRATE, "--temperature", "e.csv=10"], "--temperature e.csv=...: there is no such record"),
+        (["run", "."], ". is a folder; give an experiment file"),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, words):
@@ -254,12 +277,19 @@ def test_results_of_a_batch_were_read_as_a_cell_the_next_time(call, tmp_path, ou
     assert not (tmp_path / "cells" / "found").exists()
 
 
-@pytest.mark.parametrize("why", [errno.EACCES, errno.EPERM, errno.EROFS])
-def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(call, monkeypatch, tmp_path, why):
-    def refused(*_):
-        raise OSError(why, os.strerror(why), str(tmp_path / ".aesi"))
+@pytest.mark.parametrize(
+    ("why", "home"),
+    [(errno.EACCES, "."), (errno.EPERM, "."), (errno.EROFS, "."), (errno.ENOTDIR, "file/home")],
+)
+def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(
+    call, monkeypatch, tmp_path, why, home
+):
+    (tmp_path / "file").write_text("kept")
 
-    monkeypatch.setenv("AESI_HOME", str(tmp_path))
+    def refused(*_):
+        raise OSError(why, os.strerror(why), str(tmp_path / home / ".aesi"))
+
+    monkeypatch.setenv("AESI_HOME", str(tmp_path / home))
     monkeypatch.setattr("aesi.physics.effects.known_effects", refused)
     code, _, err = call("effects", "self_heating")
     assert code == 1

@@ -154,14 +154,10 @@ def test_a_record_that_the_declared_cell_runs_empty_on_was_told_with_an_error_of
 def test_the_declared_cell_was_judged_on_a_record_of_another_day_with_a_loss_that_nobody_declared(
     start, records
 ):
-    (record,) = records[:1]
-    plain = calibrate(start, [record], evaluations=1)
-    dated = calibrate(
-        start,
-        [record],
-        Conditions(dates={record.name: date(2024, 1, 1)}, as_of=date(2023, 1, 1)),
-        evaluations=1,
-    )
+    later, earlier = records
+    plain = calibrate(start, records, evaluations=1)
+    days = {later.name: date(2024, 1, 1), earlier.name: date(2023, 1, 1)}
+    dated = calibrate(start, records, Conditions(dates=days, as_of=date(2023, 1, 1)), evaluations=1)
     assert dated.errors[0].before_v == plain.errors[0].before_v
 
 

@@ -1,5 +1,7 @@
 """A record written for others and read back is the same record."""
 
+import gzip
+
 import numpy as np
 import pytest
 
@@ -19,14 +21,17 @@ def source(tmp_path):
     return path
 
 
+@pytest.mark.parametrize("name", ["out.csv", "out.csv.gz"])
 @pytest.mark.parametrize("layout", ["aesi", "bdf"])
-def test_a_conversion_and_back_changes_nothing(source, tmp_path, layout):
+def test_a_conversion_and_back_changes_nothing(source, tmp_path, layout, name):
     milli = Reading(units={"current_a": "mA"})
-    written = convert_file(source, tmp_path / "new" / "out.csv", milli, layout)
-    again = read_measurement(tmp_path / "new" / "out.csv")
+    written = convert_file(source, tmp_path / "new" / name, milli, layout)
+    again = read_measurement(tmp_path / "new" / name)
+    assert not any("its name ends" in note.lower() for note in again.notes)  # it is what its name says
     np.testing.assert_allclose(again.to_frame(), written.to_frame(), rtol=1e-9)  # ten digits are written
     assert again.current_a.max() == 2.0
-    header = (tmp_path / "new" / "out.csv").read_text().splitlines()[0]
+    content = (tmp_path / "new" / name).read_bytes()
+    header = (gzip.decompress(content) if name.endswith(".gz") else content).decode().splitlines()[0]
     assert header.startswith("time_s,current_a" if layout == "aesi" else "Test Time / s,Voltage / V")
 
 
@@ -35,6 +40,13 @@ def test_what_a_record_holds_is_told_with_its_charge(source):
     assert (
         "27.22 Ah discharged, 10.83 Ah charged" in lines[1]
     )  # 49 s of 2 kA and 39 s of 1 kA, in amperes as written
+
+
+def test_nothing_was_said_of_the_resistance_where_the_current_has_no_steps(tmp_path):
+    path = tmp_path / "steady.csv"
+    path.write_text("time_s,current_a,voltage_v\n" + "".join(f"{k},2,{4 - 1e-4 * k}\n" for k in range(100)))
+    (line,) = (x for x in record_lines(convert_file(path, tmp_path / "o.csv")) if "not told" in x)
+    assert "fewer than 5 steps of the current are clear" in line
 
 
 def test_a_place_that_cannot_be_written_is_one_sentence(source):

@@ -397,10 +397,19 @@ def test_a_unit_without_its_column_and_words_without_theirs_were_passed_over_in_
     assert plain.notes == ()
     said = " ".join(read(path, Reading(units={"temperature_degc": "K"})).notes)
     assert "A unit was declared for temperature_degc (K), and there is no such column" in said
-    said = " ".join(read(path, Reading(state_words={"D": "discharge"})).notes)
-    assert "name their column: --state" in said
-    used = read(path, Reading({"state": "mode"}, state_words={"D": "discharge"})).notes
-    assert not any("Words of a state" in note for note in used)
+    words = {"D": "discharge"}
+    with pytest.raises(DataError, match=r"no column is known .* name it: --state .* There are: .*'mode'"):
+        read(path, Reading(state_words=words))
+    assert len(read(path, Reading({"state": "mode"}, state_words=words))) == 4
+
+
+@pytest.mark.parametrize("suffix", [".xlsx", ".xls", ".parquet", ".csv.gz"])
+def test_text_under_the_name_of_another_format_was_read_without_a_word(tmp_path, suffix):
+    named = suffix.removeprefix(".csv")
+    (note,) = read_measurement(written(tmp_path, text(), f"drive{suffix}")).notes
+    assert f"Its name ends in {named}, but it is text and no " in note
+    with pytest.raises(DataError, match=f"its name ends in {named}, but it is text .*: .*\n?"):
+        read_measurement(written(tmp_path, "\x00\x01", f"broken{suffix}"))
 
 
 def test_a_row_without_a_time_was_left_out_as_if_asked(tmp_path):

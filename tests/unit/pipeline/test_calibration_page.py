@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -144,9 +145,10 @@ def drawn_rms_v(trace):
 def test_the_start_file_was_drawn_with_a_loss_on_a_record_of_another_day():
     """The table said what it errs by as a cell that has lost nothing."""
     cell = Cell.from_bpx(START)
-    data, days = pulses(cell), {"pulses": date(2024, 1, 1)}
-    found = calibrate(cell, [data], Conditions(dates=days, as_of=date(2023, 1, 1)), evaluations=1)
-    (trace,), (error,) = fit_traces(found), found.errors
+    data, days = pulses(cell), {"pulses": date(2024, 1, 1), "before": date(2023, 1, 1)}
+    before = replace(data, name="before")
+    found = calibrate(cell, [data, before], Conditions(dates=days, as_of=days["before"]), evaluations=1)
+    (trace, _), (error, _) = fit_traces(found), found.errors
     assert drawn_rms_v(trace) == pytest.approx((error.before_v, error.simulated_v, error.after_v), rel=1e-9)
 
 

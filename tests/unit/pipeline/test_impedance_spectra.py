@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import aesi
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.physics.effects import activated
 from aesi.pipeline.impedance import held_against, impedance_file, read_frequencies
 from aesi.records import Spectrum
@@ -79,6 +79,12 @@ def test_a_shift_of_the_temperature_was_left_out_of_an_impedance_without_a_word(
     cell = CELLS / "nmc_30ah.bpx.json"
     impedance_file(cell, 0.5, "1:10:4", tmp_path / "z.csv", effects=effects, say_notes=said.extend)
     assert "ambient_temperature: not in the impedance, which is at the temperature that is given." in said
+
+
+@pytest.mark.parametrize("text", ["1:1000:100000000", "1:1e30:10"])
+def test_frequencies_without_end_killed_the_process(text):
+    with pytest.raises(InputError, match=f"--frequencies {text}: at most 100,000 frequencies up to 1e.09 Hz"):
+        read_frequencies(text)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,47 @@
+"""Commands whose options are refused in one sentence, and taken once each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+from aesi.errors import InputError, wanted
+
+
+class Command(TyperCommand):
+    """A command that raises InputError, naming the option, for a value that is none and for an option that is there
+    twice and cannot be: of two the last would count, and nobody be told."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """The arguments that are left."""
+        if not ctx.resilient_parsing:  # as while a shell asks what could stand there
+            _, _, given = self.make_parser(ctx).parse_args(list(args))
+            for parameter, times in Counter(given).items():
+                if times > 1 and not (parameter.multiple or parameter.is_eager):
+                    option = "/".join((*parameter.opts, *parameter.secondary_opts))
+                    raise InputError(f"{option} is there twice; give it once.")
+        try:
+            return super().parse_args(ctx, args)
+        except typer.BadParameter as error:
+            faults = getattr(error.__cause__, "errors", list)()
+            if not faults or error.param is None:
+                raise
+            raise InputError(_sentence(error.param.opts[0], faults[0])) from None
+
+
+class App(typer.Typer):
+    """A group of such commands."""
+
+    def command(self, name: str | None = None, **how: Any) -> Callable[[Any], Any]:
+        """As of typer."""
+        return super().command(name, **{"cls": Command, **how})
+
+
+def _sentence(option: str, fault: dict[str, Any]) -> str:
+    if fault["type"] == "value_error":  # of a choice, which holds the value
+        return f"{option}: {str(fault['ctx']['error']).rstrip('.')}."
+    return f"{option} {fault['input']}: it {wanted(fault)}."
