@@ -28,7 +28,7 @@ from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.candidate_effects import CandidateEffect, ranking
 from aesi.tracer.report.explain import explain
 from aesi.tracer.report.outcome import FileOutcome, State, States, emptied, outcomes, test_rmse_v
-from aesi.tracer.report.own_parameters import OwnParameter, own_parameters
+from aesi.tracer.report.own_parameters import OwnParameter, ages_told, own_parameters
 from aesi.tracer.report.tell_apart import telling_experiment
 from aesi.tracer.report.warning import contradicted_by_v, warnings
 from aesi.tracer.report.yardstick import Yardstick, measure
@@ -271,6 +271,8 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: Left) -> 
     notes = [*known, *(note for record in (*records, *tested) for note in record.notes)]
     notes += [note for path in evidence.paths.values() for note in path.notes]
     notes += [*evidence.verdict.alike_too, *evidence.limits]
+    ages = ages_told((evidence.after, evidence.recalibrated))
+    notes += [ages] if ages else []
     if left.yardstick.explained_v is None:
         notes.append(NO_YARDSTICK)
     if evidence.fault is not None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from aesi.tracer.case.free_parameter import FreeParameter
+from aesi.tracer.case.free_parameter import CAPACITY_SHARE, FreeParameter
 from aesi.tracer.likelihood.model_state import ModelState
 
 LIMIT_SHARE = 0.01
@@ -40,6 +41,20 @@ def own_parameters(state: ModelState) -> tuple[OwnParameter, ...]:
         if free.own and free.name in state.values.get(free.owner, {})
     ]
     return tuple(sorted(found, key=lambda one: -abs(one.deviations)))
+
+
+def ages_told(states: Sequence[ModelState]) -> str:
+    """For a reader, the capacity that the cell had in each record, of the first state that has them; '' of none."""
+    for state in states:
+        shares = (state.values or {}).get(CAPACITY_SHARE)
+        if shares:
+            records = state.problem.records
+            told = ", ".join(f"{shares[str(i)]:.3f} in {record.name}" for i, record in enumerate(records))
+            return (
+                f"the records say more where they may be of several ages: fitted, the cell had {told} of the file's "
+                "capacity; the model that is written has the file's."
+            )
+    return ""
 
 
 def _name(state: ModelState, free: FreeParameter) -> str:

@@ -16,7 +16,7 @@ from aesi.tracer.decide.in_use import foretold_in_use
 from aesi.tracer.decide.written import Option
 from aesi.tracer.likelihood.model_error import MEASURED_V
 from aesi.tracer.likelihood.model_state import ModelState
-from aesi.tracer.report.own_parameters import own_parameters
+from aesi.tracer.report.own_parameters import ages_told, own_parameters
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, values_without
 
@@ -53,6 +53,9 @@ def test_each_of_several_records_of_a_measured_cell_has_a_capacity_of_its_own(ce
     assert max(left) < 1.5e-3
     told = {one.name: one.value for one in own_parameters(state) if one.owner == CAPACITY_SHARE}
     assert told == {"later": share_of(fit.values, 0), "first": share_of(fit.values, 1)}
+    declared = ModelState(problem)
+    assert ages_told((declared,)) == ""
+    assert f"{told['later']:.3f} in later, {told['first']:.3f} in first" in ages_told((declared, state))
     without = values_without(problem, blocks, fit, blocks.folds["record"][0])
     assert share_of(without, 0) == pytest.approx(1.0, abs=1e-4)  # nothing but its own rows tells it
     held = replace(problem, trust="tight")
