@@ -54,13 +54,12 @@ class Option:
 
 
 def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> bool:
-    """Could these data have spoken against a fit? Not where it says nothing of ordinary use. Beyond that other records
-    bear it out, or not; one record does as far as its ranges of charge foretell each other, and where own parameters
-    are open, as they are known by how they answer to the current, also its ranges of current."""
-    if foretold_in_use(problem, blocks, fit, MEASURED_V) < FORETOLD_SHARE:
-        return False
+    """Could these data have spoken against a fit? Several records bear it out, or not, where it says something of
+    ordinary use. One record does as far as its ranges of charge foretell each other; where own parameters are open, as
+    they are known by how they answer to the current, also its ranges of current.
+    """
     if len(problem.records) > 1:
-        return True
+        return foretold_in_use(problem, blocks, fit, MEASURED_V) >= FORETOLD_SHARE
     conditions = ("charge",) if problem.trust in MEASURED_CELL else ("rate", "charge")
     return all(
         name in blocks.folds and foretold_share(problem, blocks, fit, MEASURED_V, name) >= FORETOLD_SHARE
