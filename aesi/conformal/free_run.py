@@ -149,8 +149,7 @@ class FreeRunBands:
         Raises InputError for a record without the slopes that it takes."""
         if self.root is None:
             return np.zeros(len(series))
-        known = len(self.root)
-        return spread(_slopes(series, known)[:, :known], self.root)
+        return spread(_slopes(series, len(self.root)), self.root)
 
     def thermal(self, series: ErrorSeries) -> Array:
         """(n,) V, what the fitted temperatures leave open of the physics along a record; nought where that is not
@@ -159,8 +158,7 @@ class FreeRunBands:
         Raises InputError for a record without the slopes that it takes."""
         if self.energies_j_mol is None or self.seen is None:
             return np.zeros(len(series))
-        known = len(self.energies_j_mol)
-        slopes = _slopes(series, known)[:, :known]
+        slopes = _slopes(series, len(self.energies_j_mol))
         return thermal_spread(slopes, self.energies_j_mol, self.seen.per_energy(series.temperature_degc))
 
     def intervals(
@@ -216,12 +214,12 @@ class FreeRunBands:
 
 
 def _slopes(series: ErrorSeries, count: int) -> Array:
-    """(n, at least count) V."""
+    """(n, count) V, of the first parameters that the record has slopes of."""
     if series.slopes_v is None or series.slopes_v.shape[1] < count:
         raise InputError(
             f"{series.name}: the band asks for {count} slopes of the physics; run the experiment again."
         )
-    return series.slopes_v
+    return series.slopes_v[:, :count]
 
 
 def _between(halves: Array, horizons: Sequence[float], elapsed_s: Array) -> Array:
