@@ -9,6 +9,8 @@ Birkl et al., J. Power Sources 341 (2017) 373, doi:10.1016/j.jpowsour.2016.12.01
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -16,6 +18,7 @@ from scipy.optimize import brentq
 from aesi.errors import SimulationError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
+from aesi.physics.cell.parts import Balance
 
 EDGE = 1e-6
 """How near a stoichiometry comes to 0 or 1, where potentials have poles."""
@@ -23,6 +26,8 @@ SOC_BEYOND = 0.05
 """How far beyond full and empty voltages are looked up; GRID points over that range, between which a root is
 bracketed."""
 GRID = 257
+REMEMBERED = 256
+"""Roots: few of the parameters that a fit moves shift a balance, and every simulation of it asks for one."""
 
 
 def without_lithium(cell: Cell, fraction: float) -> Cell:
@@ -32,10 +37,11 @@ def without_lithium(cell: Cell, fraction: float) -> Cell:
     """
     if fraction == 0.0:
         return cell
-    q_n, q_p = cell.electrode_capacity_ah(cell.negative), cell.electrode_capacity_ah(cell.positive)
+    sizes = _sizes_ah(cell)
+    q_n, q_p = sizes
     lithium = q_n * cell.negative.theta_max + q_p * cell.positive.theta_min - fraction * cell.capacity_ah
-    full, empty = (float(cell.rest_voltage_v(s)[0]) for s in (1.0, 0.0))
-    return _with_windows(cell, _at(cell, lithium, full), _at(cell, lithium, empty))
+    full, empty = (_at_rest(cell.balance, soc, sizes, lithium, cell.name) for soc in (1.0, 0.0))
+    return _with_windows(cell, full, empty)
 
 
 def with_active_material(cell: Cell, negative: float, positive: float, lost_at_soc: float = 1.0) -> Cell:
@@ -46,16 +52,16 @@ def with_active_material(cell: Cell, negative: float, positive: float, lost_at_s
     """
     if negative == 1.0 and positive == 1.0:
         return cell
-    full, empty = (float(cell.rest_voltage_v(s)[0]) for s in (1.0, 0.0))
-    n, p = cell.negative, cell.positive
+    n, p, balance = cell.negative, cell.positive, cell.balance
     aged = cell.with_negative(area_per_volume_1_m=n.area_per_volume_1_m * negative)
     aged = aged.with_positive(area_per_volume_1_m=p.area_per_volume_1_m * positive)
-    q_n, q_p = aged.electrode_capacity_ah(aged.negative), aged.electrode_capacity_ah(aged.positive)
-    x_n = n.theta_min + lost_at_soc * (n.theta_max - n.theta_min)
-    x_p = p.theta_max - lost_at_soc * (p.theta_max - p.theta_min)
+    sizes = _sizes_ah(aged)
+    (q_n, q_p), (x_n, x_p) = sizes, balance.stoichiometries(lost_at_soc)
     lithium = q_n * x_n + q_p * x_p
-    kept = (n.theta_max, p.theta_min) if lost_at_soc == 1.0 else _at(aged, lithium, full)
-    return _with_windows(aged, kept, _at(aged, lithium, empty))
+    full = n.theta_max, p.theta_min
+    if lost_at_soc != 1.0:
+        full = _at_rest(balance, 1.0, sizes, lithium, cell.name)
+    return _with_windows(aged, full, _at_rest(balance, 0.0, sizes, lithium, cell.name))
 
 
 def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
@@ -65,17 +71,22 @@ def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
     that is known, and windows that are the same leave it the same. Beyond both ends of the new windows the nearer end;
     where a potential that turns beyond its window rests there twice, the nearer to `soc`.
     """
-    if _windows(declared) == _windows(aged):
-        return soc
-    alike = declared.with_negative(ocp=aged.negative.ocp).with_positive(ocp=aged.positive.ocp)
-    voltage = float(alike.rest_voltage_v(soc)[0])
+    before, after = declared.balance, aged.balance
+    alike = replace(after, window_n=before.window_n, window_p=before.window_p)
+    return soc if alike == after else _same_rest(alike, after, soc)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _same_rest(before: Balance, after: Balance, soc: float) -> float:
+    """State of charge of `after` where it rests as `before` does at `soc`."""
+    voltage = float(before.rest_voltage_v(soc)[0])
 
     def excess(z: float) -> float:
-        return float(aged.rest_voltage_v(z)[0]) - voltage
+        return float(after.rest_voltage_v(z)[0]) - voltage
 
-    low, high = aged_range(aged)
+    low, high = _range(after)
     grid = np.linspace(low, high, GRID)
-    above = aged.rest_voltage_v(grid) >= voltage
+    above = after.rest_voltage_v(grid) >= voltage
     crossed = np.flatnonzero(above[1:] & ~above[:-1])  # a rest voltage rises with the charge
     if not len(crossed):
         return low if above[0] else high
@@ -85,32 +96,44 @@ def same_rest(declared: Cell, aged: Cell, soc: float) -> float:
 
 def aged_range(cell: Cell) -> tuple[float, float]:
     """States of charge at which both electrodes are within (0, 1), at most 5 % beyond the windows."""
+    return _range(cell.balance)
+
+
+def _range(balance: Balance) -> tuple[float, float]:
     low, high = -SOC_BEYOND, 1.0 + SOC_BEYOND
-    n, p = cell.negative, cell.positive
-    span_n, span_p = n.theta_max - n.theta_min, p.theta_max - p.theta_min
-    low = max(low, (EDGE - n.theta_min) / span_n, (p.theta_max - 1.0 + EDGE) / span_p)
-    high = min(high, (1.0 - EDGE - n.theta_min) / span_n, (p.theta_max - EDGE) / span_p)
+    (empty_n, full_n), (empty_p, full_p) = balance.window_n, balance.window_p
+    span_n, span_p = full_n - empty_n, empty_p - full_p
+    low = max(low, (EDGE - empty_n) / span_n, (empty_p - 1.0 + EDGE) / span_p)
+    high = min(high, (1.0 - EDGE - empty_n) / span_n, (empty_p - EDGE) / span_p)
     return low, high
 
 
-def _windows(cell: Cell) -> tuple[float, ...]:
-    n, p = cell.negative, cell.positive
-    return n.theta_min, n.theta_max, p.theta_min, p.theta_max
+def _sizes_ah(cell: Cell) -> tuple[float, float]:
+    """Capacities of the electrodes (negative, positive), from stoichiometry 0 to 1."""
+    return cell.electrode_capacity_ah(cell.negative), cell.electrode_capacity_ah(cell.positive)
 
 
-def _at(cell: Cell, lithium_ah: float, voltage_v: float) -> tuple[float, float]:
-    """Stoichiometries (negative, positive) that hold `lithium_ah` together and rest at `voltage_v`."""
-    q_n, q_p = cell.electrode_capacity_ah(cell.negative), cell.electrode_capacity_ah(cell.positive)
+@lru_cache(maxsize=REMEMBERED)
+def _at_rest(
+    declared: Balance, soc: float, sizes_ah: tuple[float, float], lithium_ah: float, name: str
+) -> tuple[float, float]:
+    """Stoichiometries (negative, positive) of electrodes of these sizes that hold `lithium_ah` together and rest where
+    the declared ones do at `soc`.
+
+    name : of the cell, for what cannot be.
+    """
+    q_n, q_p = sizes_ah
+    voltage_v = float(declared.rest_voltage_v(soc)[0])
 
     def positive(theta_n: Array) -> Array:
         return (lithium_ah - q_n * theta_n) / q_p
 
     def excess(theta_n: Array) -> Array:
-        return cell.positive.ocp(positive(theta_n)) - cell.negative.ocp(theta_n) - voltage_v
+        return declared.ocp_p(positive(theta_n)) - declared.ocp_n(theta_n) - voltage_v
 
     low = max(EDGE, (lithium_ah - q_p * (1.0 - EDGE)) / q_n)
     high = min(1.0 - EDGE, (lithium_ah - q_p * EDGE) / q_n)
-    theta_n = _root(excess, low, high, cell.name)
+    theta_n = _root(excess, low, high, name)
     return theta_n, (lithium_ah - q_n * theta_n) / q_p
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from aesi.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell.relations import Constant, Relation
+
+Soc = TypeVar("Soc", float, Array)
 
 NO_ENTROPY = Constant(0.0)
 NO_FILM = Constant(0.0)
@@ -96,6 +98,27 @@ class Electrolyte:
     diffusivity: Relation
     conductivity_ea_j_mol: float = 0.0
     diffusivity_ea_j_mol: float = 0.0
+
+
+@dataclass(frozen=True)
+class Balance:
+    """All that a cell at rest depends on: the open-circuit potentials of its electrodes (V against Li/Li+), and the
+    stoichiometries (empty, full) of either."""
+
+    ocp_n: Relation
+    ocp_p: Relation
+    window_n: tuple[float, float]
+    window_p: tuple[float, float]
+
+    def stoichiometries(self, soc: Soc) -> tuple[Soc, Soc]:
+        """(negative, positive) at a state of charge."""
+        (empty_n, full_n), (empty_p, full_p) = self.window_n, self.window_p
+        return empty_n + soc * (full_n - empty_n), empty_p - soc * (empty_p - full_p)
+
+    def rest_voltage_v(self, soc: float | Array) -> Array:
+        """(n,) V at the reference temperature."""
+        theta_n, theta_p = self.stoichiometries(np.atleast_1d(np.asarray(soc, dtype=float)))
+        return self.ocp_p(theta_p) - self.ocp_n(theta_n)
 
 
 LEAST_SOH, MOST_SOH = 0.2, 1.5
@@ -186,20 +209,20 @@ class CellParameters:
             return None
         return self.density_kg_m3 * self.specific_heat_j_kg_k * self.volume_m3
 
+    @property
+    def balance(self) -> Balance:
+        """Of the electrodes: what the cell is at rest."""
+        n, p = self.negative, self.positive
+        return Balance(n.ocp, p.ocp, (n.theta_min, n.theta_max), (p.theta_max, p.theta_min))
+
     def stoichiometries(self, soc: float) -> tuple[float, float]:
         """Rest stoichiometries (negative, positive) at a state of charge, by the declared limits."""
-        n, p = self.negative, self.positive
-        theta_n = n.theta_min + soc * (n.theta_max - n.theta_min)
-        theta_p = p.theta_max - soc * (p.theta_max - p.theta_min)
+        theta_n, theta_p = self.balance.stoichiometries(soc)
         return theta_n, theta_p
 
     def rest_voltage_v(self, soc: float | Array) -> Array:
         """(n,) V, the open-circuit voltage at the reference temperature."""
-        z = np.atleast_1d(np.asarray(soc, dtype=float))
-        n, p = self.negative, self.positive
-        theta_n = n.theta_min + z * (n.theta_max - n.theta_min)
-        theta_p = p.theta_max - z * (p.theta_max - p.theta_min)
-        return p.ocp(theta_p) - n.ocp(theta_n)
+        return self.balance.rest_voltage_v(soc)
 
     def with_negative(self, **changes: Any) -> Self:
         """A copy with fields of the negative electrode replaced."""

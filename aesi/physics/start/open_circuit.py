@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
@@ -85,7 +87,5 @@ class OpenCircuit:
 
 def _ocv(cell: Cell, soc: Array, kelvin: float) -> Array:
     rise = kelvin - cell.reference_temperature_k
-    n, p = cell.negative, cell.positive
-    theta_n = n.theta_min + soc * (n.theta_max - n.theta_min)
-    theta_p = p.theta_max - soc * (p.theta_max - p.theta_min)
-    return shifted_ocp(p, rise)(theta_p) - shifted_ocp(n, rise)(theta_n)
+    ocp_n, ocp_p = shifted_ocp(cell.negative, rise), shifted_ocp(cell.positive, rise)
+    return replace(cell.balance, ocp_n=ocp_n, ocp_p=ocp_p).rest_voltage_v(soc)

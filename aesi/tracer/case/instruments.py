@@ -20,15 +20,21 @@ def instruments_undone(
     of a tenth from the sparse rows of a pulse, which begin where the current jumps. Records that were not averaged are
     returned as they are, with all effects.
     """
-    acting = [a for a in effects if a.effect.kind == "instrument" and a.effect.on_record is not None]
+    acting = tuple(a for a in effects if a.effect.kind == "instrument" and a.effect.on_record is not None)
     if not acting or not isinstance(data, Averaged):
         return data, tuple(effects)
+    rest = tuple(replace(a, effect=_elsewhere(a.effect)) if a in acting else a for a in effects)
+    return _seen_by_cell(data, acting), rest
+
+
+@lru_cache(maxsize=64)
+def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measurement:
+    """The record behind the instruments: of the parameters that a fit moves few are theirs."""
     record = Record(data.finer.time_s, data.finer.current_a)
     for active in acting:
         assert active.effect.on_record is not None
         record = active.effect.on_record(record, **active.parameters)
-    rest = tuple(replace(a, effect=_elsewhere(a.effect)) if a in acting else a for a in effects)
-    return data.with_record(record.time_s, record.current_a), rest
+    return data.with_record(record.time_s, record.current_a)
 
 
 @lru_cache(maxsize=64)

@@ -172,10 +172,12 @@ class InverseProblem:
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
         """(n,) V over the fit parts of all records, or of one; None where the model fails."""
         out = []
+        asked_for = range(len(self.records)) if only is None else (only,)
         try:
-            for i in range(len(self.records)) if only is None else (only,):
+            acting = {good: self.active(values, good) for good in {self.records[i].good for i in asked_for}}
+            for i in asked_for:
                 good = self.records[i].good
-                asked = i, values[STATE_OF_CHARGE][str(i)], self.active(values, good), share_of(values, i)
+                asked = i, values[STATE_OF_CHARGE][str(i)], acting[good], share_of(values, i)
                 known = self._of_good.get(asked)
                 voltage = self._voltage_v(*asked) if known is None else known
                 if good:
