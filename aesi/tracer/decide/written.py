@@ -94,8 +94,9 @@ def written(
     sound = [one for one, fault in zip(named, faults, strict=True) if fault is None]
     preferred = [*sound, declared]
     options = [*preferred, *own]
-    as_good = [one for one in preferred if worst_ratio(one, options) <= AS_GOOD]
-    best = as_good[0] if as_good else carries_best(options)
+    best = carries_best(options)
+    least = worst_ratio(best, options)
+    best = next((one for one in preferred if worst_ratio(one, options) <= AS_GOOD * least), best)
     if not named or any(best is one for one in sound):
         return best.state, None
     names = " + ".join(named[0].state.hypothesis)

@@ -301,6 +301,9 @@ def test_what_is_written_is_never_far_worse_than_another_model_on_a_record_left_
     assert carries_best([declared, cold, both]) is both
     assert carries_best([declared, option(1.0, np.inf)]) is declared
     assert written(declared, [cold, both])[0] is both.state
+    nearly = option(5.0, 39.0)  # its worst ratio within 5 % of the least, which is above 1.05 itself
+    assert worst_ratio(nearly, [nearly, cold, both]) > worst_ratio(both, [nearly, cold, both]) > 1.05
+    assert written(nearly, [cold, both])[0] is nearly.state
     state, why = written(declared, [both], [cold])
     assert state is both.state
     assert "another model leaves less on records left out" in str(why)
