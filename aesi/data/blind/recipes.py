@@ -173,7 +173,7 @@ RECIPES: dict[str, Recipe] = {
         lambda m, q, s: {"capacity_f_m2": 2.0 * m},
         "double_layer",
         _algebraic,
-        most=30.0,
+        most=25.0,
         also=("clock_skew",),
         radial_points=25,
     ),
@@ -191,7 +191,7 @@ RECIPES: dict[str, Recipe] = {
         "concentration_dependent_diffusivity",
         as_named=_over_windows,
         also=("solid_diffusivity",),
-        most=3.0,
+        most=2.8,
     ),
     "negative_diffusivity": Recipe(
         "solid_diffusivity",
@@ -237,10 +237,10 @@ RECIPES: dict[str, Recipe] = {
     ),
     "asymmetric_kinetics": Recipe(
         "asymmetric_kinetics",
-        lambda m, q, s: {"negative_alpha": min(0.5 + 0.1 * m, 0.85)},
+        lambda m, q, s: {"negative_alpha": 0.5 + 0.1 * m},
         "asymmetric_kinetics",
         _algebraic,
-        most=3.5,
+        most=3.0,
         radial_points=25,
     ),
     "lithium_inventory_loss": Recipe(

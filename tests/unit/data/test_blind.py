@@ -251,3 +251,16 @@ def test_the_label_of_a_slope_counts_it_over_the_window_as_the_effect_does(cells
     x = np.array([positive.theta_min, positive.theta_max])
     added = np.log(positive.diffusivity(x)) - np.log(cell.positive.diffusivity(x))
     assert np.diff(added) == pytest.approx(5.0 * np.diff(x))
+
+
+def test_no_recipe_goes_beyond_what_its_effect_takes_for_physical(cells):
+    for name, recipe in RECIPES.items():
+        known = CATALOGUE[recipe.label].parameters
+        for cell in recipe.cells:
+            declared = cells_in(cells)[cell]
+            values = recipe.values(recipe.most, Cell.from_bpx(declared).nominal_capacity_ah, 0.9)
+            for key, value in recipe.as_named(values, declared).items():
+                sides = (key, f"negative_{key}", f"positive_{key}")  # of a value for both electrodes
+                for parameter in (known[side] for side in sides if side in known):
+                    low, high = parameter.bounds
+                    assert low <= value <= high * (1 + 1e-9), (name, cell, key)
