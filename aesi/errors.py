@@ -66,11 +66,19 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     return f"; did you mean {near[0]!r}?" if near else "."
 
 
+OF_A_LIST = ("list_type", "tuple_type", "sequence_str", "is_instance_of")
+"""Faults of a value that is no list; of Python's types fields of a schema take sequences alone."""
+
+
 def wanted(fault: Mapping[str, Any]) -> str:
     """How a sentence about a value goes on that a schema refuses: "has to be less than 1".
 
     fault : as pydantic's ValidationError.errors() has it.
     """
+    if fault["type"] in OF_A_LIST:
+        return "has to be a list, in [ ]"
+    if fault["type"] == "missing":
+        return "lacks a value"
     said = fault["msg"].rstrip(".").split(", unable to ")[0].split(", got ")[0]
     own = said.removeprefix("Input should ")
     return f"has to {own}" if own != said else said[:1].lower() + said[1:]

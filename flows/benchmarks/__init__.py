@@ -6,12 +6,13 @@ Each module has `run(**options)`, which yields one JSON-ready dict a line.
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
-from inspect import signature
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
 
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
-from aesi.errors import InputError
+from aesi.errors import InputError, wanted
 from aesi.numerics.files.whole import check_writable
 from flows.benchmarks.page import check_page
 
@@ -44,14 +45,20 @@ def missing(names: Iterable[str]) -> dict[str, str]:
 def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     """Lines of one benchmark, as they come.
 
-    Raises InputError for an option that it does not have, and for a place that cannot be written to.
+    Raises InputError for an option that it does not have, a value that the option cannot have, and a place that cannot
+    be written to.
     """
     module = import_module(BENCHMARKS[name])
-    known = signature(module.run).parameters
-    for option in options:
+    known = get_type_hints(module.run, include_extras=True)
+    known.pop("return")
+    for option, value in options.items():
         if option not in known:
             there = ", ".join(known) or "none"
             raise InputError(f"--set {option}: `aesi bench {name}` has no such option; it has: {there}.")
+        try:
+            options[option] = TypeAdapter(known[option]).validate_python(value)
+        except ValidationError as error:
+            raise InputError(f"--set {option}={value}: it {wanted(error.errors()[0])}.") from None
     _check_places({option: str(options[option]) for option in PLACES if options.get(option) is not None})
     if options.get("write") is not None:
         check_page(str(options["write"]), module.BEGIN, module.END)

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
+from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
+
 from aesi.bench.blind import LIMIT_S, chosen, judged, summary, table
 from flows.benchmarks.cases import Cases, tracked
 from flows.benchmarks.page import write_between
@@ -29,14 +31,14 @@ BEGIN, END = "<!-- table of aesi bench blind -->", "<!-- end of blind -->"
 
 def run(
     cells: str = "experiments/cells",
-    cases: int | None = None,
+    cases: PositiveInt | None = None,
     only: str | None = None,
     small: bool = False,
-    seed: int = 0,
-    every: int = 1,
-    after: int = 0,
-    limit_s: float | None = LIMIT_S,
-    workers: int = 1,
+    seed: NonNegativeInt = 0,
+    every: PositiveInt = 1,
+    after: NonNegativeInt = 0,
+    limit_s: PositiveFloat | None = LIMIT_S,
+    workers: PositiveInt = 1,
     address: str | None = None,
     write: str | None = None,
 ) -> Iterator[dict[str, Any]]:

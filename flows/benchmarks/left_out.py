@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from pydantic import PositiveFloat, PositiveInt
+
 from aesi.bench.left_out import LIMIT_S, LeftOutCase, judged, plan, summary, table
 from flows.benchmarks.cases import Cases, judged_once, tracked
 from flows.benchmarks.page import write_between
@@ -18,8 +20,8 @@ BEGIN, END = "<!-- table of aesi bench left_out -->", "<!-- end of left_out -->"
 def run(
     cells: str = "experiments/cells",
     only: str | None = None,
-    limit_s: float | None = LIMIT_S,
-    workers: int = 1,
+    limit_s: PositiveFloat | None = LIMIT_S,
+    workers: PositiveInt = 1,
     address: str | None = None,
     write: str | None = None,
     keep: str | None = None,

@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from pydantic import PositiveFloat, PositiveInt
+
 from aesi.bench.real import chosen, judged, summary, table, write_report
 from aesi.bench.real.case import RealCase
 from aesi.bench.real.judge import LIMIT_S
@@ -22,12 +24,12 @@ BEGIN, END = "<!-- table of aesi bench real -->", "<!-- end of real -->"
 
 def run(
     cells: str = "experiments/cells",
-    cases: int | None = None,
+    cases: PositiveInt | None = None,
     only: str | None = None,
     development: bool | None = None,
-    every: int = 1,
-    limit_s: float | None = LIMIT_S,
-    workers: int = 1,
+    every: PositiveInt = 1,
+    limit_s: PositiveFloat | None = LIMIT_S,
+    workers: PositiveInt = 1,
     address: str | None = None,
     report: str | None = None,
     write: str | None = None,

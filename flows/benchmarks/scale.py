@@ -15,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
+from pydantic import PositiveInt
 
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.records import Failed
@@ -33,8 +34,8 @@ WAIT_S = 600.0
 
 def run(
     experiment: str = "experiments/smoke.yaml",
-    candidates: int = 24,
-    workers: int = 2,
+    candidates: PositiveInt = 24,
+    workers: PositiveInt = 2,
     overrides: Sequence[str] = HEAVIER,
 ) -> Iterator[dict[str, Any]]:
     """One line: seconds of one worker and of several, and both ratios.

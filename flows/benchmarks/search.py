@@ -17,6 +17,7 @@ from typing import Any, cast
 
 import numpy as np
 import optuna
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.sparse import Candidate, Genome, Problem
 from aesi.sparse.search.genome_space import GenomeSpace
@@ -28,7 +29,10 @@ SHARED = "SQLite"
 
 
 def run(
-    terms: int = 626, candidates: int = 60, population: int = 20, seed: int = 0
+    terms: PositiveInt = 626,
+    candidates: PositiveInt = 60,
+    population: PositiveInt = 20,
+    seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One line a storage."""
     _ours(

@@ -13,6 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from pydantic import PositiveFloat, PositiveInt
+
 from aesi.bench import CaseRow
 from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
@@ -64,16 +66,16 @@ def run(
     experiments: str = "experiments",
     cells: Sequence[str] = tuple(EXPERIMENTS),
     whole: bool = False,
-    a_cell: int | None = None,
+    a_cell: PositiveInt | None = None,
     only: str | None = None,
     development: bool | None = None,
-    seeds: int | None = None,
-    candidates: int | None = None,
-    resamples: int | None = None,
-    dt_s: float | None = None,
+    seeds: PositiveInt | None = None,
+    candidates: PositiveInt | None = None,
+    resamples: PositiveInt | None = None,
+    dt_s: PositiveFloat | None = None,
     models: Sequence[str] = QUICK_MODELS,
     overrides: Sequence[str] = (),
-    workers: int = 1,
+    workers: PositiveInt = 1,
     address: str | None = None,
     write: str | None = None,
     keep: str | None = None,

@@ -19,6 +19,7 @@ from statistics import median
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
 from aesi.bench.hybrid.ensemble import synthetic_record
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -35,13 +36,13 @@ DELIVERY_S = 120.0
 
 
 def run(
-    terms: int = 60,
-    n: int = 88_200,
-    resamples: int = 100,
-    candidates: int = 10,
-    rounds: int = 5,
-    artifact_kb: float = 50.0,
-    seed: int = 0,
+    terms: PositiveInt = 60,
+    n: PositiveInt = 88_200,
+    resamples: PositiveInt = 100,
+    candidates: PositiveInt = 10,
+    rounds: PositiveInt = 5,
+    artifact_kb: PositiveFloat = 50.0,
+    seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One line: processor seconds a candidate, untracked and tracked, and the overhead in per cent."""
     problem = _problem(terms, n, resamples, seed)

@@ -17,6 +17,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.bench.virtual_drives import INPUTS, virtual_splits
 from aesi.errors import FitError
@@ -54,10 +55,10 @@ USEFUL_PCT = 45.0
 
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
-    cells: int = 4,
-    candidates: int = 40,
+    cells: PositiveInt = 4,
+    candidates: PositiveInt = 40,
     settings: Sequence[str] = tuple(SETTINGS),
-    seed: int = 0,
+    seed: NonNegativeInt = 0,
     sindy: bool = True,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:

@@ -23,6 +23,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array
@@ -40,11 +41,11 @@ _CAPACITY_AS = 30.0 * SECONDS_PER_HOUR
 
 def run(
     cases: Sequence[tuple[int, float]] = CASES,
-    n: int = 88_200,
-    candidates: int = 20,
-    resamples: int = 100,
-    peer_models: int = 2,
-    seed: int = 0,
+    n: PositiveInt = 88_200,
+    candidates: PositiveInt = 20,
+    resamples: PositiveInt = 100,
+    peer_models: NonNegativeInt = 2,
+    seed: NonNegativeInt = 0,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """One line a case: seconds of ours and of the peer for all candidates, their ratio, errors, memory."""

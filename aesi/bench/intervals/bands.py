@@ -18,6 +18,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.bench.virtual_drives import SplitLayout, cuts_of, virtual_splits
 from aesi.conformal import WHOLE_DRIVE
@@ -107,9 +108,9 @@ DESIGNS: dict[str, Callable[[_Errors], HalfWidths]] = {
 
 def run(
     cell: str = "experiments/cells/nmc_30ah.bpx.json",
-    cells: int = 40,
+    cells: PositiveInt = 40,
     layouts: Sequence[SplitLayout] = LAYOUTS,
-    seed: int = 0,
+    seed: NonNegativeInt = 0,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """cell : BPX file of the declared cell.  cells : virtual cells a layout.  layouts : see `SplitLayout`."""

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.conformal.online.scale import GROUP_LEVELS
 from aesi.conformal.online.tracker import replay
@@ -28,7 +29,9 @@ HOLD = 30
 DRIFTS = ("none", "all", "hardest")
 
 
-def run(records: int = 100, n: int = 3000, seed: int = 0) -> Iterator[dict[str, Any]]:
+def run(
+    records: PositiveInt = 100, n: PositiveInt = 3000, seed: NonNegativeInt = 0
+) -> Iterator[dict[str, Any]]:
     """One dict a kind of drift, means over `records` records of n samples each."""
     rng = np.random.default_rng(seed)
     for drift in DRIFTS:

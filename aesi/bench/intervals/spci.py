@@ -17,6 +17,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.conformal import METHODS, Calibrated
 from aesi.conformal.scores import interval_score
@@ -66,12 +67,12 @@ def _autoregression(phi: float, shocks: Array) -> Array:
 
 
 def run(
-    n_calibration: int = 88_200,
-    n_test: int = 40_000,
+    n_calibration: PositiveInt = 88_200,
+    n_test: PositiveInt = 40_000,
     methods: Sequence[str] = tuple(METHODS),
-    peer_steps: int = 1,
-    mapie_steps: int = 200,
-    seed: int = 0,
+    peer_steps: NonNegativeInt = 1,
+    mapie_steps: NonNegativeInt = 200,
+    seed: NonNegativeInt = 0,
     **_: Any,
 ) -> Iterator[dict[str, Any]]:
     """One line a method: seconds of ours and of the peer for all test steps, coverage, width, score, memory.

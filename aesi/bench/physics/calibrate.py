@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.bench.limit import Stopwatch
 from aesi.calibration import calibrate
@@ -33,7 +34,9 @@ HOLD_S, REST_S = 30, 60
 
 
 def run(
-    cell: str = "experiments/cells/lg_m50_chen2020.bpx.json", evaluations: int = EVALUATIONS, seed: int = 0
+    cell: str = "experiments/cells/lg_m50_chen2020.bpx.json",
+    evaluations: PositiveInt = EVALUATIONS,
+    seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One dict a record with its error in mV as declared and calibrated, the last record unseen; then the summary.
 

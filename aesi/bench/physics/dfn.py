@@ -15,6 +15,7 @@ from pathlib import Path
 from time import process_time
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.bench import CaseRow
 from aesi.bench.physics.espm import STEP_S, random_load
@@ -61,11 +62,11 @@ class Load:
 
 
 def run(
-    samples: int = 88_200,
-    repeats: int = 3,
+    samples: PositiveInt = 88_200,
+    repeats: PositiveInt = 3,
     cell: str = "",
-    seed: int = 0,
-    seconds: int = 200,
+    seed: NonNegativeInt = 0,
+    seconds: PositiveInt = 200,
     curves: bool = True,
     records: bool = True,
 ) -> Iterator[CaseRow]:

@@ -9,6 +9,7 @@ from time import process_time
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.errors import InputError
 from aesi.numerics.typing import Array
@@ -26,7 +27,10 @@ MEAN_C_RATE, SPREAD_C_RATE, LARGEST_C_RATE, CORRELATION_S = 0.25, 1.0, 3.0, 20.0
 
 
 def run(
-    samples: int = 88_200, repeats: int = 5, cell: str | Path = DEFAULT_CELL, seed: int = 0
+    samples: PositiveInt = 88_200,
+    repeats: PositiveInt = 5,
+    cell: str | Path = DEFAULT_CELL,
+    seed: NonNegativeInt = 0,
 ) -> Iterator[dict[str, Any]]:
     """One line: seconds of ours (median, warm) and of the peer (its default mesh), and both against a fine mesh.
 

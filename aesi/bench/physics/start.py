@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.bench.physics.cells import HG2, NCR, cell_of
 from aesi.data.catalogue import locate
@@ -32,7 +33,9 @@ LEAST_ROWS = 300
 """Of what remains of a record."""
 
 
-def run(cells: str = "experiments/cells", cuts: int = 40, seed: int = 0) -> Iterator[dict[str, Any]]:
+def run(
+    cells: str = "experiments/cells", cuts: PositiveInt = 40, seed: NonNegativeInt = 0
+) -> Iterator[dict[str, Any]]:
     """One dict a record, and a last one with `summary`: true.
 
     cells : folder of the cell files.  cuts : rows at which each record is cut.

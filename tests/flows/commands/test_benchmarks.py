@@ -36,6 +36,26 @@ def test_tracking_costs_something_and_leaves_the_workspace_alone(workspace):
     assert not list(workspace.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        ("real", {"every": 0}, "every=0: it has to be greater than 0"),
+        ("blind", {"workers": "many"}, "workers=many: it has to be a valid integer"),
+        ("splits", {"cells": "nmc"}, r"cells=nmc: it has to be a list, in \[ \]"),
+        ("left_out", {"seed": 1}, "has no such option"),
+    ],
+)
+def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, options, said):
+    with pytest.raises(InputError, match=said):
+        next(benchmarks.run(name, **options))
+
+
+def test_the_options_of_every_benchmark_are_checked():
+    for name in benchmarks.BENCHMARKS:
+        with pytest.raises(InputError, match="has no such option"):
+            next(benchmarks.run(name, no_such_option=1))
+
+
 @pytest.mark.slow
 def test_two_dask_workers_share_the_work_evenly(workspace):
     smoke = Path(__file__).resolve().parents[3] / "experiments" / "smoke.yaml"
