@@ -5,8 +5,10 @@ Relations are frozen and hashable by value, so that whatever is computed from th
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -59,8 +61,9 @@ class LookupTable:
     def __post_init__(self) -> None:
         if len(self.x) != len(self.y) or len(self.x) < 2:
             raise CellError(f"a table needs x and y of one length >= 2, not {len(self.x)} and {len(self.y)}.")
-        if not np.all(np.diff(self.x) > 0) or not np.all(np.isfinite(self.y)):
-            raise CellError("a table needs strictly increasing x and finite y.")
+        x = np.array(self.x)
+        if not (np.all(np.diff(x) > 0) and np.isfinite(x).all() and np.isfinite(self.y).all()):
+            raise CellError("a table needs strictly increasing, finite x and finite y.")
 
     def __call__(self, x: Array) -> Array:
         """(n,) interpolated."""
@@ -158,10 +161,24 @@ def relation(value: object, what: str) -> Relation:
         if isinstance(value, str):
             return Expression(str(value))
         if isinstance(value, dict) and set(value) == {"x", "y"}:
-            return LookupTable(tuple(map(float, value["x"])), tuple(map(float, value["y"])))
+            return LookupTable(_column(value, "x"), _column(value, "y"))
     except CellError as error:
         raise CellError(f"{what}: {error}") from None
     raise CellError(f"{what} is {type(value).__name__}; give {ADMISSIBLE}.")
+
+
+def _column(table: Mapping[str, Any], name: str) -> tuple[float, ...]:
+    """Raises CellError for what is no list of numbers; a file may hold words, gaps or a lone number there."""
+    values = table[name]
+    if not isinstance(values, Sequence | np.ndarray) or isinstance(values, str):
+        raise CellError(f"{name} of a table is {values!r}, and has to be a list of numbers.")
+    numbers = []
+    for value in values:
+        try:
+            numbers.append(float(value))
+        except (TypeError, ValueError):
+            raise CellError(f"{name} of a table holds {value!r}, which is not a number.") from None
+    return tuple(numbers)
 
 
 def to_bpx(item: Relation, low: float = 0.0, high: float = 1.0) -> float | str | dict[str, list[float]]:

@@ -54,6 +54,21 @@ def test_what_a_file_holds_reads_back_as_the_same_function(item):
     assert back(X) == pytest.approx(item(X), abs=1e-6)  # mixtures with tables become tables of 1,025 points
 
 
+@pytest.mark.parametrize(
+    ("table", "told"),
+    [
+        ({"x": [0, 1], "y": [1, "a"]}, "y of a table holds 'a', which is not a number"),
+        ({"x": [0, 1], "y": [None, 1]}, "y of a table holds None, which is not a number"),
+        ({"x": 0, "y": 1}, "x of a table is 0, and has to be a list of numbers"),
+        ({"x": "01", "y": [0, 1]}, "x of a table is '01', and has to be a list of numbers"),
+        ({"x": [0, float("inf")], "y": [0, 1]}, "strictly increasing, finite x"),
+    ],
+)
+def test_a_table_of_what_is_no_number_was_an_error_of_python(table, told):
+    with pytest.raises(CellError, match=f"Diffusivity: .*{told}"):
+        relation(table, "Diffusivity")
+
+
 @pytest.mark.parametrize("bad", [None, True, [1, 2], {"x": [0, 1]}, {"x": [1, 0], "y": [0, 1]}, "x +"])
 def test_what_is_no_relation_is_named(bad):
     with pytest.raises(CellError, match="Diffusivity"):
