@@ -16,6 +16,7 @@ from aesi.physics.cell.parts import (
     CONTACT_RESISTANCE,
     FILM_ENERGIES,
     FILM_RESISTANCES,
+    HEAT_TRANSFER,
     RATE_FACTORS,
     THERMAL_CONDUCTIVITY,
     CellParameters,
@@ -187,7 +188,8 @@ def _energies(cell: CellParameters) -> dict[str, float]:
 
 
 def _check_thermal(cell: CellParameters, where: str) -> None:
-    """What is there of mass, heat capacity and surface is positive, and together that of a cell."""
+    """What is there of mass, heat capacity and surface is positive, and together that of a cell; nothing cools by less
+    than nought."""
     declared = {
         "Density [kg.m-3]": cell.density_kg_m3,
         "Specific heat capacity [J.K-1.kg-1]": cell.specific_heat_j_kg_k,
@@ -196,6 +198,9 @@ def _check_thermal(cell: CellParameters, where: str) -> None:
         THERMAL_CONDUCTIVITY: cell.thermal_conductivity_w_m_k,
     }
     require_positive(where, {name: value for name, value in declared.items() if value is not None})
+    cooled = cell.heat_transfer_w_m2_k
+    if cooled is not None and not 0.0 <= cooled < np.inf:
+        raise CellError(f"{where}: {HEAT_TRANSFER} = {cooled:g} has to be a number from 0 (no cooling) on.")
     if cell.heat_capacity_j_k is None:
         return
     least, most = HEAT_J_K_AH
@@ -237,7 +242,7 @@ def _check_electrode(electrode: Electrode, what: str) -> None:
 
 
 def _check_share(what: str, name: str, value: float) -> None:
-    if value >= 1.0:
+    if not value < 1.0:  # this way round, NaN fails too
         raise CellError(f"{what}: {name} = {value:g} has to be a share below 1; 30 % is 0.3.")
 
 

@@ -257,6 +257,7 @@ def test_a_negative_thickness_is_refused(content):
             "the nominal capacity is 5000 A.h, but the negative electrode holds 5.153 A.h",
         ),
         ("Electrolyte", {"Cation transference number": 38.0}, "transference = 38 has to be a share below 1"),
+        ("Electrolyte", {"Cation transference number": float("nan")}, "transference = nan has to be a share"),
         ("Cell", {"Upper voltage cut-off [V]": 4200.0}, "rests at 4.182 V .* the upper cut-off is 4200 V"),
         (
             "Negative electrode",
@@ -309,6 +310,14 @@ def test_a_value_in_another_unit_is_refused(content, section, field, factor, sen
     value = fields[field]
     fields[field] = f"({value}) * {factor!r}" if isinstance(value, str) else factor * value
     with pytest.raises(CellError, match=sentence):
+        Cell.from_bpx(content)
+
+
+@pytest.mark.parametrize("coefficient", [-10.0, float("nan"), float("inf")])
+def test_a_heat_transfer_coefficient_that_no_cell_has_was_told_under_another_name(content, coefficient):
+    name = "Heat transfer coefficient [W.m-2.K-1]"
+    content["State"]["Thermal environment"] = {name: coefficient, "Ambient temperature [K]": 298.15}
+    with pytest.raises(CellError, match=r"Heat transfer coefficient .* has to be a number from 0"):
         Cell.from_bpx(content)
 
 
