@@ -24,9 +24,10 @@ from typing import cast
 import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
-from aesi.errors import DataError, SimulationError
+from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, ComplexArray, Numbers
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
+from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
 from aesi.physics.effect import ActiveEffect, Contribution, Record, Trace
@@ -58,13 +59,17 @@ def impedance(
 ) -> ComplexArray:
     """Impedance of `cell` at rest.
 
-    frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows.  effects, model : as in
-    `simulate`.
+    frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows; where an effect moved these, the
+    cell rests at the same voltage in the new ones, as in `simulate`.  effects, model : as there.
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
     Raises DataError for frequencies or a state that have none, InputError for what is no Cell, no effect, no state of
     charge or no temperature of a cell.
     """
     check_cell(cell)
+    if soc is None:  # which check_soc lets pass, of records whose voltage tells it
+        raise InputError(
+            "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
+        )
     check_soc(soc)
     frequency = np.atleast_1d(numbers(frequency_hz, "frequency_hz"))
     if frequency.ndim != 1 or not (
@@ -72,11 +77,16 @@ def impedance(
     ):
         raise DataError("frequency_hz has to be one row of positive numbers, at least one.")
     active = checked_effects(effects)
-    check_temperature(temperature_degc)
-    kelvin = _shifted(active, temperature_degc + ZERO_CELSIUS_K)
+    degc = numbers(temperature_degc, "temperature_degc")
+    if degc.ndim:
+        raise InputError(
+            f"temperature_degc has the shape {degc.shape}; a cell at rest is at one temperature."
+        )
+    check_temperature(degc)
+    kelvin = _shifted(active, float(degc) + ZERO_CELSIUS_K)
     check_choice("model", model, ModelName)
     changed = model_with(cell, active)
-    rest = np.array(changed.cell.stoichiometries(soc))
+    rest = np.array(changed.cell.stoichiometries(same_rest(cell, changed.cell, soc)))
     if not ((rest > 0.0) & (rest < 1.0)).all():
         raise DataError(
             f"{cell.name} has no state of charge of {soc:g}: a stoichiometry leaves (0, 1) there."
@@ -96,8 +106,8 @@ def impedance(
     if not acting:
         return z
     on_model = [one for one in active if one.effect.on_model is not None]
-    degc = kelvin - ZERO_CELSIUS_K
-    rest_run = simulate(cell, INSTANT_S, np.zeros(2), soc, on_model, degc, "backward", model=model)
+    really = kelvin - ZERO_CELSIUS_K
+    rest_run = simulate(cell, INSTANT_S, np.zeros(2), soc, on_model, really, "backward", model=model)
     return z + sum(_series_ohm(changed, one, function, rest_run) for one, function in acting)
 
 

@@ -280,6 +280,9 @@ def test_an_impedance_says_what_cannot_be_meant(cell):
     for changes, sentence in (
         ({"soc": 50}, "soc0 = 50 is not a state of charge"),
         ({"soc": [0.5, 0.6]}, "is not a state of charge"),
+        ({"soc": None}, "soc = None is no state of charge"),
+        ({"temperature_degc": "room"}, "temperature_degc holds 'room', which is not a number"),
+        ({"temperature_degc": [25.0, 30.0]}, r"temperature_degc has the shape \(2,\); a cell at rest"),
         ({"effects": "double_layer"}, "effects is the text 'double_layer'"),
         ({"frequency_hz": "1 kHz"}, "frequency_hz holds '1 kHz', which is not a number"),
     ):

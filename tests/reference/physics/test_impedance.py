@@ -42,6 +42,8 @@ def sine_response(cell, frequency_hz, soc, degc, effects, amplitude_a=0.1, cycle
         ("concentration_dependent_diffusivity",),
         ("series_resistance",),
         ("film_growth",),
+        ("lithium_inventory_loss",),
+        ("active_material_loss_negative",),
     ],
 )
 def test_a_small_sine_in_time_gives_the_same_impedance(effects):
