@@ -11,6 +11,7 @@ import numpy as np
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
 from aesi.data.readers import open_table
 from aesi.data.readers.table import TableFile
+from aesi.data.reading import record_name
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 from aesi.records import Spectrum
@@ -39,6 +40,11 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
         raise DataError(
             f"{file} has no column {wanted}; a file of spectra needs {', '.join(NEEDED)}, and {' or '.join(STATES)}."
         )
+    twice = [name for name in (*NEEDED, *DESCRIBED, LABEL) if header.count(name) > 1]
+    if twice:
+        raise DataError(
+            f"{file} has {header.count(twice[0])} columns named {twice[0]!r}; rename all but one of them."
+        )
     names = [name for name in (*NEEDED, *DESCRIBED) if name in header]
     columns = dict(zip(names, table.read(tuple(header.index(name) for name in names)), strict=True))
     if not len(columns["frequency_hz"]):
@@ -56,7 +62,8 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     pieces = _pieces(told_apart)
     if LABEL not in header:
         _check_swept_once(columns["frequency_hz"], pieces, table)
-    return tuple(_spectrum(file, k, columns, rows) for k, rows in enumerate(pieces))
+    name = record_name(table.path)
+    return tuple(_spectrum(f"{name} {k}", columns, rows) for k, rows in enumerate(pieces, start=1))
 
 
 def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:
@@ -93,13 +100,13 @@ def _pieces(told_apart: Sequence[AnyArray]) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(cuts)]
 
 
-def _spectrum(file: str, number: int, columns: dict[str, Array], rows: slice) -> Spectrum:
-    def first(name: str) -> float | None:
-        return float(columns[name][rows][0]) if name in columns else None
+def _spectrum(name: str, columns: dict[str, Array], rows: slice) -> Spectrum:
+    def first(quantity: str) -> float | None:
+        return float(columns[quantity][rows][0]) if quantity in columns else None
 
     temperature = columns["temperature_degc"][rows].mean() if "temperature_degc" in columns else None
     return Spectrum(
-        name=f"{file.split('.')[0]} {number + 1}",
+        name=name,
         frequency_hz=columns["frequency_hz"][rows],
         z_ohm=columns["z_real_ohm"][rows] + 1j * columns["z_imag_ohm"][rows],
         soc=first("soc"),

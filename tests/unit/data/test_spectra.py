@@ -65,3 +65,15 @@ def test_a_file_without_a_row_is_one_sentence(tmp_path):
 def test_what_is_no_spectrum_is_refused(tmp_path, header, row, told):
     with pytest.raises(DataError, match=told):
         read_spectra(written(tmp_path, header, row))
+
+
+def test_spectra_of_two_files_were_called_alike_by_what_is_before_the_first_point(tmp_path):
+    for name in ("W8_0.2.csv", "W8_0.5.csv"):
+        (tmp_path / name).write_text(f"{COLUMNS},soc\n{POINTS[0]},0.5\n")
+    names = [read_spectra(tmp_path / name)[0].name for name in ("W8_0.2.csv", "W8_0.5.csv")]
+    assert names == ["W8_0.2 1", "W8_0.5 1"]
+
+
+def test_of_a_column_that_is_there_twice_the_first_was_taken_without_a_word(tmp_path):
+    with pytest.raises(DataError, match="has 2 columns named 'soc'; rename all but one"):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc,soc", f"{POINTS[0]},0.5,0.6"))
