@@ -114,12 +114,20 @@ def clock_to_s(cells: Sequence[str]) -> Array:
 
 
 def dates_to_s(cells: Sequence[str], pattern: str) -> Array:
-    """(n,) s since the first date; pattern : 'date' (ISO 8601) or one of strptime.  NaN for what is no date."""
+    """(n,) s since the first date; pattern : 'date' (ISO 8601) or one of strptime.  NaN for what is no date.
+
+    Raises DataError for what is no pattern.
+    """
     import pandas as pd
 
     form = "ISO8601" if pattern == DATE else pattern
-    # In UTC: a record that runs over a change to summer time holds two offsets, which pandas refuses otherwise.
-    stamps = pd.to_datetime(pd.Series(cells).str.strip(), format=form, errors="coerce", utc=True)
+    try:
+        # In UTC: a record that runs over a change to summer time holds two offsets, which pandas refuses otherwise.
+        stamps = pd.to_datetime(pd.Series(cells).str.strip(), format=form, errors="coerce", utc=True)
+    except (ValueError, re.error) as error:  # of the pattern: a cell that does not follow it is none of these
+        raise DataError(
+            f"{pattern!r} is no pattern of a date: {error}; give one such as '%d.%m.%Y %H:%M:%S', or date (ISO 8601)."
+        ) from None
     first = stamps.dropna()
     if first.empty:
         return np.full(len(cells), np.nan)

@@ -141,17 +141,18 @@ def _of_number(
     numbers = data[name]
     keep = np.flatnonzero((numbers >= low) & (numbers <= high))
     if len(keep) < 2:
+        there = numbers[~np.isnan(numbers)]
+        runs = f"runs from {there.min():g} to {there.max():g}" if len(there) else "is empty in every row"
         raise DataError(
-            f"{context.file}: {len(keep)} rows are of {name} {text}; column {context.header[name]!r} runs from "
-            f"{np.nanmin(numbers):g} to {np.nanmax(numbers):g}."
+            f"{context.file}: {len(keep)} rows are of {name} {text}; column {context.header[name]!r} {runs}."
         )
     notes.append(f"{name} {text}: {len(keep):,} of {len(numbers):,} rows were taken as asked.")
     return keep_rows(data, context, keep)
 
 
 def _window(data: Columns, context: Context, reading: Reading, notes: list[str]) -> tuple[Columns, Context]:
-    if reading.start_s is None and reading.stop_s is None:
-        return data, context
+    if (reading.start_s is None and reading.stop_s is None) or np.isnan(data["time_s"]).all():
+        return data, context  # a row without a time is refused later, by its number
     low = -np.inf if reading.start_s is None else reading.start_s
     high = np.inf if reading.stop_s is None else reading.stop_s
     time = data["time_s"]
@@ -180,6 +181,11 @@ def _without_duplicates(
     same = np.diff(data["time_s"]) == 0
     if duplicates == "refuse" or not np.any(same):
         return data, context
+    if np.all(same):
+        raise DataError(
+            f"{context.file}: all {len(data['time_s']):,} rows have the stamp {data['time_s'][0]:.10g} s, and a record "
+            "needs two; check the column of the time."
+        )
     dropped = np.append(same, False) if duplicates == "last" else np.insert(same, 0, False)
     notes.append(f"{_rows(int(np.sum(same)))} dropped whose stamp is there twice, the {duplicates} kept.")
     return keep_rows(data, context, np.flatnonzero(~dropped))

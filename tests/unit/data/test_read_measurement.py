@@ -443,3 +443,22 @@ def test_a_file_of_many_blocks_is_read_whole(tmp_path, monkeypatch, end):
         data = read_measurement(written(tmp_path, packed(text(end=end))))
         np.testing.assert_array_equal(data.voltage_v, VOLTAGE)
         np.testing.assert_array_equal(data.time_s, TIME)
+
+
+@pytest.mark.parametrize("pattern", ["%Q", "%", "%d.%d"])
+def test_a_pattern_that_is_none_of_a_date_was_an_error_of_python(tmp_path, pattern):
+    day = f"{HEADER}\n2024-01-01,1,3.7\n2024-01-02,1,3.6\n"
+    message = refusal(tmp_path, day, units={"time_s": pattern})
+    assert f"{pattern!r} is no pattern of a date" in message
+
+
+@pytest.mark.parametrize("kept", ["first", "last"])
+def test_rows_of_one_stamp_alone_were_a_record_of_one_row(tmp_path, kept):
+    message = refusal(tmp_path, f"{HEADER}\n5,1,3.7\n5,1,3.6\n", duplicates=kept)
+    assert "all 2 rows have the stamp 5 s, and a record needs two" in message
+
+
+def test_a_column_of_cycles_without_a_number_ran_from_nan_to_nan(tmp_path):
+    rows = f"{HEADER},cyc\n0,1,3.7,\n1,1,3.6,\n"
+    message = refusal(tmp_path, rows, columns={"cycle": "cyc"}, cycle=1)
+    assert "column 'cyc' is empty in every row" in message
