@@ -79,9 +79,8 @@ def map_columns(
     Raises DataError for an unknown quantity, a name that is missing or there twice, and a unit that is not SI and
     was neither declared nor is a maker's.
     """
-    finder = _Finder(
-        table, dict(columns or {}), {q: units.declared(q, u) for q, u in (declared or {}).items()}
-    )
+    told = {q: units.declared(q, u) for q, u in (declared or {}).items()}
+    finder = _Finder(table, dict(columns or {}), told, required)
     missing = [q for q in QUANTITIES if not finder.take(q) and q in required]
     if missing:
         raise finder.missing(missing)
@@ -98,8 +97,14 @@ def map_columns(
 class _Finder:
     """Looks quantities up in one table and keeps what it found."""
 
-    def __init__(self, table: TableFile, given: dict[str, str | None], declared: dict[str, str]) -> None:
-        self._table, self.given, self._declared = table, given, declared
+    def __init__(
+        self,
+        table: TableFile,
+        given: dict[str, str | None],
+        declared: dict[str, str],
+        required: tuple[str, ...],
+    ) -> None:
+        self._table, self.given, self._declared, self._required = table, given, declared, required
         self._file = table.path.name
         for quantity in given:
             if quantity not in (*QUANTITIES, *SELECTORS):
@@ -117,7 +122,7 @@ class _Finder:
         if quantity in self.given:
             name = self.given[quantity]
             if name is None:
-                if quantity in REQUIRED:
+                if quantity in self._required:
                     raise DataError(f"{self._file}: {quantity} cannot be left out.")
                 self.notes.append(f"{quantity} was left out as asked.")
                 return True

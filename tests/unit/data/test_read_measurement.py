@@ -462,3 +462,15 @@ def test_a_column_of_cycles_without_a_number_ran_from_nan_to_nan(tmp_path):
     rows = f"{HEADER},cyc\n0,1,3.7,\n1,1,3.6,\n"
     message = refusal(tmp_path, rows, columns={"cycle": "cyc"}, cycle=1)
     assert "column 'cyc' is empty in every row" in message
+
+
+def test_a_voltage_that_failed_could_not_be_left_out_of_a_current_to_simulate(tmp_path):
+    path = written(tmp_path, text(voltage=np.where(TIME < 50, VOLTAGE, np.nan)))
+    with pytest.raises(DataError, match="voltage_v is empty or NaN"):
+        read_current(path)
+    found = read_current(path, Reading({"voltage_v": None}))
+    assert found.voltage_v is None
+    assert found.current_a.tolist() == CURRENT.tolist()
+    assert found.notes == ("drive.csv: voltage_v was left out as asked.",)
+    with pytest.raises(DataError, match="voltage_v cannot be left out"):
+        read_measurement(path, {"voltage_v": None})
