@@ -47,6 +47,10 @@ NOTED_AGE = 0.01
 """Of the active material: what a record's differs by and is told."""
 NOTED_SILICON = 0.05
 """The same of silicon, a sixth of what such a cell gives."""
+OF_ROWS_LEFT_OUT = (
+    "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
+    "voltage says."
+)
 
 
 def calibrate(
@@ -116,7 +120,10 @@ def problem(
     placed, told = with_temperatures(start, [data for data, _ in kept], conditions.temperatures_degc)
     start, typical = with_activation(start)
     physics = conditions.physics or "espm"
-    ready = prepared(start, placed, conditions.soc0, physics, conditions.same_cell)
+    cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
+    ready = prepared(start, placed, conditions.soc0, physics, conditions.same_cell, cut)
+    if conditions.soc0 is not None:
+        told = (*told, *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut))
     for one in ready:
         check_charge(start, one)
     span = _span_k(start, ready)

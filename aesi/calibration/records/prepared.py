@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,13 +66,18 @@ def prepared(
     soc0: float | None,
     physics: ModelName = "espm",
     same_cell: bool = False,
+    cut: Collection[str] = (),
 ) -> tuple[Prepared, ...]:
     """Every record with its rows and its initial state.  soc0 : of all that their voltage does not contradict.
 
-    same_cell : the potentials are of this very cell.
+    same_cell : the potentials are of this very cell.  cut : names of records without the rows that `soc0` is of, which
+    start where their voltage says.
     """
     least = SOC_SD if same_cell else OTHER_CELL_SD
-    return tuple(_prepared(cell, data, soc0, len(records) > 1, physics, least) for data in records)
+    return tuple(
+        _prepared(cell, data, None if data.name in cut else soc0, len(records) > 1, physics, least)
+        for data in records
+    )
 
 
 def _prepared(

@@ -179,3 +179,19 @@ def test_a_start_given_against_the_voltage_bent_the_file_with_no_more_than_a_not
     assert not any("--soc0" in words for words in believed.warnings)
     of_several = calibrate(start, records, Conditions(soc0=0.8), evaluations=1)  # they start where they say
     assert not any("--soc0" in words for words in of_several.warnings)
+
+
+def test_a_state_of_charge_given_of_a_record_that_begins_with_a_charge_was_taken_where_its_discharge_begins(
+    start,
+):
+    charged = start.capacity_ah
+    phases = ((600, 0.0), (4.5 * 3600, -charged / 5.0), (3600, 0.0), (1.6 * 3600, charged / 2.0), (1800, 0.0))
+    current = np.concatenate([np.full(int(seconds / 10.0), amperes) for seconds, amperes in phases])
+    time = 10.0 * np.arange(len(current))
+    record = Measurement(time, current, simulate(start, time, current, 0.08, (), None, "backward").voltage_v)
+    model, notes = problem(start, [record], Conditions(soc0=0.08))
+    (fitted,) = model.records
+    assert fitted.rows.time_s[0] > 15_000.0
+    assert fitted.start.basis == "rest"
+    assert fitted.start.soc == pytest.approx(0.98, abs=0.01)  # 0.08 and 4.5 h at C/5
+    assert any("given is that of its first row, which is not fitted" in note for note in notes)
