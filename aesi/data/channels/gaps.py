@@ -59,12 +59,12 @@ def _rests_told(rests: Sequence[tuple[float, float]]) -> list[str]:
 def find_gaps(columns: Columns) -> list[int]:
     """Rows k after which rows seem to be missing: an interval much longer than those around it."""
     step = np.diff(columns["time_s"])
-    gaps = []
-    for k in np.flatnonzero(step > GAP_FLOOR_S):
-        around = np.concatenate([step[max(0, k - NEIGHBOURS) : k], step[k + 1 : k + 1 + NEIGHBOURS]])
-        if len(around) and step[k] > GAP_RATIO * np.max(around):
-            gaps.append(int(k))
-    return gaps
+    longest = np.full(len(step), -np.inf)  # of the neighbours; a lone interval has none
+    for away in range(1, NEIGHBOURS + 1):
+        np.maximum(longest[away:], step[:-away], out=longest[away:])
+        np.maximum(longest[:-away], step[away:], out=longest[:-away])
+    gaps = (step > GAP_FLOOR_S) & (step > GAP_RATIO * longest) & np.isfinite(longest)
+    return np.flatnonzero(gaps).tolist()
 
 
 def is_rest(columns: Columns, k: int) -> bool:
