@@ -21,7 +21,10 @@ def numbers(values: object, name: str) -> Array:
             raise DataError(
                 f"{name} is masked in {row_words(int(masked[0, 0]))}; drop or fill what is masked first."
             )
-    kind = np.asarray(values).dtype.kind
+    try:
+        kind = np.asarray(values).dtype.kind
+    except ValueError:  # numpy's word for rows within a row that differ in length
+        raise DataError(f"{name} holds rows of several lengths; give one row of numbers.") from None
     if kind in "mM":
         raise DataError(
             f"{name} holds dates or durations; give numbers, as (dates - dates[0]).total_seconds() does."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
@@ -86,7 +86,16 @@ class Measurement:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        """Raises DataError, naming column and row, for columns that are no rows of numbers, or of different lengths."""
+        """Raises DataError, naming column and row, for columns that are no rows of numbers or of different lengths, and
+        for a hold that is none."""
+        if self.hold is not None and self.hold not in get_args(Hold):
+            words = " or ".join(map(repr, get_args(Hold)))
+            raise DataError(f"{self.name}: hold = {self.hold!r} is not known; give {words}, or leave it out.")
+        for label in ("time_s", "current_a", "voltage_v"):
+            if getattr(self, label) is None:
+                raise DataError(
+                    f"{self.name}: {label} is None; give one row of numbers, NaN for unknown voltages."
+                )
         columns = {
             label: numbers(getattr(self, label), f"{self.name}: {label}")
             for label in ("time_s", "current_a", "voltage_v", "temperature_degc")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from aesi.errors import DataError
 from aesi.records import Measurement
 
 
@@ -15,3 +16,18 @@ def test_the_charge_of_a_pulse_between_far_rows_depends_on_how_the_current_runs(
     assert straight[[1, 2]] == pytest.approx([0.5, 1.0])
     assert held[-1] == pytest.approx(1.0 - 3.0 / 3600.0 - 1.5)
     assert straight[-1] == pytest.approx(record.charge_ah)
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"hold": "Backward"}, "drive: hold = 'Backward' is not known; give 'linear' or 'backward'"),
+        ({"voltage_v": None}, "drive: voltage_v is None; give one row of numbers, NaN for unknown voltages"),
+        ({"time_s": None}, "drive: time_s is None"),
+        ({"current_a": [[1.0], [2.0, 3.0]]}, "drive: current_a holds rows of several lengths"),
+    ],
+)
+def test_a_record_that_cannot_be_was_made_and_failed_where_it_was_used(changes, sentence):
+    columns = {"time_s": [0.0, 1.0], "current_a": [1.0, 1.0], "voltage_v": [3.7, 3.6], "name": "drive"}
+    with pytest.raises(DataError, match=sentence):
+        Measurement(**(columns | changes))
