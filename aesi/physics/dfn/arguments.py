@@ -14,6 +14,7 @@ from aesi.physics.dfn.layout import Electrodes, Particles, Stack
 from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
+    entropic_table,
     film_tables,
     ocp_table,
     rate_tables,
@@ -136,7 +137,7 @@ def _electrodes(model: EspmModel) -> Electrodes:
         after=np.array(layer.after),
         solid=np.array([layer.solid * x.thickness_m / x.conductivity_s_m for x in (n, p)]),
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
-        entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
+        entropic=np.array([entropic_table(n, "negative"), entropic_table(p, "positive")]),
         rate=rate_tables(cell),
         film=film_tables(cell),
         alpha=np.array([x.transfer_coefficient for _, x in sides]),

@@ -29,6 +29,7 @@ from aesi.physics.espm.plain import stack_of
 from aesi.physics.espm.tables import (
     conductivity_table,
     electrolyte_diffusion,
+    entropic_table,
     film_tables,
     ocp_table,
     rate_tables,
@@ -167,7 +168,7 @@ def _surfaces(model: EspmModel) -> Surfaces:
     solid, salt = ohmic_drops(model)
     return Surfaces(
         ocp=np.array([ocp_table(n.ocp, "negative"), ocp_table(p.ocp, "positive")]),
-        entropic=np.array([ocp_table(n.entropic, "negative"), ocp_table(p.entropic, "positive")]),
+        entropic=np.array([entropic_table(n, "negative"), entropic_table(p, "positive")]),
         rate=rate_tables(model.cell),
         film=film_tables(model.cell),
         alpha=np.array([model.negative.transfer_coefficient, model.positive.transfer_coefficient]),

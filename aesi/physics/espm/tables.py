@@ -9,7 +9,7 @@ import numpy as np
 
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
-from aesi.physics.cell import Cell
+from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.relations import Constant, Relation, tabulated
 
 OCP_POINTS = 8193
@@ -31,7 +31,7 @@ SMALLEST_DIFFUSIVITY_RATIO = 1e-3
 """Of the value at rest: a polynomial outside the range of its fit may turn negative."""
 
 
-def ocp_table(ocp: Relation, what: str) -> Array:
+def ocp_table(ocp: Relation, side: str, what: str = "open-circuit potential") -> Array:
     """(OCP_POINTS,) V on [0, 1]; a pole at either end is replaced by its finite neighbour.
 
     Raises CellError where it is not finite inside.
@@ -44,8 +44,16 @@ def ocp_table(ocp: Relation, what: str) -> Array:
     values[-1] = values[-2] if not np.isfinite(values[-1]) else values[-1]
     if not np.isfinite(values).all():
         bad = float(np.flatnonzero(~np.isfinite(values))[0]) / (OCP_POINTS - 1)
-        raise CellError(f"the open-circuit potential of the {what} electrode is not finite at x = {bad:.4f}.")
+        raise CellError(
+            f"the {what} of the {side} electrode is not finite at x = {bad:.4f}; write there a table, or a formula "
+            "that holds from 0 to 1: surfaces leave the limits of the file under load."
+        )
     return values
+
+
+def entropic_table(electrode: Electrode, side: str) -> Array:
+    """(OCP_POINTS,) V/K on [0, 1], as `ocp_table`."""
+    return ocp_table(electrode.entropic, side, "entropic change coefficient")
 
 
 def rate_tables(cell: Cell) -> Array:

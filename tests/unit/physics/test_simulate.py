@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aesi.constants import SECONDS_PER_HOUR
-from aesi.errors import DataError, InputError, SimulationError
+from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.cell.parts import NO_ENTROPY
-from aesi.physics.cell.relations import LookupTable
+from aesi.physics.cell.relations import Expression, LookupTable
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import solver as _solver
 
@@ -272,3 +272,12 @@ def test_a_steep_diffusivity_is_followed_in_steps_of_a_second(nmc, load, slope, 
         for effects in ([steep], [steep, fine.activate(refinement=4.0)])
     )
     assert 1e3 * np.sqrt(np.mean((coarse_v - fine_v) ** 2)) < 0.1
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_an_entropy_that_ends_at_the_limits_was_told_as_an_open_circuit_potential(nmc, model):
+    odd = nmc.with_negative(entropic=Expression(f"1e-4 * sqrt(x - {0.5 * nmc.negative.theta_min})"))
+    with pytest.raises(
+        CellError, match="the entropic change coefficient of the negative electrode is not fin"
+    ):
+        simulate(odd, [0.0, 1.0], [1.0, 1.0], 0.5, temperature_degc=[10.0, 10.1], model=model)
