@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date
+from datetime import date, datetime
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -69,7 +69,7 @@ class Ageing:
         check_dates([r.name for r in records], dates)
         if as_of is not None and not dates:
             raise DataError(f"--as-of {as_of}: no record has a date; give theirs, --date FILE=YYYY-MM-DD.")
-        days = [dates.get(r.name) for r in records]
+        days, as_of = [_day(dates.get(r.name)) for r in records], _day(as_of)
         told = [d for d in days if d is not None]
         if as_of is not None and not min(told) <= as_of <= max(told):
             raise DataError(
@@ -122,6 +122,11 @@ class Ageing:
         if self.day is None:
             return ()
         return (f"the file is in the state of {self.day}.",)
+
+
+def _day(given: date | None) -> date | None:
+    """A moment is a date to Python, and two of one day are less than a day apart, or minus one."""
+    return given.date() if isinstance(given, datetime) else given
 
 
 def _size(z: Array) -> Array:

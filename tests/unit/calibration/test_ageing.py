@@ -1,6 +1,6 @@
 """Records of other days: one course of ageing, a file in the state of a stated day, and dates that fit no record."""
 
-from datetime import date
+from datetime import date, datetime
 from types import SimpleNamespace
 
 import numpy as np
@@ -47,6 +47,14 @@ def test_records_of_one_day_are_in_one_state():
     ageing = of(["a", "b", "later"], {"a": DAYS["march"], "b": DAYS["march"], "later": DAYS["june"]})
     found = shares(ageing, np.array([0.7, -0.4, 0.1]))
     assert found[0] == found[1] > found[2] == 1.0
+
+
+def test_moments_of_one_day_were_taken_for_two_and_beside_dates_ended_in_an_error_of_python():
+    hours = {"a": datetime(2017, 3, 11, 8), "b": datetime(2017, 3, 11, 20), "later": DAYS["june"]}
+    ageing = of(list(hours), hours, as_of=datetime(2017, 6, 7, 12))
+    found = shares(ageing, np.array([0.7, -0.4, 0.1]))
+    assert found[0] == found[1] > found[2] == 1.0
+    assert ageing.day == DAYS["june"]
 
 
 def test_the_file_as_simulated_is_that_of_every_record():
