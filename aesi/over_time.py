@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 LONGEST_IN_SECONDS = 20_000.0
 """Axes of longer tests are in hours."""
+LONGEST_STAMP_S = 1e6
+"""From which on six digits leave out whole seconds."""
 PANEL_HEIGHT = 190
 """Pixels."""
 COLOURS = ("#1f2328", "#0072B2", "#D55E00", "#009E73", "#CC79A7")
@@ -23,6 +25,11 @@ BAND = "rgba(0,114,178,0.2)"
 def time_unit(span_s: float) -> tuple[str, float]:
     """Label and divisor for an axis of that length: seconds, or hours for long tests."""
     return ("h", SECONDS_PER_HOUR) if span_s > LONGEST_IN_SECONDS else ("s", 1.0)
+
+
+def stamp(time_s: float) -> str:
+    """A row's time for a sentence, in s: six digits, of stamps since 1970 all that tell one row from the next."""
+    return f"{time_s:.{6 if abs(time_s) < LONGEST_STAMP_S else 12}g}"
 
 
 def extent(time_s: Array) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
 
@@ -98,8 +99,8 @@ def one_branch(cell: Cell, data: Measurement) -> tuple[Measurement, tuple[str, .
     first = int(before[rows[0] - 1]) + 1 if rows[0] else 0  # the rest before it shows where it starts from
     kept = data.take(slice(min(first, max(int(rows[0]) - 1, 0)), int(rows[-1]) + 1))
     note = (
-        f"{data.name}: only {kept.time_s[0]:g} to {kept.time_s[-1]:g} s are fitted; the charge beside it runs on the "
-        "other branch of a hysteresis that this model does not have."
+        f"{data.name}: only {stamp(kept.time_s[0])} to {stamp(kept.time_s[-1])} s are fitted; the charge "
+        "beside it runs on the other branch of a hysteresis that this model does not have."
     )
     return kept, (note,)
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, IntArray
+from aesi.over_time import stamp
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
 from aesi.records.checked import row_words
@@ -68,7 +69,7 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
         row = int(outside[0])
         like = f"; rows like it: {len(outside):,}" if len(outside) > 1 else ""
         raise DataError(
-            f"{data.name}: {data.voltage_v[row]:.3f} V at {data.time_s[row]:g} s ({row_words(row)}{like}) is "
+            f"{data.name}: {data.voltage_v[row]:.3f} V at {stamp(data.time_s[row])} s ({row_words(row)}{like}) is "
             f"outside the range of {cell.name} ({cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V): the record "
             "and the cell file are of different cells, or the row is no measurement of the cell."
         )
@@ -133,7 +134,7 @@ def _check_window(cell: Cell, record: Measurement) -> None:
     if np.any(above):
         row = int(np.argmax(above))
         raise DataError(
-            f"{record.name}, {record.time_s[row]:.6g} s: {record.voltage_v[row]:.3f} V at "
+            f"{record.name}, {stamp(record.time_s[row])} s: {record.voltage_v[row]:.3f} V at "
             f"{record.current_a[row]:.3g} A, but {cell.name} is full at {full_v:.3f} V: the record and the "
             "cell file are of different cells, or the row is no measurement of the cell."
         )
@@ -160,7 +161,7 @@ def _moved(record: Measurement, rows: tuple[int, int]) -> str:
     charge = record.discharged_ah("backward")
     amount, way = abs(charge[last] - charge[first]), "leave" if rows[0] == first else "enter"
     ends = " and ".join(
-        f"{record.time_s[row]:.6g} s ({record.voltage_v[row]:.3f} V)" for row in (first, last)
+        f"{stamp(record.time_s[row])} s ({record.voltage_v[row]:.3f} V)" for row in (first, last)
     )
     return f"{record.name}: {amount:.4g} Ah {way} the cell between {ends}"
 

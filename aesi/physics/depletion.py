@@ -12,6 +12,7 @@ import numpy as np
 
 from aesi.constants import FARADAY_C_MOL, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
 from aesi.physics.espm.plain import rate_factor, stack_of
 from aesi.physics.model import EspmModel
 
@@ -28,7 +29,7 @@ def sentence(
     4, no reaction carries the current."""
     cell = model.cell
     head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
-    where = f"at {time_s[at]:.6g} s"  # of a row the file may know nothing: models run on rows of their own
+    where = f"at {stamp(time_s[at])} s"  # of a row the file may know nothing: models run on rows of their own
     amperes = float(np.max(np.abs(current_a[max(at - 1, 0) : at + 1])))  # on the way there
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
     if what == SALT or (what == NO_SOLUTION and driest < DRY_SHARE):
@@ -95,7 +96,7 @@ def ran_out(name: str, at_s: Mapping[str, float]) -> str:
 
     at_s : what was simulated, in words, to when it ran out, s.
     """
-    where = ", ".join(f"in {model} at {when:g} s" for model, when in at_s.items())
+    where = ", ".join(f"in {model} at {stamp(when)} s" for model, when in at_s.items())
     return (
         f"{name}: a particle's surface or the electrolyte runs empty or full {where}, and is held there: from then on "
         "an error says that it ran out, not by how much the model is off."
@@ -126,7 +127,7 @@ def _cut_off(model: EspmModel, time_s: Array, voltage_v: Array, at: int) -> str:
     for passed, name, limit in ((low, "lower", cell.lower_voltage_v), (high, "upper", cell.upper_voltage_v)):
         if passed.any():
             row = int(np.argmax(passed))
-            words = f"the voltage passed the {name} cut-off ({limit:g} V) at {time_s[row]:.6g} s "
+            words = f"the voltage passed the {name} cut-off ({limit:g} V) at {stamp(time_s[row])} s "
             words += "and the record goes on; "
             return words
     return ""

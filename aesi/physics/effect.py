@@ -22,6 +22,7 @@ import numpy as np
 
 from aesi.errors import ParameterError, SimulationError
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
 from aesi.parameters import Parameter, checked
 from aesi.physics.model import EspmModel
 
@@ -212,4 +213,4 @@ def check_row_of(file: str, what: str, row: Any, trace: Trace) -> None:
     unknown = ~np.isfinite(row)
     if unknown.any():
         at = float(trace.time_s[int(np.argmax(unknown))])
-        raise SimulationError(f"{file}: {what} gives no number at {at:.6g} s.")
+        raise SimulationError(f"{file}: {what} gives no number at {stamp(at)} s.")

@@ -20,6 +20,7 @@ import numpy as np
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, Numbers
+from aesi.over_time import stamp
 from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
@@ -112,8 +113,8 @@ def simulate(
     if fault_at >= 0 and not np.isfinite(voltage).all():
         lost = int(np.argmin(np.isfinite(voltage)))
         raise SimulationError(
-            f"there is no solution at {time[lost]:g} s: the cell ran out at {time[fault_at]:g} s, and the current went "
-            "on; end the record there, or check soc0, capacity and the sign of the current."
+            f"there is no solution at {stamp(time[lost])} s: the cell ran out at {stamp(time[fault_at])} s, and the "
+            "current went on; end the record there, or check soc0, capacity and the sign of the current."
         )
     return Run(time, current, voltage, series, across or {})
 

@@ -17,6 +17,7 @@ from aesi.calibration.start import sized
 from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
 from aesi.errors import DataError, InputError
+from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.belongs import check_measured
@@ -204,7 +205,7 @@ def _checked(found: Measurement, hold: Hold | None) -> Measurement:
     if unknown.any():
         row = int(np.argmax(unknown))
         raise DataError(
-            f"{found.name}: voltage_v is nan at {found.time_s[row]:g} s ({row_words(row)}); drop the row, or give "
+            f"{found.name}: voltage_v is nan at {stamp(found.time_s[row])} s ({row_words(row)}); drop the row, or give "
             "the parts before and after it as records of their own."
         )
     whole = found if found.source else examined(found)

@@ -6,6 +6,7 @@ import numpy as np
 
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
+from aesi.over_time import stamp
 
 
 def numbers(values: object, name: str) -> Array:
@@ -55,7 +56,7 @@ def check_increasing(time_s: Array, name: str) -> None:
     if still.any():
         row = int(np.argmax(still)) + 1
         raise DataError(
-            f"{name} does not increase at {time_s[row]:g} s ({row_words(row)}); sort or drop duplicate stamps."
+            f"{name} does not increase at {stamp(time_s[row])} s ({row_words(row)}); sort or drop duplicate stamps."
         )
 
 

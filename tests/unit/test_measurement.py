@@ -31,3 +31,10 @@ def test_a_record_that_cannot_be_was_made_and_failed_where_it_was_used(changes, 
     columns = {"time_s": [0.0, 1.0], "current_a": [1.0, 1.0], "voltage_v": [3.7, 3.6], "name": "drive"}
     with pytest.raises(DataError, match=sentence):
         Measurement(**(columns | changes))
+
+
+@pytest.mark.parametrize(("offset", "told"), [(0.0, "2.5 s"), (1.7e9, "1700000002.5 s")])
+def test_a_row_stamped_since_1970_was_told_by_six_digits_which_all_rows_share(offset, told):
+    time = offset + np.array([0.0, 2.5, 2.5])
+    with pytest.raises(DataError, match=f"time_s does not increase at {told}"):
+        Measurement(time, np.ones(3), np.full(3, 3.7))

@@ -13,6 +13,7 @@ from aesi.calibration.start import flowing
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import stamp
 from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
@@ -168,6 +169,6 @@ def check_charge(cell: Cell, record: Prepared) -> None:
         row = int(np.argmax(wrong))
         raise DataError(
             f"{record.name}: the charge moved takes the cell to a state of charge of {100 * soc[row]:.0f} % at "
-            f"{rows.time_s[row]:g} s, from {100 * record.start.soc:.0f} % at the start and with {cell.capacity_ah:.3g} "
-            "Ah; check the cell file, --soc0 and the sign and unit of the current."
+            f"{stamp(rows.time_s[row])} s, from {100 * record.start.soc:.0f} % at the start and with "
+            f"{cell.capacity_ah:.3g} Ah; check the cell file, --soc0 and the sign and unit of the current."
         )
