@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from aesi.errors import DataError
+from aesi.physics.arguments import check_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
@@ -65,14 +66,22 @@ def initial_state(
     for several, so that one whose voltage contradicts it starts where its voltage says.
     hold : how the current runs between rows.  effects : what the cell has beyond its file.  model : that a
     loaded start is simulated with.
-    Raises DataError where the voltage belongs to no state of this cell, or there is neither voltage nor `soc0`.
+    Where the voltage is not known from some row on, the rows before it say where the record starts.
+    Raises DataError where the voltage belongs to no state of this cell, or there is neither voltage nor `soc0`;
+    InputError for what is no state of charge.
     """
+    check_soc(soc0)
+    if not len(record):
+        raise DataError(f"{record.name} has no row to start from.")
     active = tuple(effects)
-    start = _Start(cell, record, hold, active, model)
-    if not np.isfinite(record.voltage_v[0]):
+    unknown = ~np.isfinite(record.voltage_v)
+    if unknown[0]:
         if soc0 is None:
             raise DataError(f"{record.name} has no voltage to start from; give --soc0.")
         return _given(record, soc0, None)
+    if unknown.any():
+        record = record.take(slice(0, int(np.argmax(unknown))))
+    start = _Start(cell, record, hold, active, model)
     if soc0 is not None:
         try:
             read = start.read()

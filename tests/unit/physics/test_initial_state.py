@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.start.open_circuit import READING_V, OpenCircuit
@@ -198,3 +198,18 @@ def test_no_voltage_and_nothing_given_is_refused():
     with pytest.raises(DataError, match="--soc0"):
         initial_state(LG_M50, resting(np.nan))
     assert initial_state(LG_M50, resting(np.nan), 0.7).soc == 0.7
+
+
+@pytest.mark.parametrize("current_a", [0.0, 2.0])
+def test_a_voltage_that_is_not_known_further_on_made_a_start_that_is_no_number(current_a):
+    time, current = np.arange(100.0), np.full(100, current_a)
+    voltage = simulate(LG_M50, time, current, 0.6, hold="backward").voltage_v
+    whole = initial_state(LG_M50, record(time[:40], current[:40], voltage[:40]))
+    found = initial_state(LG_M50, record(time, current, np.where(time < 40.0, voltage, np.nan)))
+    assert (found.soc, found.sd, found.basis) == (whole.soc, whole.sd, whole.basis)
+
+
+@pytest.mark.parametrize("soc0", [np.nan, 50.0])
+def test_a_start_that_is_no_state_of_charge_was_taken_as_given(soc0):
+    with pytest.raises(InputError, match="is not a state of charge"):
+        initial_state(LG_M50, resting(3.7), soc0)
