@@ -11,6 +11,7 @@ from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
 from aesi.errors import InputError
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
+from aesi.records.checked import numbers
 
 FARTHEST_SOC = 1.0
 """A state of charge further than this outside [0, 1] is a percentage or a voltage, not a cell beyond its limits."""
@@ -66,7 +67,7 @@ def check_temperature(temperature_degc: Any, name: str = "temperature_degc") -> 
 
     name : how the sentence calls it.
     """
-    given = np.asarray(temperature_degc, dtype=float)
+    given = numbers(temperature_degc, name)
     absurd = given[~((given >= COLDEST_DEGC) & (given <= WARMEST_DEGC))]  # this way round, NaN is absurd too
     if absurd.size:
         kelvin = " (in kelvin? 298.15 K is 25 degC)" if absurd[0] > WARMEST_DEGC else ""

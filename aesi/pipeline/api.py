@@ -124,6 +124,8 @@ def calibrate(
     Raises AesiError, one sentence, for what cannot be used.
     """
     check_soc(soc0)
+    _check_by_name("temperatures_degc", temperatures_degc)
+    _check_by_name("dates", dates)
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
     declared = given.cell
@@ -151,6 +153,12 @@ def _check_asked(soc0: float | None, holdout: float | None, max_effects: int, se
         if not isinstance(value, int | np.integer) or not 0 <= value <= most:
             upper = f" up to {most:g}" if np.isfinite(most) else ""
             raise InputError(f"{name} = {value!r} is not a whole number from 0{upper}.")
+
+
+def _check_by_name(what: str, given: object) -> None:
+    """Raises InputError for what is said of records without their names."""
+    if given is not None and not isinstance(given, Mapping):
+        raise InputError(f"{what} = {given!r} names no record; give a dict by the records' names.")
 
 
 def _check_days(dates: Mapping[str, date], as_of: date | None) -> None:

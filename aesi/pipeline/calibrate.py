@@ -15,7 +15,7 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
-from aesi.errors import DataError
+from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
@@ -147,6 +147,10 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
             )
     for name, value in (temperatures_degc or {}).items():
         check_temperature(value, f"the temperature of {name}")
+        if np.ndim(value):
+            raise InputError(
+                f"the temperature of {name} is a row of {len(value)}; give one number here, or the record a column."  # type: ignore[arg-type]
+            )
 
 
 def _made_from(found: Calibration) -> str:

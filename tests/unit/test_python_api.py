@@ -311,6 +311,22 @@ def test_a_day_that_is_text_or_a_number_is_told(cell, record, days, sentence):
         aesi.calibrate(cell, record, **days)
 
 
+@pytest.mark.parametrize(
+    ("said", "sentence"),
+    [
+        ({"temperatures_degc": 25.0}, "temperatures_degc = 25.0 names no record; give a dict"),
+        ({"dates": ["2019-05-31"]}, r"dates = \['2019-05-31'\] names no record; give a dict"),
+        ({"temperatures_degc": {"drive": "room"}}, "the temperature of drive holds 'room', which is not a n"),
+        ({"temperatures_degc": {"drive": [25.0, 26.0]}}, "the temperature of drive is a row of 2; give one"),
+    ],
+)
+def test_what_is_said_of_records_in_a_form_that_nothing_reads_was_an_error_of_python(
+    cell, record, said, sentence
+):
+    with pytest.raises(InputError, match=sentence):
+        aesi.calibrate(cell, record, **said)
+
+
 def test_a_table_in_place_of_a_file_is_told_what_takes_one():
     with pytest.raises(InputError, match=r"of type DataFrame is no file; .* aesi\.Measurement\(time_s"):
         aesi.read_measurement(pd.DataFrame({"time_s": TIME}))
