@@ -83,13 +83,21 @@ def record_name(path: str | Path) -> str:
 
 
 def record_names(paths: Sequence[Path]) -> list[str]:
-    """What the records of several files are called; those of one name have that of their folder in front of it."""
+    """What the records of several files are called; those of one name have that of their folder in front of it, and of
+    the folders above until no two files are called alike. Files of one folder keep their suffix then."""
     files = [path.resolve() for path in paths]
-    shared = Counter(record_name(file) for file in set(files))
-    return [
-        f"{file.parent.name} {name}" if shared[name] > 1 else name
-        for file, name in ((file, record_name(file)) for file in files)
-    ]
+    names = {file: record_name(file) for file in files}
+    beside = Counter((file.parent, name) for file, name in names.items())
+    names = {file: file.name if beside[file.parent, name] > 1 else name for file, name in names.items()}
+    for depth in range(max((len(file.parts) for file in files), default=0)):
+        shared = Counter(names.values())
+        names = {
+            file: f"{file.parts[-2 - depth]} {name}"
+            if shared[name] > 1 and depth < len(file.parts) - 2
+            else name
+            for file, name in names.items()
+        }
+    return [names[file] for file in files]
 
 
 def _check_choice(what: str, value: str | None, choices: tuple[str, ...]) -> None:

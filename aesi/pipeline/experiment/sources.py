@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aesi.data.read import Reading, read
+from aesi.data.reading import record_names
 from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataError, did_you_mean
 from aesi.pipeline.distinct import check_distinct
@@ -53,7 +54,8 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
     names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
-        name: (_record(where(name), data.reading), None) for name in dict.fromkeys(names)
+        name: (_record(path, data.reading, called), None)
+        for name, (path, called) in _placed(where, names).items()
     }
     test = [records[name][0] for name in roles["test"]]
     for role in ("train", "valid"):
@@ -103,12 +105,13 @@ def discovery_records(
     if config.data.kind == "virtual":
         experiment = virtual_experiment(config, cell)
         return experiment.train, experiment.test, ()
-    where = _locator(config)
+    placed = _placed(_locator(config), (*wanted.fit, *wanted.test, *wanted.good))
 
     def until(names: Sequence[str], stop_s: Mapping[str, float | None]) -> tuple[Measurement, ...]:
         reading = config.data.reading
         return tuple(
-            _record(where(name), reading.but(stop_s=stop_s.get(name))).held(wanted.hold) for name in names
+            _record(placed[name][0], reading.but(stop_s=stop_s.get(name)), placed[name][1]).held(wanted.hold)
+            for name in names
         )
 
     return (
@@ -148,10 +151,21 @@ def cell_path(config: ExperimentConfig) -> Path:
     return locate(config.data.set, "cell.bpx.json")
 
 
-def _record(path: Path, reading: Reading) -> Measurement:
-    """A record of a file.  Raises DataError that names, beside the options of a command, the keys of an experiment."""
+def _placed(where: Callable[[str], Path], names: Sequence[str]) -> dict[str, tuple[Path, str]]:
+    """Name in the experiment -> file of the record, and what it is called: no two alike, since what is told of a record
+    is kept by its name, and files of several folders may have one."""
+    paths = {name: where(name) for name in names}
+    called = record_names(list(paths.values()))
+    return {name: (path, one) for (name, path), one in zip(paths.items(), called, strict=True)}
+
+
+def _record(path: Path, reading: Reading, called: str | None = None) -> Measurement:
+    """A record of a file.  Raises DataError that names, beside the options of a command, the keys of an experiment.
+
+    called : None calls it as its file is.
+    """
     try:
-        return read(path, reading)
+        return read(path, reading, name=called)
     except DataError as error:
         raise DataError(with_keys(str(error))) from None
 

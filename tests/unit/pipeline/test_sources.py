@@ -7,7 +7,8 @@ import pytest
 
 from aesi.data.reading import Reading
 from aesi.errors import DataError
-from aesi.pipeline.experiment.sources import _record, with_keys
+from aesi.pipeline.experiment.config import parse_experiment
+from aesi.pipeline.experiment.sources import _record, discovery_records, sources_of, with_keys
 
 
 def written(folder: Path, header: str, sign: float = 1.0) -> Path:
@@ -42,3 +43,42 @@ def test_what_needs_no_option_is_told_as_it_is(tmp_path):
 def test_a_state_of_charge_that_a_run_may_be_given_was_called_by_a_command_s_option():
     sentence = "drive starts under 1 A at 3.9 V: state of charge 0.7 +/- 0.1; give --soc0 if it is known."
     assert with_keys(sentence).endswith("if it is known (in an experiment file: cell.soc0).")
+
+
+def days(folder: Path, inner: str = "") -> list[str]:
+    """Records of one name, a folder a day, none like another."""
+    paths = []
+    for day in range(3):
+        place = folder / f"day{day}" / inner
+        place.mkdir(parents=True)
+        paths.append(written(place, "time_s,current_a,voltage_v"))
+        paths[-1].write_text("\n".join(paths[-1].read_text().splitlines()[: 150 + 10 * day]) + "\n")
+    return [str(path) for path in paths]
+
+
+@pytest.mark.parametrize(
+    ("inner", "called"),
+    [("", ["day0 drive", "day1 drive", "day2 drive"]), ("run", [f"day{day} run drive" for day in range(3)])],
+)
+def test_records_of_one_name_in_several_folders_were_taken_for_one(tmp_path, inner, called):
+    first, second, test = days(tmp_path, inner)
+    content = {"name": "days", "data": {"kind": "files", "train": [first, second], "test": [test]}}
+    sources = sources_of(parse_experiment(content), Path("unread.bpx.json"))
+    assert [record.name for record, _ in sources.records.values()] == called
+    assert list(sources.records) == [first, second, test]
+
+
+def test_a_discovery_takes_records_of_one_name_apart_and_knows_one_of_two_parts(tmp_path):
+    first, second, _ = days(tmp_path)
+    asked = {"fit": [first, second], "test": [first]}
+    config = parse_experiment({"name": "days", "data": {"kind": "files"}, "discover": asked})
+    fit, test, _ = discovery_records(config, config.discover, Path("unread.bpx.json"))
+    assert [record.name for record in fit] == ["day0 drive", "day1 drive"]
+    assert [record.name for record in test] == ["day0 drive"]
+
+
+def test_records_of_one_name_in_one_folder_keep_their_suffix(tmp_path):
+    from aesi.data.reading import record_names
+
+    paths = [tmp_path / "drive.csv", tmp_path / "drive.parquet", tmp_path / "rest.csv"]
+    assert record_names(paths) == ["drive.csv", "drive.parquet", "rest"]
