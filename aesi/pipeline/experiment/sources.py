@@ -57,9 +57,9 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
         name: (_record(path, data.reading, called), None)
         for name, (path, called) in _placed(where, names).items()
     }
-    test = [records[name][0] for name in roles["test"]]
-    for role in ("train", "valid"):
-        check_distinct([records[name][0] for name in roles[role]], test)
+    train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
+    for fitted in (train, valid, [*train, *valid]):
+        check_distinct(fitted, test)
     return Sources(records, roles)
 
 

@@ -82,3 +82,13 @@ def test_records_of_one_name_in_one_folder_keep_their_suffix(tmp_path):
 
     paths = [tmp_path / "drive.csv", tmp_path / "drive.parquet", tmp_path / "rest.csv"]
     assert record_names(paths) == ["drive.csv", "drive.parquet", "rest"]
+
+
+def test_a_copy_of_a_training_record_was_taken_to_validate(tmp_path):
+    first, second, test = days(tmp_path)
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(Path(first).read_bytes())
+    data = {"kind": "files", "train": [first, second], "valid": [str(copy)], "test": [test]}
+    config = parse_experiment({"name": "days", "data": data})
+    with pytest.raises(DataError, match="day0 drive and copy hold the same rows and are both among the data"):
+        sources_of(config, Path("unread.bpx.json"))
