@@ -12,7 +12,7 @@ from aesi.errors import FitError
 from aesi.numerics.files.source_digest import source_digest
 from aesi.pipeline.experiment.candidate import ScoredCandidate, genome_space, top_share, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
-from aesi.records import Failed
+from aesi.records import Failed, digest
 from aesi.sparse import Candidate, Genome, Problem
 from aesi.sparse.search.pick.average import averaged
 from flows.base import environment, fingerprint
@@ -164,9 +164,14 @@ def shared_outcomes(config: ExperimentConfig) -> Outcomes:
 
 
 def study_key(problem: Problem, config: ExperimentConfig) -> str:
-    """Content key of all that decides what becomes of a genome: records, settings, code."""
+    """Content key of all that decides what becomes of a genome: records, settings, code.
+
+    Of the records also where they lie in charge and temperature, beyond which corrections fade, and the errors of
+    physics that has not seen them, by which candidates are judged.
+    """
     search, conformal = config.search, config.conformal
     records = (*problem.split.train, *problem.split.valid)
+    places = (column for record in records for column in (record.soc, record.temperature_degc))
     settings = [
         problem.options.__dict__,
         weights(config).__dict__,
@@ -174,7 +179,10 @@ def study_key(problem: Problem, config: ExperimentConfig) -> str:
         [search.timeout_s, search.memory_mb],
     ]
     return fingerprint.key(
-        source_digest(), *(record.digest for record in records), json.dumps(settings, default=str)
+        source_digest(),
+        *(record.digest for record in records),
+        digest(problem.unseen_error, problem.unseen_target, *places),
+        json.dumps(settings, default=str),
     )
 
 
