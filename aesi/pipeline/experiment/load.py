@@ -22,7 +22,14 @@ from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
 from aesi.pipeline.experiment.left_out import TrainingDrives, series_under
 from aesi.pipeline.experiment.physics_models import PhysicsModels, no_rows, physics_models
 from aesi.pipeline.experiment.recalibrate import FitRecord
-from aesi.pipeline.experiment.sources import Sources, cell_path, check_roles, sources_of, with_keys
+from aesi.pipeline.experiment.sources import (
+    Sources,
+    cell_path,
+    check_had,
+    check_roles,
+    sources_of,
+    with_keys,
+)
 from aesi.pipeline.notes import temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -67,15 +74,15 @@ class Loaded:
 def load(config: ExperimentConfig) -> Loaded:
     """Measurements, simulated and subtracted, by role.
 
-    With a `fallback` section, data that cannot be had are replaced by it. A note says so, and the experiment's own
-    note, which is about the data that were asked for, is left out.
+    With a `fallback` section, data that cannot be had are replaced by it; what is wrong with data that are there is
+    raised. A note says so, and the experiment's own note, which is about the data that were asked for, is left out.
     Raises ConfigError or DataError naming the file and what to do.
     """
     check_roles(config)
     try:
-        return _load(config)
+        check_had(config)
     except DataError as error:
-        if config.fallback is None or config.data.kind != "catalogue":
+        if config.fallback is None:
             raise
         fallback = config.model_copy(
             update={"data": config.fallback.data, "cell": config.fallback.cell, "fallback": None, "note": ""}
@@ -91,6 +98,7 @@ def load(config: ExperimentConfig) -> Loaded:
         )
         loaded = _load(fallback)
         return replace(loaded, notes=(reason, *loaded.notes), fallback=reason)
+    return _load(config)
 
 
 def _called(config: ExperimentConfig) -> str:

@@ -14,7 +14,7 @@ from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataError, did_you_mean
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
-from aesi.pipeline.experiment.sections import DiscoverConfig
+from aesi.pipeline.experiment.sections import DataConfig, DiscoverConfig
 from aesi.records import ROLES, Measurement, Role
 
 if TYPE_CHECKING:
@@ -52,10 +52,9 @@ def sources_of(config: ExperimentConfig, cell: Path) -> Sources:
     data = config.data
     where = _locator(config)
     roles: dict[Role, tuple[str, ...]] = {role: getattr(data, role) for role in ROLES}
-    names = (data.record,) if data.record else tuple(name for role in ROLES for name in roles[role])
     records: dict[str, tuple[Measurement, float | None]] = {
         name: (_record(path, data.reading, called), None)
-        for name, (path, called) in _placed(where, names).items()
+        for name, (path, called) in _placed(where, _listed(data)).items()
     }
     train, valid, test = ([records[name][0] for name in roles[role]] for role in ROLES)
     for fitted in (train, valid, [*train, *valid]):
@@ -74,13 +73,20 @@ def named_files(config: ExperimentConfig) -> dict[str, Path]:
     names = {} if config.cell.bpx == "catalogue" else {"cell": config.cell.bpx}
     names |= {f"cell: effect_files: {name}": name for name in config.cell.effect_files}
     if config.data.kind == "files":
-        listed = (
-            (config.data.record,)
-            if config.data.record
-            else tuple(n for r in ROLES for n in getattr(config.data, r))
-        )
-        names |= {f"data: {name}": name for name in listed}
+        names |= {f"data: {name}": name for name in _listed(config.data)}
     return {key: config.path(name) for key, name in names.items()}
+
+
+def _listed(data: DataConfig) -> tuple[str, ...]:
+    """The records that a data section names, of whatever role."""
+    return (data.record,) if data.record else tuple(name for role in ROLES for name in getattr(data, role))
+
+
+def check_had(config: ExperimentConfig) -> None:
+    """Raises DataError where a file of the catalogue that the experiment names cannot be had."""
+    if config.data.kind == "catalogue":
+        cell_path(config)
+        _placed(_locator(config), _listed(config.data))
 
 
 def check_there(config: ExperimentConfig) -> None:

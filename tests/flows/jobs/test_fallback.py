@@ -5,7 +5,7 @@ import json
 import pytest
 import yaml
 
-from aesi.errors import DataAway
+from aesi.errors import DataAway, DataError
 from aesi.pipeline.product.hybrid import HybridModel
 from flows.results.tables import tables_of
 from flows.tracking.store import KIND, Store
@@ -86,3 +86,16 @@ def test_the_setting_of_a_fallback_and_of_another_measurement_are_others(experim
     assert len({loaded.setting, other.setting, config.setting}) == 3
     again = load(read_experiment(experiment, ["seed=7"]))
     assert again.setting == loaded.setting
+
+
+def test_what_is_wrong_with_data_that_are_there_was_told_as_data_that_cannot_be_had(
+    experiment, tmp_path, monkeypatch
+):
+    from aesi.pipeline.experiment.config import read_experiment
+    from aesi.pipeline.experiment.load import load
+
+    record = tmp_path / "drive_cycle.csv"
+    record.write_text("time_s,current_a\n0,1\n1,1\n2,1\n")
+    monkeypatch.setattr("aesi.data.catalogue.locate", lambda name, file: record)
+    with pytest.raises(DataError, match=r"drive_cycle\.csv.*voltage_v"):
+        load(read_experiment(experiment, [f"cell.bpx={read_experiment(experiment).fallback.cell.bpx}"]))
