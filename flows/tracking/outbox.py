@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ class Outbox:
     """Items of one run below `folder`; `deliver` raises where an item could not be sent.
 
     away : tells a passing failure (retried for ever) from an item the store refuses (put aside, and said).
+    left : what an earlier process had put in and not delivered, in order.
     """
 
     def __init__(
@@ -54,8 +55,11 @@ class Outbox:
         self._tries = 0
         self._sending = False
         folder.mkdir(parents=True, exist_ok=True)
-        self._old = {path.name for path in self._waiting()}
-        self._next = 1 + max((int(path.stem) for path in self._waiting()), default=0)
+        waiting = self._waiting()
+        self.left: tuple[Item, ...] = tuple(json.loads(path.read_bytes()) for path in waiting)
+        self._old = {path.name for path in waiting}
+        aside = (folder / REFUSED).glob("[0-9]*.json")  # whose numbers are taken, too
+        self._next = 1 + max((int(path.stem) for path in (*waiting, *aside)), default=0)
         self._thread = threading.Thread(target=self._run, name="aesi-outbox", daemon=True)
         self._thread.start()
 
@@ -71,11 +75,6 @@ class Outbox:
     def pending(self) -> int:
         """How many items are not delivered yet."""
         return len(self._waiting())
-
-    def items(self) -> Iterator[Item]:
-        """What waits, in order."""
-        for path in self._waiting():
-            yield json.loads(path.read_bytes())
 
     def flush(self, timeout_s: float) -> int:
         """Wait for delivery, at most `timeout_s` after the store was last seen to work; the number left.

@@ -84,7 +84,7 @@ class Tracker:
         self._outbox = Outbox(
             environment.state() / "outbox" / self.run_id, partial(deliver, store), store.away, say
         )
-        self._tracked |= {item["label"] for item in self._outbox.items() if item["kind"] == "run"}
+        self._tracked |= {item["label"] for item in self._outbox.left if item["kind"] == "run"}
         self._stop = threading.Event()
         if config.tracking.system_metrics:
             threading.Thread(target=self._sample, name="aesi-system", daemon=True).start()

@@ -144,3 +144,25 @@ def test_an_item_that_cannot_be_crossed_off_kept_an_ending_run_waiting_for_ever(
     assert box.flush(5) == 0
     assert store.again[-1]  # a store is told that it may have been sent before
     box.close()
+
+
+def test_what_was_left_was_read_while_it_was_delivered_and_gone(tmp_path, store, said):
+    store.here.clear()
+    box = opened(tmp_path, store, said)
+    for n in range(3):
+        box.put({"n": n})
+    box.close()
+    store.here.set()
+    again = opened(tmp_path, store, said)
+    assert again.flush(5) == 0
+    assert [item["n"] for item in again.left] == [0, 1, 2]
+
+
+def test_a_second_refused_item_took_the_place_of_the_first(tmp_path, store, said):
+    for n in range(2):
+        box = opened(tmp_path, store, said)
+        box.put({"n": n, "bad": True})
+        assert box.flush(5) == 0
+        box.close()
+    kept = sorted((tmp_path / "box" / "refused").iterdir())
+    assert [json.loads(path.read_text())["n"] for path in kept] == [0, 1]
