@@ -70,8 +70,10 @@ class Tracker:
     ) -> None:
         self.store = store
         self._config = config
+        self._say = say
         self._experiment_id = store.experiment(config.name)
         self._tracked: set[str] = set()
+        self._began: dict[str, str] = {}
         self.resumed = run_id is not None
         if run_id is None:
             tags = {KIND: "run", "aesi.config_digest": config.digest, **source_tags()}
@@ -81,10 +83,13 @@ class Tracker:
             self.run_id = run_id
             store.client.update_run(run_id, status="RUNNING")
             self._tracked = set(store.children(self._experiment_id, run_id))
+            self._began = dict(store.run(run_id).data.params)
         self._outbox = Outbox(
             environment.state() / "outbox" / self.run_id, partial(deliver, store), store.away, say
         )
         self._tracked |= {item["label"] for item in self._outbox.left if item["kind"] == "run"}
+        for item in self._outbox.left:
+            self._began |= item["params"] if item["kind"] == "batch" else {}
         self._stop = threading.Event()
         if config.tracking.system_metrics:
             threading.Thread(target=self._sample, name="aesi-system", daemon=True).start()
@@ -101,8 +106,17 @@ class Tracker:
         return f"{server.rstrip('/')}/#/experiments/{self._experiment_id}/runs/{self.run_id}"
 
     def parameters(self, values: Mapping[str, Any], tags: Mapping[str, str] | None = None) -> None:
-        """Parameters of the parent run."""
-        self._batch(params=_texts(values), tags=dict(tags or {}))
+        """Parameters of the parent run.
+
+        Those that a resumed run began with stay, since MLflow changes none and would refuse the others with them; where
+        one is another now, that is said.
+        """
+        texts = _texts(values)
+        changed = {name for name, text in texts.items() if self._began.get(name, text) != text}
+        if changed:
+            told = ", ".join(f"{name} = {self._began[name]} (now {texts[name]})" for name in sorted(changed))
+            self._say(f"tracking: the run stays tracked as it was begun, with {told}.")
+        self._batch(params={k: v for k, v in texts.items() if k not in changed}, tags=dict(tags or {}))
 
     def metrics(self, values: Mapping[str, float], step: int = 0) -> None:
         """Metrics of the parent run."""
