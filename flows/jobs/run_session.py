@@ -157,22 +157,25 @@ def _withdraw(record: RunRecord, tracker: Tracker) -> None:
 
 
 def resume_key(config: ExperimentConfig) -> str:
-    """What a run has to share to be gone on with: the settings, the content of the files that they name, the program.
+    """What a run has to share to be gone on with: the settings, what a candidate may take, the content of the files
+    that they name, the program.
 
-    What a run has tracked is not tracked again, so that candidates of other data or of another version would stand
-    beside the new ones.
+    What a run has tracked is not tracked again, so that candidates of other data or of another version, or that had
+    failed for want of time, would stand beside the new ones.
     """
     from aesi.pipeline.experiment.sources import named_files
 
-    return fingerprint.key(config.digest, source_digest(), *contents(named_files(config).values()))
+    limits = f"{config.search.timeout_s:g} s, {config.search.memory_mb:g} MB"
+    return fingerprint.key(config.digest, limits, source_digest(), *contents(named_files(config).values()))
 
 
 def _unfinished(config: ExperimentConfig, store: Store, console: Console) -> RunRecord | None:
-    """The newest unfinished run of the same experiment, settings, files and program that nobody works on."""
+    """The newest unfinished run of the same experiment, settings, files and program that is still in the store and that
+    nobody works on."""
     for record in records(config.name):
         if record.status not in UNFINISHED or record.uri != store.uri:
             continue
-        if record.config_digest != resume_key(config):
+        if record.config_digest != resume_key(config) or not store.holds(record.run_id):
             continue
         lock = RunLock(record.run_id)
         if lock.acquire():

@@ -146,6 +146,17 @@ class Store:
                 f"no run {run_id!r} is tracked in {without_login(self.uri)}; give {asked}."
             ) from None
 
+    def holds(self, run_id: str) -> bool:
+        """Whether a run of that id is there, and not deleted."""
+        from mlflow.exceptions import MlflowException
+
+        try:
+            return bool(self.client.get_run(run_id).info.lifecycle_stage == "active")
+        except MlflowException as error:
+            if error.error_code != "RESOURCE_DOES_NOT_EXIST":
+                raise
+            return False
+
     def artifact(self, run: Any, name: str) -> Path | None:
         """A file among the artifacts of a run, or None where there is none."""
         try:

@@ -58,6 +58,17 @@ def test_a_run_was_gone_on_with_on_other_data_or_by_another_version(tmp_path, mo
     assert resume_key(config) != changed
 
 
+def test_a_run_was_gone_on_with_though_its_candidates_may_take_longer_now(path):
+    config = RunRequest(path).config()
+    longer, more = (
+        RunRequest(path, (text,)).config() for text in ("search.timeout_s=500", "search.memory_mb=9000")
+    )
+    assert len({resume_key(each) for each in (config, longer, more)}) == 3
+    assert resume_key(RunRequest(path, ("search.workers=3", "runner.kind=dask")).config()) == resume_key(
+        config
+    )
+
+
 def test_a_run_without_prefect_was_told_to_go_on_with_it(path):
     assert RunRequest(path, use_prefect=False).resuming == f"aesi run {path} --no-prefect --resume"
     assert RunRequest(path).resuming == f"aesi run {path} --resume"
