@@ -64,6 +64,17 @@ class Result:
             return judged[0] if judged else names[-1]
         return self.chosen.better.name
 
+    @property
+    def corrected(self) -> str:
+        """The physics that corrections are learnt on, which a saved model holds."""
+        return RECALIBRATED if self.loaded.config.cell.start == "recalibrated" else DECLARED
+
+    @property
+    def kept(self) -> Fitted | None:
+        """`best` where a model folder can hold it: a sparse model, or the physics by itself; its bands go with it."""
+        one = next(fitted for fitted in self.fitted if fitted.model.name == self.best)
+        return one if isinstance(one.model, SparseModel) or self.best == self.corrected else None
+
 
 def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     """Write everything below `folder`; returns the content of summary.json."""
@@ -97,7 +108,9 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
 def notes(result: Result) -> tuple[str, ...]:
     """What a reader should know: of the data, of terms left out, of intervals that could not be calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
-    return together((*result.loaded.notes, *result.problem.notes, *without_intervals))
+    alone = f"The saved model is the {result.corrected} alone, without bands: {result.best} cannot be kept with it."
+    told = () if result.kept else (alone,)
+    return together((*result.loaded.notes, *result.problem.notes, *without_intervals, *told))
 
 
 def published_by(model: ModelName) -> Callable[[str], str]:
@@ -115,14 +128,14 @@ def _published_trace(trace: RecordTrace, shown: Callable[[str], str]) -> RecordT
 
 
 def hybrid(result: Result) -> HybridModel:
-    """The product: physics, effects, the chosen ensemble and its bands."""
-    one = next(fitted for fitted in result.fitted if fitted.model.name == result.best)
+    """The product: physics, effects, the chosen ensemble and its bands; the physics alone where that cannot be kept."""
+    one = result.kept
     return HybridModel(
         cell=result.loaded.cell,
         effects=result.loaded.effects,
-        correction=one.model if isinstance(one.model, SparseModel) else None,
-        intervals=one.intervals,
-        bands=one.bands,
+        correction=one.model if one and isinstance(one.model, SparseModel) else None,
+        intervals=one.intervals if one else None,
+        bands=one.bands if one else None,
         dt_s=result.loaded.config.data.dt_s,
         hold=result.loaded.config.data.hold,
         soc0=next(iter(result.loaded.soc0.values()), None),
@@ -161,7 +174,7 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         mlflow_run_id=result.run_id,
         seconds=result.seconds,
         physics=shown(DECLARED),
-        corrected=shown(RECALIBRATED if result.loaded.config.cell.start == "recalibrated" else DECLARED),
+        corrected=shown(result.corrected),
         fallback=result.loaded.fallback,
     )
 
