@@ -198,10 +198,8 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
 def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:
     """Sentences on where the correction is used, and on what its band holds of the rows that have one."""
     if model.correction is None:
-        said = [
-            "the model carries no learnt correction: one step ahead is the same as a free run, and lower_v and upper_v "
-            "are empty."
-        ]
+        empty = ", and lower_v and upper_v are empty" if prediction.nominal is None else ""
+        said = [f"the model carries no learnt correction: one step ahead is the same as a free run{empty}."]
     else:
         said = [
             f"{record.name}: {_percent(prediction.outside)} of the rows lie outside the range the correction was "

@@ -38,7 +38,7 @@ class HybridModel:
     """Physics + effects + correction + intervals; the last two may be absent.
 
     model : of the physics, "espm" or "dfn".
-    dt_s : s, the step of the correction; records sampled otherwise are brought to it and back.
+    dt_s : s, the step of the correction and of the bands; records sampled otherwise are brought to it and back.
     """
 
     cell: Cell
@@ -177,12 +177,13 @@ class HybridModel:
         return np.concatenate([[False], np.diff(time_s) > MOST_STEP * self.dt_s])
 
     def _even(self, record: Measurement) -> Measurement:
-        """The record at the correction's step, or itself where that is nothing to do."""
-        if self.correction is None or is_even(record.time_s, self.dt_s):
+        """The record at the step of correction and bands, or itself where that is nothing to do."""
+        stepping = self.correction is not None or self.bands is not None
+        if not stepping or is_even(record.time_s, self.dt_s):
             return record
         if len(record) > 1 and record.time_s[-1] - record.time_s[0] < self.dt_s:
             raise DataError(
-                f"{record.name} lasts {record.time_s[-1] - record.time_s[0]:g} s, and the correction steps by "
+                f"{record.name} lasts {record.time_s[-1] - record.time_s[0]:g} s, and the model steps by "
                 f"{self.dt_s:g} s; give a longer one."
             )
         return to_even(record, self.dt_s, self.hold)

@@ -74,6 +74,18 @@ def test_another_sampling_is_brought_to_the_models_own_and_back(model, data):
     assert np.isfinite(prediction.voltage_v).all()
 
 
+def test_the_band_of_physics_alone_counted_rows_of_any_length_as_steps(model, record):
+    _, _, models = fitted(record)
+    bands = next(each.bands for each in models if each.model.name == "ESPM")
+    physics = replace(model, correction=None, intervals=None, bands=bands)
+    time_s, often_s = np.arange(0.0, 61.0), np.linspace(0.0, 60.0, 601)
+    whole, often = (physics.predict(t, np.full(len(t), 20.0), SOC0) for t in (time_s, often_s))
+    np.testing.assert_allclose(
+        (often.upper_v - often.lower_v)[::10], whole.upper_v - whole.lower_v, rtol=0.01
+    )
+    np.testing.assert_allclose(often.voltage_v, often.physics_v, atol=1e-12)
+
+
 def linear_drive(model, dt_s, every_s=1.0, seconds=900.0):
     """Time, current and voltage of the model's own physics on a drive that runs straight between points `every_s`."""
     rng = np.random.default_rng(0)
@@ -293,7 +305,7 @@ def test_a_file_in_the_place_of_a_model_is_not_written_over(model, tmp_path):
 
 
 def test_a_record_shorter_than_a_step_of_the_correction_is_refused(model):
-    with pytest.raises(DataError, match=r"lasts 0.5 s, and the correction steps by 1 s"):
+    with pytest.raises(DataError, match=r"lasts 0.5 s, and the model steps by 1 s"):
         model.predict([0.0, 0.25, 0.5], [0.0, 1.0, 1.0], SOC0)
 
 
@@ -315,3 +327,15 @@ def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
     for above, said in ((1e-12, False), (0.01, True)):
         told = reached(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
         assert any("a state of charge outside 0 to 1" in note for note in told) == said
+
+
+@pytest.mark.parametrize("banded", [True, False])
+def test_the_band_of_physics_alone_was_called_empty(model, record, tmp_path, banded):
+    _, _, models = fitted(record)
+    bands = next(each.bands for each in models if each.model.name == "ESPM") if banded else None
+    said: list[str] = []
+    physics = replace(model, correction=None, intervals=None, bands=bands).save(tmp_path / "model")
+    predict_file(physics, record, tmp_path / "o.csv", say_notes=said.extend)
+    assert pd.read_csv(tmp_path / "o.csv")["lower_v"].notna().all() == banded
+    (told,) = [note for note in said if "no learnt correction" in note]
+    assert told.endswith("lower_v and upper_v are empty.") != banded
