@@ -101,6 +101,7 @@ def _signature(soc0: float) -> ModelSignature:
                 ColSpec("double", "time_s"),
                 ColSpec("double", "current_a"),
                 ColSpec("double", "voltage_v", required=False),
+                ColSpec("double", "temperature_degc", required=False),
             ]
         ),
         outputs=Schema([ColSpec("double", name) for name in ("voltage_v", "lower_v", "upper_v")]),

@@ -1,6 +1,7 @@
 """A saved hybrid model as MLflow serves it. MLflow runs this file to load the model; nothing is pickled.
 
-In: a table with time_s, current_a and, if measured, voltage_v (one step ahead then; free run without it).
+In: a table with time_s, current_a and, if measured, voltage_v (one step ahead then; free run without it) and
+temperature_degc. A column without any value counts as not there; one that lacks some is refused.
 Out: voltage_v, lower_v, upper_v, one row a row. Parameter soc0: state of charge at the first row.
 """
 
@@ -26,14 +27,16 @@ class HybridPyfunc(PythonModel):
         self, context: Any, model_input: pd.DataFrame, params: dict[str, Any] | None = None
     ) -> pd.DataFrame:
         """The voltage with its band."""
-        voltage = None
-        if "voltage_v" in model_input and model_input["voltage_v"].notna().all():
-            voltage = model_input["voltage_v"].to_numpy(float)
+        measured = {
+            name: model_input[name].to_numpy(float)
+            for name in ("voltage_v", "temperature_degc")
+            if name in model_input and model_input[name].notna().any()
+        }
         prediction = self._model.predict(
             model_input["time_s"].to_numpy(float),
             model_input["current_a"].to_numpy(float),
             soc0=(params or {}).get("soc0"),
-            voltage_v=voltage,
+            **measured,
         )
         return prediction.to_frame()[["voltage_v", "lower_v", "upper_v"]]
 
