@@ -38,7 +38,7 @@ from flows.tracking.experiment_log import (
     candidate_metrics,
     coefficients,
 )
-from flows.tracking.store import KIND, PARENT, Store
+from flows.tracking.store import KIND, PARENT, Store, without_login
 
 EXPERIMENT = "experiment.json"
 COMMIT, COMMIT_SHOWN = "mlflow.source.git.commit", 10
@@ -168,7 +168,13 @@ def _candidate(store: Store, run_id: str) -> Any:
             raise InputError(
                 f"run {run_id} has chosen no candidate yet; give the id of one of its candidates."
             )
-        run = store.children(run.info.experiment_id, run.info.run_id)[f"candidate:{number}"]
+        chosen = store.child(run.info.experiment_id, run.info.run_id, f"candidate:{number}")
+        if chosen is None:
+            raise InputError(
+                f"run {run_id} chose candidate {number}, which is not in {without_login(store.uri)}: it was deleted, "
+                "or is not delivered yet, which the next `aesi run` or `aesi tables` does."
+            )
+        run = chosen
     if run.data.tags.get(KIND) != "candidate":
         raise InputError(f"run {run_id} is no candidate of a search, nor the run of an experiment.")
     if "aesi.failed" in run.data.tags:

@@ -158,3 +158,13 @@ def test_a_candidate_on_recalibrated_physics_came_back_with_other_figures(tracke
     )
     np.testing.assert_array_equal(again.voltage_v, ran.voltage_v)
     np.testing.assert_array_equal(again.upper_v, ran.upper_v)
+
+
+def test_a_run_whose_chosen_candidate_is_gone_ended_in_a_traceback(store_alone, tmp_path, call):
+    (run,) = runs_of(store_alone, "run")
+    store, number = Store(store_alone), run.data.params["chosen_candidate"]
+    gone = store.child(run.info.experiment_id, run.info.run_id, f"candidate:{number}")
+    store.client.delete_run(gone.info.run_id)
+    code, _, err = call("candidate", run.info.run_id, "--out", tmp_path / "back", "--uri", store_alone)
+    assert code == 2
+    assert f"chose candidate {number}, which is not in" in err
