@@ -19,6 +19,7 @@ from aesi.records import ROLES, Failed
 from aesi.sparse import Candidate, Genome, Problem, SparseModel
 from flows.base import codec
 from flows.tracking.provenance import versions
+from flows.tracking.store import without_login
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
@@ -26,6 +27,10 @@ CHOSEN = "aesi.chosen"
 INPUTS, RECORDS, LEFT_OUT, DECLARED = "inputs", "records.bin", "left_out.bin", "declared"
 """What a candidate is made from: the error series by role, those of training drives under physics that has not seen
 them, and the declared cell with its effects."""
+NO_PARAMETERS = ("note", "name", "fallback", "discover")
+"""Keys of an experiment that are no settings of the run."""
+ADDRESSES = (("tracking", "uri"), ("runner", "storage"), ("runner", "address"))
+"""Sections and keys of an experiment that hold the address of a server or a database."""
 HEADLINES = ("free_run", "one_step", "intervals")
 """What MLflow's charts show first: it draws a section a prefix, in the order of the alphabet."""
 WITH_UNIT = {
@@ -38,14 +43,15 @@ WITH_UNIT = {
 
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
     """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
-    content = loaded.config.model_dump(mode="json", exclude={"note", "base", "name", "fallback", "discover"})
+    whole = _without_logins(loaded.config.model_dump(mode="json"))
+    content = {key: value for key, value in whole.items() if key not in NO_PARAMETERS}
     tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
     tags = {NOTE: config.note, "aesi.setting": loaded.setting}
     if loaded.fallback:
         tags["aesi.fallback"] = loaded.fallback
     held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name, **held}, tags)
-    tracker.json("experiment.json", loaded.config.model_dump(mode="json"))
+    tracker.json("experiment.json", whole)
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
     write_whole(folder / INPUTS / LEFT_OUT, codec.dumps(loaded.left_out))
     soc0 = next(iter(loaded.soc0.values()), None)
@@ -64,6 +70,14 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
             for series in getattr(loaded.split, role)
         ]
     )
+
+
+def _without_logins(content: dict[str, Any]) -> dict[str, Any]:
+    """The settings of an experiment with the addresses that may hold a password as they may be written."""
+    for section, key in ADDRESSES:
+        given = content[section]
+        content[section] = given | {key: given[key] and without_login(given[key])}
+    return content
 
 
 class CandidateTracker:
