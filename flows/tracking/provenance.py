@@ -21,19 +21,30 @@ def versions() -> str:
 
 @cache
 def source_tags() -> dict[str, str]:
-    """Git commit of the code in use, and whether the tree had changes; empty outside a repository."""
-    root = Path(__file__).resolve().parents[2]
+    """Git commit of the code in use, and whether the tree had changes; no commit where it is of no repository."""
+    return {"mlflow.source.name": "aesi", "mlflow.source.type": "PROJECT"} | commit_tags(Path(__file__))
+
+
+def commit_tags(file: Path) -> dict[str, str]:
+    """The commit of the repository that a file is kept in.
+
+    Packages are installed in folders of others' repositories, whose commits say nothing of them.
+    """
 
     def git(*arguments: str) -> str:
         done = subprocess.run(
-            ["git", "-C", str(root), *arguments], capture_output=True, text=True, timeout=20, check=True
+            ["git", "-C", str(file.resolve().parent), *arguments],
+            capture_output=True,
+            text=True,
+            timeout=20,
+            check=True,
         )
         return done.stdout.strip()
 
-    tags = {"mlflow.source.name": "aesi", "mlflow.source.type": "PROJECT"}
     try:
-        tags["mlflow.source.git.commit"] = git("rev-parse", "HEAD")
-        tags["aesi.dirty"] = str(bool(git("status", "--porcelain", "--untracked-files=no"))).lower()
+        git("ls-files", "--error-unmatch", file.name)
+        commit = git("rev-parse", "HEAD")
+        dirty = bool(git("status", "--porcelain", "--untracked-files=no"))
     except (OSError, subprocess.SubprocessError):
-        tags["aesi.dirty"] = "unknown"
-    return tags
+        return {"aesi.dirty": "unknown"}
+    return {"mlflow.source.git.commit": commit, "aesi.dirty": str(dirty).lower()}
