@@ -1,4 +1,4 @@
-"""Baselines that nothing is fitted for, shown beside every figure: physics without a correction, and persistence."""
+"""The baseline that nothing is fitted for, shown beside every figure: physics without a correction."""
 
 from __future__ import annotations
 
@@ -30,23 +30,3 @@ class Bare:
 
     def _beyond(self, series: ErrorSeries) -> Array:
         return series.error_v - series.left_by(self.name)
-
-
-@dataclass(frozen=True)
-class Persistence:
-    """e[k + 1] = e[k]: the last measured error is held."""
-
-    name: str = "persistence"
-
-    def one_step(self, series: ErrorSeries) -> Array:
-        """(n,) V: the error one sample before; the first is error_v[0]."""
-        return self.k_step(series, 1)
-
-    def free_run(self, series: ErrorSeries, error0_v: float | None = None) -> FreeRun:
-        """The error at the start, held."""
-        start = float(series.error_v[0]) if error0_v is None else error0_v
-        return FreeRun(np.full(len(series), start), None, np.zeros(len(series), dtype=bool))
-
-    def k_step(self, series: ErrorSeries, steps: int) -> Array:
-        """(n,) V: the error `steps` samples before; error_v[0] for the first ones."""
-        return series.error_v[np.maximum(np.arange(len(series)) - steps, 0)]

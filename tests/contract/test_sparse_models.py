@@ -13,9 +13,9 @@ from sparse_records import make_record
 from aesi.records import Split
 from aesi.sparse import Candidate, Genome, Options, Problem, evaluate
 from aesi.sparse.baselines import BASELINES, Tuning
-from aesi.sparse.yardsticks import Bare, Persistence
+from aesi.sparse.yardsticks import Bare
 
-NAMES = ("AESI I", "AESI II", "ESPM", "persistence", *BASELINES)
+NAMES = ("AESI I", "AESI II", "ESPM", *BASELINES)
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,6 @@ def models():
     candidate = evaluate(problem, Genome.whole(problem.library, 1e-2, 1e-3, 0.5, 1, 2, feedback=False))
     assert isinstance(candidate, Candidate)
     found = {"AESI I": candidate.bagging, "AESI II": candidate.stability, "ESPM": Bare()}
-    found["persistence"] = Persistence()
     return found | {name: fit(problem, Tuning(candidates=20)) for name, fit in BASELINES.items()}
 
 

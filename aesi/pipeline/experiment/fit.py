@@ -19,7 +19,7 @@ from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
 from aesi.sparse import ENSEMBLES, Candidate, Options, Problem
 from aesi.sparse.baselines import BASELINES, Judge, Tuning
-from aesi.sparse.yardsticks import Bare, Persistence
+from aesi.sparse.yardsticks import Bare
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +83,6 @@ def _model(name: str, problem: Problem, chosen: Candidate, tuning: Tuning) -> tu
         return ensemble, len(ensemble.terms)
     if name in PHYSICS_NAMES:
         return Bare(name), 0
-    if name == "persistence":
-        return Persistence(), 0
     baseline = BASELINES[name](problem, tuning)
     return baseline, len(getattr(baseline, "terms", ()))
 

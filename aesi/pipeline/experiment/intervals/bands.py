@@ -18,7 +18,7 @@ from aesi.pipeline.experiment.recalibrate import MEMORY_S, MODEL_ERROR_V
 from aesi.pipeline.product.deviations import ENERGIES_J_MOL, KNOBS
 from aesi.records import ErrorModel, ErrorSeries, FreeRun
 from aesi.sparse import SparseModel
-from aesi.sparse.yardsticks import Bare, Persistence
+from aesi.sparse.yardsticks import Bare
 
 Unseen = tuple[ErrorModel, ErrorSeries, slice]
 """A model, a record, and the samples of it that the model was not fitted to."""
@@ -124,7 +124,7 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     does in use, and so does a correction that fades into it: all of their rows count.
     """
     faded = isinstance(model, SparseModel) and model.fade is not None
-    if faded or isinstance(model, Bare | Persistence):
+    if faded or isinstance(model, Bare):
         return np.ones(len(series), dtype=bool)
     seen = [
         record.inputs[_others(len(record), rows)] if record.name == series.name else record.inputs

@@ -20,7 +20,7 @@ from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors, U
 from aesi.records import LeftOutDrives
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.search.fold_models import fold_models, with_leverage
-from aesi.sparse.yardsticks import Bare, Persistence
+from aesi.sparse.yardsticks import Bare
 
 
 def conformalise(
@@ -54,7 +54,7 @@ def _conformalised(
         if left_out.drives and problem.folds_are_drives:
             drives += fold_models(problem, chosen, one.model, left_out.drives, problem.spans)
         one = replace(one, model=with_leverage(one.model, problem, chosen.ridge))
-    elif isinstance(one.model, Bare | Persistence):
+    elif isinstance(one.model, Bare):
         pairs += [(one.model, each.series, each.rows) for each in left_out.parts]
         drives += [(one.model, each.series, each.rows) for each in left_out.drives]
         if not left_out.parts:
