@@ -1,7 +1,7 @@
 """Candidates on Dask: a cluster of processes on this machine, or the scheduler at an address.
 
 A worker that is lost in mid-candidate gives it back to the scheduler, which hands it to another. Each worker
-builds the problem once, from the experiment, and keeps it.
+builds the problem of a study once, from the experiment, and keeps it.
 """
 
 from __future__ import annotations
@@ -100,10 +100,19 @@ class DaskPool:
     """See `flows.evaluation.pool.Pool`.
 
     content, base : the experiment as JSON, and the folder its paths start from (which the workers must see).
+    study : content key of the study: a worker that lives on builds its problem again where the files are others.
     """
 
-    def __init__(self, content: str, base: str, address: str | None, workers: int, timeout_s: float) -> None:
-        self._content, self._base, self._timeout_s = content, base, timeout_s
+    def __init__(
+        self,
+        content: str,
+        base: str,
+        address: str | None,
+        workers: int,
+        timeout_s: float,
+        study: str = "",
+    ) -> None:
+        self._recipe, self._timeout_s = (content, base, study), timeout_s
         self._client, self._cluster = connect(address, workers)
         self._futures: dict[Any, tuple[Any, float]] = {}
         self._finished: Queue[Any] = Queue()
@@ -120,7 +129,7 @@ class DaskPool:
     def start(self, tag: Any, genome: Any) -> None:
         """Hand a genome to the scheduler."""
         data = codec.dumps(genome)
-        future = self._client.submit(evaluate_bytes, self._content, self._base, data, pure=False)
+        future = self._client.submit(evaluate_bytes, *self._recipe, data, pure=False)
         self._futures[future.key] = (tag, time.monotonic())
         future.add_done_callback(self._finished.put)
 
@@ -167,13 +176,13 @@ class DaskPool:
         return found
 
 
-def evaluate_bytes(content: str, base: str, genome: bytes) -> bytes:
+def evaluate_bytes(content: str, base: str, study: str, genome: bytes) -> bytes:
     """What runs on a worker: genome in, outcome out, both without pickle."""
-    return codec.dumps(guarded(_scorer(content, base), codec.loads(genome)))
+    return codec.dumps(guarded(_scorer(content, base, study), codec.loads(genome)))
 
 
 @lru_cache(maxsize=1)
-def _scorer(content: str, base: str) -> Any:
+def _scorer(content: str, base: str, study: str) -> Any:
     return build_scorer(content, base)
 
 

@@ -14,14 +14,15 @@ from flows.evaluation.pool import Pool
 from flows.evaluation.scorer_recipe import build_scorer
 
 
-def open_pool(problem: Problem, config: ExperimentConfig) -> Pool:
-    """Who evaluates the candidates of the experiment."""
+def open_pool(problem: Problem, config: ExperimentConfig, study: str) -> Pool:
+    """Who evaluates the candidates of the experiment; study : its content key."""
     content = config.model_dump_json()
     search = config.search
     if config.runner.kind == "dask":
         from flows.evaluation.dask_pool import DaskPool
 
-        return DaskPool(content, str(config.base), config.runner.address, search.workers, search.timeout_s)
+        where, workers = config.runner.address, search.workers
+        return DaskPool(content, str(config.base), where, workers, search.timeout_s, study)
     build = _Builder(partial(scorer, problem, config), partial(build_scorer, content, str(config.base)))
     return LocalPool(build, search.workers, search.timeout_s, search.memory_mb)
 

@@ -90,9 +90,10 @@ def run_study(
     Raises FitError, with the reasons counted, where no candidate is feasible.
     """
     outcomes = shared_outcomes(config)
-    pool = open_pool(problem, config)
+    study = study_key(problem, config)
+    pool = open_pool(problem, config, study)
     tally = tally or Tally()
-    evaluation = Evaluation(pool, outcomes, study_key(problem, config), console.say, tally, reuse, lost_again)
+    evaluation = Evaluation(pool, outcomes, study, console.say, tally, reuse, lost_again)
     scored: dict[int, ScoredCandidate | Failed] = {}
     waiting: dict[Genome, list[ScoredCandidate | Failed]] = {}
     started = time.monotonic()

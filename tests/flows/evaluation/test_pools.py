@@ -151,3 +151,23 @@ def test_without_dask_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install 'dask\[distributed\]'"):
         DaskPool("{}", "", None, workers=1, timeout_s=1.0)
+
+
+def test_a_worker_that_lives_on_evaluated_on_the_data_of_an_earlier_study(monkeypatch):
+    from flows.base import codec
+    from flows.evaluation import dask_pool
+
+    built = []
+
+    def build(content, base):
+        built.append(content)
+        return lambda genome: [len(built), genome]
+
+    monkeypatch.setattr(dask_pool, "build_scorer", build)
+    dask_pool._scorer.cache_clear()
+    genome = codec.dumps("x")
+    outcomes = [
+        codec.loads(dask_pool.evaluate_bytes("{}", "", study, genome)) for study in ("one", "one", "another")
+    ]
+    dask_pool._scorer.cache_clear()
+    assert outcomes == [[1, "x"], [1, "x"], [2, "x"]]
