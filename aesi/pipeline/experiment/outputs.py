@@ -158,7 +158,10 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result)),
         bootstrap=BootstrapView(
-            n=counts.shape[1], block=result.problem.block, unique_fraction=(counts > 0).mean(axis=1)
+            n=counts.shape[1],
+            block=result.problem.block,
+            unique_fraction=(counts > 0).mean(axis=1),
+            lengths=tuple(b - a for a, b in result.problem.spans),
         ),
         settings={
             "lambda1": f"{genome.lambda1:.3g}",

@@ -142,12 +142,23 @@ def test_expected_coverage_of_the_bootstrap_matches_a_simulation():
         for start in rng.integers(0, n - block + 1, -(-n // block)):
             hit[start : start + block] = True
         shares.append(hit.mean())
-    expected = ensemble.expected_unique_fraction(n, block)
+    expected = ensemble.expected_unique_fraction([n], block)
     assert abs(np.mean(shares) - expected) < 4 * np.std(shares) / np.sqrt(resamples)
 
 
 def test_the_bootstrap_of_single_samples_is_the_classic_one():
-    assert ensemble.expected_unique_fraction(10_000, 1) == pytest.approx(1 - np.exp(-1), abs=1e-4)
+    assert ensemble.expected_unique_fraction([10_000], 1) == pytest.approx(1 - np.exp(-1), abs=1e-4)
+
+
+@pytest.mark.parametrize(("lengths", "block"), [((300,) * 6, 60), ((300, 50, 900), 60)])
+def test_the_bootstrap_of_several_records_was_expected_to_be_that_of_one(lengths, block):
+    from aesi.numerics.blocks import coverage, moving_block_weights
+    from aesi.sparse.search.rows import spans_of
+
+    drawn = coverage(moving_block_weights(spans_of(lengths), block, 400, np.random.default_rng(0)))
+    fig = ensemble.bootstrap_figure(BootstrapView(sum(lengths), block, drawn, lengths))
+    expected = float(fig.layout.meta["caption"].rpartition("(dashed) ")[2].removesuffix(" %."))
+    assert expected == pytest.approx(100.0 * drawn.mean(), abs=1.0)
 
 
 def test_the_caption_of_the_bootstrap_states_mean_and_expectation():

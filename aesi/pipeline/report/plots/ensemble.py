@@ -136,7 +136,7 @@ def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
 def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
     """Share of distinct samples in every resample of the moving block bootstrap."""
     share = 100 * np.sort(bootstrap.unique_fraction)
-    expected = 100 * expected_unique_fraction(bootstrap.n, bootstrap.block)
+    expected = 100 * expected_unique_fraction(bootstrap.lengths or (bootstrap.n,), bootstrap.block)
     caption = (
         f"Share of distinct samples in each of {len(share)} resamples of {bootstrap.n:,} samples in blocks "
         f"of {bootstrap.block}; mean (full line) {share.mean():.1f} %, expected (dashed) {expected:.1f} %."
@@ -156,15 +156,21 @@ def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
     return fig
 
 
-def expected_unique_fraction(n: int, block: int) -> float:
-    """Expected share of distinct samples in one resample: ceil(n / B) blocks, starts uniform on 0 ... n - B.
+def expected_unique_fraction(lengths: Sequence[int], block: int) -> float:
+    """Expected share of distinct samples in one resample of records of these lengths: as many blocks as have the
+    samples of all, starts uniform on 0 ... n - B of each record, or its first sample where none fits.
 
     A sample near an edge lies in fewer blocks, so the mean runs over all samples.
     """
-    starts = n - block + 1
-    position = np.arange(n)
-    holding = np.minimum.reduce([position + 1, np.full(n, block), np.full(n, starts), n - position])
-    return float(np.mean(1 - (1 - holding / starts) ** -(-n // block)))
+    starts = np.array([max(1, n - block + 1) for n in lengths])
+    blocks = np.ceil(sum(lengths) * starts.sum() / (starts @ np.minimum(lengths, block)))
+    holding = np.concatenate(
+        [
+            np.minimum(np.minimum(np.arange(1, n + 1), np.arange(n, 0, -1)), min(block, here))
+            for n, here in zip(lengths, starts, strict=True)
+        ]
+    )
+    return float(np.mean(1 - (1 - holding / starts.sum()) ** blocks))
 
 
 def _bars(rows: Sequence[Row], values: Sequence[float], title: str, caption: str, axis: str) -> Figure:
