@@ -15,10 +15,4 @@ def side_by_side(do: Callable[[Given], Made], items: Iterable[Given]) -> Iterato
     """`do` of each, in the order given, so that what is made of it does not depend on how many threads there are. What
     has not begun is left undone where the caller takes no more."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        futures = [pool.submit(do, item) for item in items]
-        try:
-            for future in futures:
-                yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+        yield from pool.map(do, items)
