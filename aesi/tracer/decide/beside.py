@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from aesi.errors import DataError
 from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
@@ -35,10 +34,6 @@ def gathered_beside(
     """
     beside = replace(problem, trust="beside")
     path = searched(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
-    if path is None:
-        raise DataError(
-            f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
-        )
     verdict = with_confidence(judged_beside(path, thresholds))
     recalibrated = ModelState.of(beside, path.base)
     after = ModelState.of(beside, path.chosen) if verdict.effects else recalibrated

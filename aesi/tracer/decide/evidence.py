@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.errors import DataError
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
@@ -58,20 +57,17 @@ class Evidence:
 def gathered(
     problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
 ) -> Evidence:
-    """Search, judge, and check what carries over."""
+    """Search, judge, and check what carries over.
+
+    Raises DataError where the model cannot be simulated on the records.
+    """
     paths: dict[Trust, Path] = {}
 
     def path_of(trust: Trust) -> Path:
         if trust not in paths:
             most = min(max_effects, MOST_EFFECTS.get(trust, max_effects))
             allowed_v = np.inf if trust in MOST_EFFECTS else tolerance_v(problem, thresholds)
-            found = searched(replace(problem, trust=trust), most, archive, report, allowed_v)
-            if found is None:
-                raise DataError(
-                    f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the "
-                    "cell file."
-                )
-            paths[trust] = found
+            paths[trust] = searched(replace(problem, trust=trust), most, archive, report, allowed_v)
         return paths[trust]
 
     path = path_of("tight")

@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
@@ -44,23 +45,25 @@ def searched(
     archive: Archive,
     report: Report = lambda problem, one, gain: None,
     allowed_v: float = np.inf,
-) -> Path | None:
+) -> Path:
     """Grow from the bare model until nothing more is admitted, at most `max_effects` effects.
 
     allowed_v : V beyond noise that a right one may leave; where all effects together leave far more, none is fitted.
+    Raises DataError where the bare model cannot be simulated on the records.
     """
     blocks = blocks_of(problem)
     base = base_of(problem, blocks, archive)
     if base is None:
-        return None
+        raise DataError(
+            f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
+        )
     steps: list[Step] = []
     notes: list[str] = []
     parents, chosen = [base], base
     slopes: dict[str, Array] = {}
     first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
-    if len(first) > FINALISTS and np.isfinite(
-        allowed_v
-    ):  # fewer are fitted in the time that looking would spare
+    # Fewer effects than that are fitted in the time that looking would spare.
+    if len(first) > FINALISTS and np.isfinite(allowed_v):
         least_v, first = within_reach(problem, base, first, REACH * allowed_v, archive)
         if least_v > REACH * allowed_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
