@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -54,6 +54,29 @@ class Evidence:
     limits: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class _Searches:
+    """How a case is searched, and what was searched so far.
+
+    paths : by trust in the declared parameters, each searched where it is first asked for.
+    """
+
+    max_effects: int
+    archive: Archive
+    thresholds: Thresholds
+    report: Report
+    paths: dict[Trust, Path] = field(default_factory=dict)
+
+    def at(self, problem: InverseProblem, trust: Trust) -> Path:
+        """The search at one trust.  Raises DataError where the model cannot be simulated on the records."""
+        if trust not in self.paths:
+            most = min(self.max_effects, MOST_EFFECTS.get(trust, self.max_effects))
+            allowed_v = np.inf if trust in MOST_EFFECTS else tolerance_v(problem, self.thresholds)
+            trusted = replace(problem, trust=trust)
+            self.paths[trust] = searched(trusted, most, self.archive, self.report, allowed_v)
+        return self.paths[trust]
+
+
 def gathered(
     problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
 ) -> Evidence:
@@ -61,19 +84,23 @@ def gathered(
 
     Raises DataError where the model cannot be simulated on the records.
     """
-    paths: dict[Trust, Path] = {}
+    searches = _Searches(max_effects, archive, thresholds, report)
+    path, verdict = _best_explanation(problem, searches)
+    if verdict.word == "unknown":
+        ages = of_several_ages(problem, archive)
+        return _unexplained(replace(problem, ages=ages), path, verdict, searches)
+    recalibrations = _recalibrations(problem, searches.paths["tight"], archive)
+    return _adopted(path, searches.paths, with_confidence(verdict), _recalibrated(problem, recalibrations))
 
-    def path_of(trust: Trust) -> Path:
-        if trust not in paths:
-            most = min(max_effects, MOST_EFFECTS.get(trust, max_effects))
-            allowed_v = np.inf if trust in MOST_EFFECTS else tolerance_v(problem, thresholds)
-            paths[trust] = searched(replace(problem, trust=trust), most, archive, report, allowed_v)
-        return paths[trust]
 
-    path = path_of("tight")
+def _best_explanation(problem: InverseProblem, searches: _Searches) -> tuple[Path, Verdict]:
+    """The search that is believed of those at the trusts `tight` and `exact`, and the verdict on it: `unknown` where
+    none of them explains the data."""
+    archive, thresholds = searches.archive, searches.thresholds
+    path = searches.at(problem, "tight")
     verdict = judged(path, thresholds)
     if verdict.word != "unknown":
-        wrong = with_wrong_parameters(path, max_effects, archive)
+        wrong = with_wrong_parameters(path, searches.max_effects, archive)
         if wrong is not path:
             path, verdict = wrong, judged(wrong, thresholds)
     if verdict.word == "found":
@@ -81,31 +108,36 @@ def gathered(
     if verdict.word != "unknown":
         path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
     if verdict.word == "none" and path.problem.trust == "tight":  # own parameters may hide an effect
-        exact = path_of("exact")
+        exact = searches.at(problem, "exact")
         found = exact, judged(exact, thresholds)
         if believed((path, verdict), found):
             path, verdict = found
-    verdict = consistent(path, verdict)
-    if verdict.word == "unknown":
-        problem = replace(problem, ages=of_several_ages(problem, archive))
-    recalibrations = _recalibrations(problem, paths["tight"], archive)
-    recalibrated = _recalibrated(problem, recalibrations)
-    if verdict.word != "unknown":
-        return _adopted(path, paths, with_confidence(verdict), recalibrated)
-    measured, blocks = path_of("measured"), path.blocks
+    return path, consistent(path, verdict)
+
+
+def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches: _Searches) -> Evidence:
+    """Where nothing explains the data: what the coarsened search names beside `unknown`, and the model that carries
+    best.
+
+    path, verdict : the search that is believed, and `unknown`.
+    """
+    archive, tight = searches.archive, searches.paths["tight"]
+    recalibrations = _recalibrations(problem, tight, archive)
+    measured, blocks = searches.at(problem, "measured"), path.blocks
     lasting = _by_what_lasts(problem, measured, archive)
     options = [*recalibrations, Option.of(lasting.problem, blocks, lasting.base)]
     if path.beyond_reach_v is not None and len(problem.records) > 1:
-        options += _with_stand_ins(path_of("loose"), blocks)
+        options += _with_stand_ins(searches.at(problem, "loose"), blocks)
     named: list[Option] = []
     if path.beyond_reach_v is not None:
         path = measured  # the only one that tried anything
     if measured.chosen.hypothesis:
-        path, verdict = measured, partly(measured, verdict, thresholds)
-        named = named_options(lasting, paths["tight"], blocks, archive)
+        path, verdict = measured, partly(measured, verdict, searches.thresholds)
+        named = named_options(lasting, tight, blocks, archive)
     after, why = written(Option.of(problem, blocks, None), options, named)
     limits = (*stand_ins(after, verdict.effects), *limits_of(after)) if after.hypothesis else ()
-    return Evidence(path, paths, recalibrated, after, with_confidence(verdict), why, limits)
+    recalibrated = _recalibrated(problem, recalibrations)
+    return Evidence(path, searches.paths, recalibrated, after, with_confidence(verdict), why, limits)
 
 
 def of_several_ages(problem: InverseProblem, archive: Archive) -> bool:
