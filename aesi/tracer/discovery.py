@@ -17,6 +17,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
+from aesi.tracer.case.free_parameter import by_owner
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import gathered_beside
@@ -203,13 +204,11 @@ class _Spent:
         self.simulations += one.simulations
         if self.progress is None:
             return
-        values: dict[str, dict[str, float]] = {}
-        for (owner, name), value in one.placed.items():
-            values.setdefault(owner, {})[name] = value
         left = one.point.residual_v - one.point.jacobian_v @ one.score.shift
         rmse_v = float(np.sqrt(np.mean(left**2)))
+        values = by_owner(one.placed)
         tried = TriedHypothesis(
-            tuple(one.hypothesis), problem.trust, gain, rmse_v, one.score.delta_v, values, one.simulations
+            one.hypothesis, problem.trust, gain, rmse_v, one.score.delta_v, values, one.simulations
         )
         self.progress(tried)
 

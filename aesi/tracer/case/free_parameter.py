@@ -197,9 +197,14 @@ def capacity_share(record: int, sd: float) -> FreeParameter:
 
 def values_of(free: Sequence[FreeParameter], x: Array) -> dict[str, dict[str, float]]:
     """owner -> name -> value of the coordinates (n_free,)."""
+    return by_owner({one.key: one.value(float(v)) for one, v in zip(free, x, strict=True)})
+
+
+def by_owner(placed: Mapping[tuple[str, str], float]) -> dict[str, dict[str, float]]:
+    """owner -> name -> value, of values by (owner, name)."""
     out: dict[str, dict[str, float]] = {}
-    for one, coordinate in zip(free, x, strict=True):
-        out.setdefault(one.owner, {})[one.name] = one.value(float(coordinate))
+    for (owner, name), value in placed.items():
+        out.setdefault(owner, {})[name] = value
     return out
 
 

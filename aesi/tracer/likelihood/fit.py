@@ -146,11 +146,8 @@ class HypothesisFitter:
             return None
         off_v = off_within_seconds(self.problem, self.blocks, self.hypothesis)
         point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]), off_v)
-        return FittedHypothesis(self.hypothesis, self.free, point, self.scored(point), self.simulations)
-
-    def scored(self, point: Linearised) -> PredictiveScore:
-        """The predictive score, over sizes of the model error."""
-        return scored(self.problem, self.blocks, point)
+        score = scored(self.problem, self.blocks, point)
+        return FittedHypothesis(self.hypothesis, self.free, point, score, self.simulations)
 
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:

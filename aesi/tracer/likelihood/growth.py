@@ -17,7 +17,14 @@ import numpy as np
 from aesi.numerics.bounded import descend, foreseen_cost
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.free_parameter import FURTHEST_SDS, FreeParameter, of_effect, starts, values_of
+from aesi.tracer.case.free_parameter import (
+    FURTHEST_SDS,
+    FreeParameter,
+    by_owner,
+    of_effect,
+    starts,
+    values_of,
+)
 from aesi.tracer.case.problem import STEP, InverseProblem, ValuesByOwner
 from aesi.tracer.likelihood.fit import GAIN_NATS, FittedHypothesis
 from aesi.tracer.likelihood.gaussian import (
@@ -84,6 +91,11 @@ class Grown:
         x = self.point.x + self.score.shift
         moved = {f.key: f.value(float(v)) for f, v in zip(self.free, x, strict=True)}
         return {**self.on_bounds, **moved}
+
+    @property
+    def values(self) -> dict[str, dict[str, float]]:
+        """owner -> name -> value, with what the parent has on a hard bound."""
+        return by_owner({**self.held, **self.placed})
 
 
 class EffectGrowth:
@@ -289,13 +301,3 @@ def _scored(growth: EffectGrowth, u: Array, e: Array, jacobian: Array) -> Grown:
 
 Explanation = FittedHypothesis | Grown
 """A hypothesis as it was tried: fitted with the whole model, or to first order but for its last effect."""
-
-
-def linear_values(one: Explanation) -> dict[str, dict[str, float]]:
-    """owner -> name -> value, where all data put them."""
-    if isinstance(one, FittedHypothesis):
-        return one.values
-    out: dict[str, dict[str, float]] = {}
-    for (owner, name), value in {**one.held, **one.placed}.items():
-        out.setdefault(owner, {})[name] = value
-    return out

@@ -15,7 +15,7 @@ from aesi.records import Run
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
 from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, share_of
 from aesi.tracer.case.records import PreparedRecord
-from aesi.tracer.likelihood.growth import Explanation, linear_values
+from aesi.tracer.likelihood.growth import Explanation
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class ModelState:
     @classmethod
     def of(cls, problem: InverseProblem, one: Explanation) -> ModelState:
         """Where a fit ended."""
-        return cls(problem, linear_values(one), tuple(one.hypothesis))
+        return cls(problem, one.values, one.hypothesis)
 
     def effects(self, good: bool = False) -> tuple[ActiveEffect, ...]:
         """What is simulated on top of the declared cell.  good : of a record that is known to be good."""

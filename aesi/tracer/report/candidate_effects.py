@@ -68,7 +68,7 @@ def ranking(
                 path.gain(best),
                 test_rmse_v(best),
                 estimates(path, best, effect.id),
-                tuple(best.hypothesis),
+                best.hypothesis,
                 remark,
             )
         )
