@@ -18,6 +18,11 @@ def rmse(truth: Array, prediction: Array) -> float:
     return float(np.sqrt(mse(truth, prediction)))
 
 
+def rms(values: Array) -> float:
+    """Root mean square of values of any shape, in their own unit."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
 def mser(error: Array, prediction: Array) -> float:
     """Reduction of the mean squared error in percent, the paper's equation (27).
 

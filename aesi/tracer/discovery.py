@@ -10,6 +10,7 @@ from pathlib import Path as FilePath
 import numpy as np
 
 from aesi.errors import AesiError, DataError
+from aesi.numerics.metrics import rms
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
@@ -205,10 +206,9 @@ class _Spent:
         if self.progress is None:
             return
         left = one.point.residual_v - one.point.jacobian_v @ one.score.shift
-        rmse_v = float(np.sqrt(np.mean(left**2)))
         values = by_owner(one.placed)
         tried = TriedHypothesis(
-            one.hypothesis, problem.trust, gain, rmse_v, one.score.delta_v, values, one.simulations
+            one.hypothesis, problem.trust, gain, rms(left), one.score.delta_v, values, one.simulations
         )
         self.progress(tried)
 

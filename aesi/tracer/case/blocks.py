@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray, IntArray
 from aesi.tracer.case.problem import InverseProblem
 
@@ -116,7 +117,7 @@ def blocks_of(problem: InverseProblem) -> Blocks:
     bounds = np.array([*starts, total])
     rows_of = _slices(bounds)
     current = np.concatenate([m.current_a for m in problem.seen])
-    rate = np.array([np.sqrt(np.mean(current[r] ** 2)) for r in rows_of])
+    rate = np.array([rms(current[r]) for r in rows_of])
     charge = np.array([np.mean(problem.declared_soc[r]) for r in rows_of])
     folds: dict[str, tuple[tuple[int, ...], ...]] = {"block": tuple((b,) for b in range(len(record)))}
     if len(problem.records) > 1:

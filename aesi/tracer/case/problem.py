@@ -11,6 +11,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.parameters import Parameter
 from aesi.physics.cell import Cell
@@ -241,7 +242,7 @@ class InverseProblem:
     @cached_property
     def noise_v(self) -> float:
         """Root mean square of the white noise of the fitted rows, V."""
-        return float(np.sqrt(np.mean(self.white_v**2)))
+        return rms(self.white_v)
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
@@ -82,7 +83,7 @@ class PreparedRecord:
     @property
     def noise_v(self) -> float:
         """Root mean square of the white noise of the rows that fits see, V."""
-        return float(np.sqrt(np.mean(self.white_v[: self.n_fit] ** 2)))
+        return rms(self.white_v[: self.n_fit])
 
     @property
     def lead_rows_thin(self) -> int:

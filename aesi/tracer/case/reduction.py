@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.numerics.metrics import rms
 from aesi.physics.simulation import ModelName
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
 from aesi.tracer.case.problem import InverseProblem, ValuesByOwner
@@ -30,7 +31,7 @@ def with_fine_numerics(problem: InverseProblem) -> InverseProblem:
     for record, data in zip(problem.records, problem.seen, strict=True):
         coarse = problem.run(data, record.soc0, problem.fixed, record.thin_hold).voltage_v
         moved.append(problem.run(data, record.soc0, effects, record.thin_hold).voltage_v - coarse)
-    shift = float(np.sqrt(np.mean(np.concatenate(moved) ** 2)))
+    shift = rms(np.concatenate(moved))
     if shift > NOTABLE_SHARE * problem.noise_v:
         return replace(problem, fixed=effects)
     return let_stand(problem, shift)
@@ -80,5 +81,5 @@ def reduction_of(problem: InverseProblem, values: ValuesByOwner | None = None) -
     )
     if reduced_v is None or full_v is None:
         return None
-    shift_v = float(np.sqrt(np.mean((full_v - reduced_v) ** 2)))
+    shift_v = rms(full_v - reduced_v)
     return Reduction(shift_v, problem.noise_v, "the declared cell" if values is None else "what was found")

@@ -11,6 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
@@ -68,8 +69,7 @@ def judged_beside(path: Path, thresholds: Thresholds) -> Verdict:
 
 def left_v(path: Path, one: FittedHypothesis, rows: BoolArray) -> float:
     """What a hypothesis leaves beyond noise of some rows, in blocks that it has not seen, V RMS."""
-    rmse_v = float(np.sqrt(np.mean(held_out_residual(path.blocks, one)[rows] ** 2)))
-    return beyond(rmse_v, path.problem.noise_v)
+    return beyond(rms(held_out_residual(path.blocks, one)[rows]), path.problem.noise_v)
 
 
 def _relative_sd(problem: InverseProblem, good: BoolArray) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
@@ -47,7 +48,7 @@ class LeftOut:
     @property
     def pooled_v(self) -> float:
         """Root mean square over the records, V."""
-        return float(np.sqrt(np.mean(np.square(self.by_record))))
+        return rms(np.array(self.by_record))
 
     def harms(self, other: LeftOut) -> bool:
         """Is the model worse than another one in a range of charge, by more than models of measured cells err by and
@@ -66,9 +67,9 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
     for k, fold in enumerate(folds):
         out = np.isin(blocks.of_row, fold)
         residual = _left_out_residual(problem, blocks, one, k, fold)
-        by_record.append(_rms(residual))
+        by_record.append(rms(residual))
         told = tells[out] * residual
-        by_range += [_rms(told[charge[out]]) for charge in charges if charge[out].any()]
+        by_range += [rms(told[charge[out]]) for charge in charges if charge[out].any()]
     return LeftOut(tuple(by_record), tuple(by_range))
 
 
@@ -82,10 +83,6 @@ def _tells(problem: InverseProblem) -> Array:
     if len(problem.records) == 1:
         return np.ones(len(problem.measured))
     return np.asarray(MEASURED_V**2 / (MEASURED_V**2 + problem.start_slope_v**2))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _left_out_residual(

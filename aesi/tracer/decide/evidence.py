@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from aesi.numerics.metrics import rms
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem, Trust
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
@@ -266,7 +267,7 @@ def _recalibrations(problem: InverseProblem, tight: Path, archive: Archive) -> l
         (record.thin.voltage_v - declared.simulated(record, k, thin=True).voltage_v)[: record.n_fit]
         for k, record in enumerate(problem.records)
     ]
-    most = float(np.sqrt(np.mean(np.concatenate(errors) ** 2)))
+    most = rms(np.concatenate(errors))
     fits = [(tight.problem, tight.base), *([] if wide is None else [(loose, wide)])]
     return [Option.of(one, tight.blocks, fit) for one, fit in fits if fit.rmse_v <= most]
 

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from aesi.numerics.bounded import descend
+from aesi.numerics.metrics import rms
 from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array, BoolArray
 from aesi.tracer.case.blocks import Blocks
@@ -57,7 +58,7 @@ class FittedHypothesis:
     @property
     def rmse_v(self) -> float:
         """Root mean square of the residual on what was seen, V."""
-        return float(np.sqrt(np.mean(self.point.residual_v**2)))
+        return rms(self.point.residual_v)
 
     @property
     def at_bounds(self) -> tuple[str, ...]:

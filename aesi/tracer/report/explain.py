@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.records import Run
 
@@ -28,7 +29,7 @@ SATURATION = 0.5
 def features(run: Run) -> dict[str, Array]:
     """Family -> (n, k) columns of one record: what a residual may depend on."""
     t, current = run.time_s, run.current_a
-    scale = float(np.sqrt(np.mean(current**2))) + 1e-12
+    scale = rms(current) + 1e-12
     i = current / scale
     soc = run.series["soc"]
     z = 2.0 * (soc - soc.min()) / max(np.ptp(soc), 1e-6) - 1.0

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.depletion import ran_out
 from aesi.records import Run
@@ -42,7 +43,7 @@ class Errors:
     def of(cls, residual_v: Array) -> Errors:
         """From residuals (n,) V."""
         size = np.abs(residual_v)
-        return cls(float(np.sqrt(np.mean(size**2))), float(size.mean()), float(size.max()))
+        return cls(rms(size), float(size.mean()), float(size.max()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from aesi.constants import MV_PER_V
+from aesi.numerics.metrics import rms
 from aesi.tracer.decide.verdict import Verdict, beyond
 from aesi.tracer.decide.written import AS_GOOD
 from aesi.tracer.report.outcome import NAMES, FileOutcome, State
@@ -22,8 +23,8 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
     if verdict.word == "unknown" or not tests:
         return None
     noise_v = np.repeat([f.noise_v for f in tests], [len(f.time_s) for f in tests])
-    left_v = float(np.sqrt(np.mean(np.concatenate([f.beyond_start_v() for f in tests]) ** 2)))
-    over_v = beyond(left_v, float(np.sqrt(np.mean(noise_v**2))))
+    left_v = rms(np.concatenate([f.beyond_start_v() for f in tests]))
+    over_v = beyond(left_v, rms(noise_v))
     return over_v if over_v > verdict.tolerance_v else None
 
 
@@ -64,8 +65,6 @@ def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:
 
 def _left_mv(tests: Sequence[FileOutcome], state: State) -> float:
     """To the hundredth of a mV that is shown; 0 where there is no test part."""
-    return round(MV_PER_V * _left_v(tests, state), 2) if tests else 0.0
-
-
-def _left_v(files: Sequence[FileOutcome], state: State) -> float:
-    return float(np.sqrt(np.mean(np.concatenate([f.residual_v(state) for f in files]) ** 2)))
+    if not tests:
+        return 0.0
+    return round(MV_PER_V * rms(np.concatenate([f.residual_v(state) for f in tests])), 2)

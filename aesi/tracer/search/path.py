@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from aesi.numerics.metrics import rms
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.reduction import LEAST_V
@@ -79,7 +80,7 @@ Report = Callable[[InverseProblem, Explanation, float], None]
 
 def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
     """Root mean square of the residual on blocks that were left out, V."""
-    return float(np.sqrt(np.mean(held_out_residual(blocks, one)[blocks.compared] ** 2)))
+    return rms(held_out_residual(blocks, one)[blocks.compared])
 
 
 def lowers_error(before_v: float, after_v: float) -> bool:
