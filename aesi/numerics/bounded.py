@@ -32,10 +32,12 @@ class Residual(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Minimum:
-    """Where a descent ended: x (n,), half the sum of squares there, how often slopes were taken, and whether it ended
-    because nothing was left to gain.
+    """Where a descent ended.
 
-    known_x : (n,) as good within the tolerance, and slopes were taken there; x where it did not converge.
+    x : (n,) the best place.  cost : half the sum of squares there.  rounds : how often slopes were taken.
+    converged : whether it ended because nothing was left to gain.
+    known_x : (n,) the last place where slopes were taken, of a cost less than the tolerance above that at x, for those
+    who need slopes where a descent ended; x where it did not converge.
     """
 
     x: Array

@@ -39,8 +39,13 @@ from aesi.tracer.search.archive import Archive, context_of
 
 @dataclass(frozen=True, eq=False)
 class TriedHypothesis:
-    """One hypothesis as it was tried: its effects, what it says of unseen data more than its parent (nats), what it
-    leaves of what was fitted (V), its parameters by effect, and the simulations spent."""
+    """One hypothesis as it was tried.
+
+    effects : ids, in the order in which they were added.  trust : in the declared parameters, see `case.problem.Trust`.
+    gain_nats : what it says more of unseen data than its parent.  rmse_v : what it leaves of what was fitted.
+    delta_v : size of the model error at which it says most.  values : owner -> name -> value of what it moved.
+    simulations : spent on it.
+    """
 
     effects: tuple[str, ...]
     trust: str
@@ -72,17 +77,24 @@ class Left:
 class Discovery:
     """The outcome of one case.
 
-    model_effects : what `after` simulates with: the effects found, and the tolerated parameters where they
-    settled.
-    written : the effects that `after` has beside the declared model, by id with their parameters; not those of the
-    verdict where these do not carry over.
-    own : of the recalibrated model and of `after`, the declared parameters that were open, and where they ended.
-    soc0, hold : of the first record, fitted.  effects : by id, all that may be tried or moved.  tried : ids of those
-    that competed, none where none may be added.  files : errors by file and part.
-    before, after : what is left as declared and at the end.  experiments : group of look-alikes -> what would
-    tell them apart.  choice : of the model of the cell.  contradicted : whether what explains the data leaves more of
-    the test part than a right explanation may.  warnings : that, and where the written model does worse on the test
-    part than another one.
+    Three models are told of: as declared, recalibrated (own parameters refitted, no effect), and after (what is
+    written: what was found, or what carries over best where nothing explains the data).
+
+    cell, model_effects : the model after: a cell with all that a cell file can hold, and the effects that it cannot.
+    soc0, hold : of the first record: its state of charge at the first row, as fitted, in the windows of `cell`, and how
+    its current runs between rows.
+    written : the effects of the model after by id, with their parameters; not those of the verdict where these do
+    not carry over.  own : of the models recalibrated and after, the declared parameters that were open, and where they
+    ended.
+    candidates : each effect that was simulated, as it competed, best first.  files : errors by file and part.
+    noise_floor_v : root mean square of the records' white noise.  before, after : what the residuals of the models as
+    declared and after show.
+    effects : by id, all that may be tried or moved.  tried : ids of those that competed, none where none may be added.
+    experiments : (group of look-alikes, what would tell them apart).  choice : of the model of the cell.
+    notes : what was assumed, and what a reader should know of the records and the search.
+    contradicted : whether what explains the data leaves more of the test part than a right explanation may.
+    warnings : that, and where the written model does worse on the test part than another one.
+    seconds, simulations : spent.
     """
 
     cell: Cell

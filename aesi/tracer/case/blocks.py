@@ -76,9 +76,11 @@ class Windows:
 class Blocks:
     """starts : (b + 1,) first rows of the blocks, and the number of rows.  record : (b,) number of each block's record.
 
-    folds : partition -> list of sets of blocks that are left out in turn.  compared : (n,) True for the rows by which
-    an error on unseen data is told, see `InverseProblem.compared`.  windows : of `WINDOW_S` within each block, None
-    where errors at the scale of seconds are not told apart.
+    folds : partition -> sets of blocks that are left out in turn: "block" one each; "record", "rate", "charge" those of
+    one record, of one range of the current's RMS, of one range of the state of charge, where there are several; "end"
+    the last third.
+    compared : (n,) True for the rows by which an error on unseen data is told, see `InverseProblem.compared`.
+    windows : of `WINDOW_S` within each block, None where errors at the scale of seconds are not told apart.
     """
 
     starts: IntArray
@@ -124,8 +126,8 @@ def blocks_of(problem: InverseProblem) -> Blocks:
         folds["record"] = tuple(
             tuple(b for b, i in enumerate(record) if i == k) for k in range(len(problem.records))
         )
-    for name, size in (("rate", rate), ("charge", charge)):
-        ranges = _ranges(size)
+    for name, of_block in (("rate", rate), ("charge", charge)):
+        ranges = _ranges(of_block)
         if name == "charge" or _differ([rate[list(r)] for r in ranges]):
             folds[name] = ranges
     folds["end"] = (tuple(b for b in range(len(record)) if b >= round(SEEN_SHARE * len(record))),)
@@ -144,6 +146,7 @@ def _differ(rates: Sequence[Array]) -> bool:
     return max(means) > OTHER_RATE * min(means)
 
 
-def _ranges(size: Array) -> tuple[tuple[int, ...], ...]:
-    order = np.argsort(size, kind="stable")
+def _ranges(of_block: Array) -> tuple[tuple[int, ...], ...]:
+    """Blocks by ranges of a quantity (b,), as many in each."""
+    order = np.argsort(of_block, kind="stable")
     return tuple(tuple(sorted(part.tolist())) for part in np.array_split(order, RANGES) if len(part))

@@ -39,6 +39,7 @@ that errs as models of measured cells do, its records read by instruments that m
 what is gone within seconds does not count.  beside: as lasting, with records of the cell that are known to be good, so
 that the question is what is different about the others."""
 MEASURED_CELL: tuple[Trust, ...] = ("measured", "lasting", "beside")
+"""Where the file is believed, and the model errs as models of measured cells do."""
 AGEING: tuple[Trust, ...] = ("loose", "measured", "lasting")
 """Where the records of a cell may be of several ages: not where something explains them all, and what is sought beside
 good records is what has changed since."""
@@ -87,8 +88,10 @@ def share_of(values: ValuesByOwner, record: int) -> float:
 class InverseProblem:
     """One case.
 
-    effects : id -> Effect, all that may be tried or moved.  own : ids of the declared parameters that every hypothesis
-    may move within their spread, by trust.  fixed : effects in every simulation.  model : that every hypothesis uses.
+    cell : as declared.  records : prepared, the good ones last.
+    effects : id -> Effect, all that may be tried or moved. Parameters of theirs that have a spread are own ones of the
+    declared model, which every hypothesis moves.  trust : by how much.
+    fixed : effects in every simulation.  model : that every hypothesis uses.
     approximated_v : RMS, V, by which approximations of that model that were let stand move the voltage: no effect is
     named for less.  ages : whether the records say that they are of several ages.
     """
@@ -305,8 +308,9 @@ class InverseProblem:
         return np.concatenate([np.gradient(data.time_s) for data in self.seen])
 
     def off_at_seconds(self, hypothesis: Sequence[str]) -> Array:
-        """(n, k) V: what each of the declared parameters that a file may be off by at the scale of seconds, but not
-        beyond, does to the voltage of the declared cell, for one standard deviation."""
+        """(n, k) V: what one standard deviation does to the voltage of the declared cell, of each parameter that a file
+        may be off by at the scale of seconds, less those that the hypothesis moves itself; none where there is one
+        scale. All of it: `model_error.off_within_seconds` takes off what lasts."""
         off = self._off_at_seconds if self.two_scales else ()
         kept = [column for restating, column in off if restating.isdisjoint(hypothesis)]
         return np.column_stack([np.zeros((len(self.time_s), 0)), *kept])

@@ -99,7 +99,7 @@ class PreparedRecord:
 
 
 def noise_floor_v(voltage_v: Array, current_a: Array) -> float:
-    """Deviation of the white noise, from second differences where the current is steady.
+    """Standard deviation of the white noise, V, from second differences where the current is steady.
 
     voltage_v, current_a : (n,).  The scale is robust to the steps that remain; the smallest
     voltage step over the root of twelve is the least it can be.

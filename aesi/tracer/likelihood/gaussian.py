@@ -33,7 +33,7 @@ from aesi.tracer.likelihood.model_error import LOG_2PI, Size
 class BlockSums:
     """Sums over the rows of each block, whitened.
 
-    square : (b,) r'r.  moment : (b, m) J'r.  gram : (b, m, m) J'J.  log_det : (b,) log|C|.  rows : (b,).
+    square : (b,) r'r.  moment : (b, m) J'r.  gram : (b, m, m) J'J.  log_det : (b,) log|C|.  rows : (b,) how many.
     """
 
     square: Array
@@ -205,7 +205,8 @@ class PredictiveScore:
 
     size : that size.  log_density : by partition, (f,) nats of each fold.  total : half over blocks, half over the
     mean of the conditions, and the log prior of the size.  evidence : log marginal likelihood at that size.
-    shifts : by partition, (f, m) change of the parameters without each fold.
+    shifts : by partition, (f, m) change of the parameters without each fold.  shift, covariance : (m,) and (m, m), the
+    change to where all data put them, and what they are uncertain by there; zero of what is held on a bound.
     """
 
     size: Size

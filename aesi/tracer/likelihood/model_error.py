@@ -170,7 +170,7 @@ def whitened(problem: InverseProblem, blocks: Blocks, table: Array, size: Size) 
 
 
 def off_within_seconds(problem: InverseProblem, blocks: Blocks, hypothesis: Sequence[str]) -> Array:
-    """(n, k) V: what the file may be off by within seconds, but not beyond, beside a hypothesis; one standard deviation
-    of each."""
+    """(n, k) V: what the file may be off by within seconds beside a hypothesis, one standard deviation of each:
+    `InverseProblem.off_at_seconds` less its means over the windows, in which the file is believed."""
     columns = problem.off_at_seconds(hypothesis)
     return columns if blocks.windows is None else columns - blocks.windows.means(columns)

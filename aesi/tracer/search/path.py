@@ -17,7 +17,12 @@ from aesi.tracer.likelihood.growth import Explanation, Grown
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step: what the parents grew, best first, what was fitted in full, and the nats that admit an effect."""
+    """One step.
+
+    parents : fitted hypotheses that were grown from, the chosen one first.  grown : what they grew, best first.
+    fitted : those of it that were fitted with the whole model, best first.  admitted : one of these, or None.
+    admission_nats : what it had to say more of unseen data.
+    """
 
     parents: tuple[FittedHypothesis, ...]
     grown: tuple[Grown, ...]
