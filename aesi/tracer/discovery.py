@@ -166,14 +166,14 @@ def discover(
         check_same_cell(problem, record, run)
     spent = _Spent(progress)
 
-    def search(one: InverseProblem, kept: Archive, most: int) -> Evidence:
+    def search(one: InverseProblem, fits: Archive, most: int) -> Evidence:
         look = gathered_beside if one.has_good else gathered
-        return look(one, most, kept, Thresholds(), spent)
+        return look(one, most, fits, Thresholds(), spent)
 
-    def kept(one: InverseProblem, beside: Archive | None) -> Archive:
+    def archive_of(one: InverseProblem, beside: Archive | None) -> Archive:
         return Archive(archive, context_of(one), beside)
 
-    evidence, choice = with_model(problem, model, search, kept, max_effects)
+    evidence, choice = with_model(problem, model, search, archive_of, max_effects)
     found = _told(
         evidence, choice, tested, spent.simulations, np.random.default_rng(seed), time.perf_counter() - began
     )

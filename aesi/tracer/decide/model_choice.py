@@ -28,8 +28,8 @@ FIRST_LOOK = 1
 """Names that the single particle is tried with before the porous electrode, where the declared cell asks for that one:
 what it approximates, no names explain, and looking for two and three of them takes most of the time. They are looked
 for where one explains the data, where none could, or where the porous electrode needs names, too."""
-Kept = Callable[[InverseProblem, Archive | None], Archive]
-"""The fits of a problem that are known already, beside those with the other model of the cell."""
+ArchiveOf = Callable[[InverseProblem, Archive | None], Archive]
+"""The archive of a problem with one model of the cell, beside that of the same case with the other one."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class ModelChoice:
 
 
 def with_model(
-    problem: InverseProblem, wanted: ModelName | None, search: Search, kept: Kept, max_effects: int
+    problem: InverseProblem, wanted: ModelName | None, search: Search, archive_of: ArchiveOf, max_effects: int
 ) -> tuple[Evidence, ModelChoice]:
     """The search with the model that the user named, or else with the one that the parameters of the cell were fitted
     with, or else with the one that the records ask for.
@@ -64,21 +64,23 @@ def with_model(
     if settled:
         one = fine("dfn" if settled == "dfn" else "espm")
         why = ", as asked" if wanted else ", with which the parameters of the cell were fitted"
-        return told(search(one, kept(one, None), max_effects), one.model, why)
+        return told(search(one, archive_of(one, None), max_effects), one.model, why)
     single = fine("espm")
     if reduction is not None and not reduction.notable:
         single = let_stand(single, reduction.shift_v)
-    fits = kept(single, None)
+    archive = archive_of(single, None)
     if problem.has_good:
         return told(
-            search(single, fits, max_effects), "espm", ", since the good records share what it approximates"
+            search(single, archive, max_effects),
+            "espm",
+            ", since the good records share what it approximates",
         )
     most = max_effects if reduction is None or not reduction.notable else min(FIRST_LOOK, max_effects)
-    first = search(single, fits, most)
+    first = search(single, archive, most)
     explained = _explains(first, reduction)
     if most < max_effects and (not explained or first.verdict.word == "found"):
         most = max_effects
-        first = search(single, fits, most)
+        first = search(single, archive, most)
         explained = _explains(first, reduction)
     if explained:
         reduction = _larger(reduction, first.paths["tight"])
@@ -87,10 +89,10 @@ def with_model(
     if not explained:
         return told(first, "espm", ", which leaves far more than the two differ by")
     full = fine("dfn")
-    second = search(full, kept(full, fits), most_names(first, max_effects))
+    second = search(full, archive_of(full, archive), most_names(first, max_effects))
     unknown = "unknown" in (first.verdict.word, second.verdict.word)
     if most < max_effects and unknown and second.verdict.word != "none":
-        first = search(single, fits, max_effects)
+        first = search(single, archive, max_effects)
     if believed((second.path, second.verdict), (first.path, first.verdict)):
         return told(first, "espm", ", which explains the data with fewer or more usual effects")
     return told(second, "dfn")
