@@ -65,7 +65,7 @@ Progress = Callable[[TriedHypothesis], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Left:
+class ResidualStructure:
     """What a residual depends on (share of its variance by family of variables), and what a sparse correction could
     explain of it."""
 
@@ -102,8 +102,8 @@ class Discovery:
     candidates: tuple[CandidateEffect, ...]
     files: tuple[FileOutcome, ...]
     noise_floor_v: float
-    before: Left
-    after: Left
+    before: ResidualStructure
+    after: ResidualStructure
     model_effects: tuple[ActiveEffect, ...]
     soc0: float
     hold: Hold
@@ -239,7 +239,7 @@ def _told(
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
     cell, model_effects, soc0 = evidence.after.settled()
-    left = _left(records, evidence.after)
+    left = _structure_of(records, evidence.after)
 
     def test_error(one: Explanation) -> float | None:
         try:
@@ -253,7 +253,7 @@ def _told(
         candidates=ranking(evidence.path, verdict, test_error),
         files=files,
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in records]))),
-        before=_left(records, declared),
+        before=_structure_of(records, declared),
         after=left,
         model_effects=model_effects,
         soc0=soc0,
@@ -272,7 +272,7 @@ def _told(
     )
 
 
-def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: Left) -> tuple[str, ...]:
+def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualStructure) -> tuple[str, ...]:
     records = evidence.path.problem.records
     known = [
         f"{r.name} is known to be good: what was found is what the others have beside it."
@@ -291,7 +291,7 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: Left) -> 
     return tuple(dict.fromkeys(notes))
 
 
-def _left(records: Sequence[PreparedRecord], state: ModelState) -> Left:
+def _structure_of(records: Sequence[PreparedRecord], state: ModelState) -> ResidualStructure:
     runs, residuals = [], []
     for index, record in enumerate(records):
         run = state.simulated(record, index, thin=True)
@@ -299,4 +299,4 @@ def _left(records: Sequence[PreparedRecord], state: ModelState) -> Left:
         series = {name: column[keep] for name, column in run.series.items()}
         runs.append(Run(run.time_s[keep], run.current_a[keep], run.voltage_v[keep], series))
         residuals.append((record.thin.voltage_v - run.voltage_v)[keep])
-    return Left(explain(runs, residuals), measure(runs, residuals))
+    return ResidualStructure(explain(runs, residuals), measure(runs, residuals))
