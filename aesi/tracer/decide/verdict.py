@@ -60,8 +60,9 @@ class Verdict:
     effects : ids in the order in which they were added.  confidence_sets : all that the data do not tell from a member
     of `effects`, with which each begins; the better ones first.  structured_v, tolerance_v : what is left on unseen
     data beyond noise, and how much may be.
-    margin : standard deviations behind the confidence, see `decide.confidence`: of an answer with names those by which
-    the closest rival lags, or those of the weakest name's gain; of one without, the distance from the tolerance.
+    margin : what the confidence is read off, see `decide.confidence`. Of an answer with names, standard deviations by
+    which the closest rival lags, or of the weakest name's gain. Of `none` the nats that the best effect says less. Of
+    `unknown` without names the logarithm of what is left over what may be, nought where too little was foretold.
     """
 
     word: Word
@@ -142,7 +143,6 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     still to be read off the margin."""
     allowed = tolerance_v(path.problem, thresholds)
     left = unexplained_v(path.problem, path.blocks, path.chosen, allowed)
-    before = structured_v(path, path.base)
     if left > allowed:
         margin = float(np.log(left / allowed))
         reason = (
@@ -168,6 +168,7 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, 0.0)
     groups, margin = look_alikes(path, thresholds, allowed)
+    before = structured_v(path, path.base)
     reason = f"{1e3 * before:.2f} mV beyond the noise on unseen data before, {1e3 * left:.2f} mV after"
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
 
