@@ -50,52 +50,57 @@ def with_model(
 
     max_effects : names that may be given.
     """
-    reduction = reduction_of(problem)
+    declared = reduction_of(problem)
 
     def fine(name: ModelName) -> InverseProblem:
         return with_fine_numerics(replace(problem, model=name))
-
-    def told(evidence: Evidence, name: ModelName, why: str = "") -> tuple[Evidence, ModelChoice]:
-        differ = "" if reduction is None else f"; {reduction.sentence}"
-        words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
-        return evidence, ModelChoice(name, words, reduction)
 
     settled = wanted or problem.cell.fitted_with
     if settled:
         one = fine("dfn" if settled == "dfn" else "espm")
         why = ", as asked" if wanted else ", with which the parameters of the cell were fitted"
-        return told(search(one, archive_of(one, None), max_effects), one.model, why)
+        return _chosen(search(one, archive_of(one, None), max_effects), one.model, declared, why)
     single = fine("espm")
-    if reduction is not None and not reduction.notable:
-        single = let_stand(single, reduction.shift_v)
+    if declared is not None and not declared.notable:
+        single = let_stand(single, declared.shift_v)
     archive = archive_of(single, None)
     if problem.has_good:
-        return told(
-            search(single, archive, max_effects),
-            "espm",
-            ", since the good records share what it approximates",
-        )
-    most = max_effects if reduction is None or not reduction.notable else min(FIRST_LOOK, max_effects)
-    first = search(single, archive, most)
-    explained = _explains(first, reduction)
-    if most < max_effects and (not explained or first.verdict.word == "found"):
+        by_single = search(single, archive, max_effects)
+        return _chosen(by_single, "espm", declared, ", since the good records share what it approximates")
+    most = min(FIRST_LOOK, max_effects) if _notable(declared) else max_effects
+    by_single = search(single, archive, most)
+    explained = _explains(by_single, declared)
+    if most < max_effects and (not explained or by_single.verdict.word == "found"):
         most = max_effects
-        first = search(single, archive, most)
-        explained = _explains(first, reduction)
-    if explained:
-        reduction = _larger(reduction, first.paths["tight"])
-    if reduction is None or not reduction.notable:
-        return told(first, "espm")
+        by_single = search(single, archive, most)
+        explained = _explains(by_single, declared)
+    reduction = _larger(declared, by_single.paths["tight"]) if explained else declared
+    if not _notable(reduction):
+        return _chosen(by_single, "espm", reduction)
     if not explained:
-        return told(first, "espm", ", which leaves far more than the two differ by")
+        return _chosen(by_single, "espm", reduction, ", which leaves far more than the two differ by")
     full = fine("dfn")
-    second = search(full, archive_of(full, archive), most_names(first, max_effects))
-    unknown = "unknown" in (first.verdict.word, second.verdict.word)
-    if most < max_effects and unknown and second.verdict.word != "none":
-        first = search(single, archive, max_effects)
-    if believed((second.path, second.verdict), (first.path, first.verdict)):
-        return told(first, "espm", ", which explains the data with fewer or more usual effects")
-    return told(second, "dfn")
+    by_full = search(full, archive_of(full, archive), most_names(by_single, max_effects))
+    unknown = "unknown" in (by_single.verdict.word, by_full.verdict.word)
+    if most < max_effects and unknown and by_full.verdict.word != "none":
+        by_single = search(single, archive, max_effects)
+    if believed((by_full.path, by_full.verdict), (by_single.path, by_single.verdict)):
+        why = ", which explains the data with fewer or more usual effects"
+        return _chosen(by_single, "espm", reduction, why)
+    return _chosen(by_full, "dfn", reduction)
+
+
+def _chosen(
+    evidence: Evidence, name: ModelName, reduction: Reduction | None, why: str = ""
+) -> tuple[Evidence, ModelChoice]:
+    """What was searched with a model, and the choice of that one."""
+    differ = "" if reduction is None else f"; {reduction.sentence}"
+    words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
+    return evidence, ModelChoice(name, words, reduction)
+
+
+def _notable(reduction: Reduction | None) -> bool:
+    return reduction is not None and reduction.notable
 
 
 def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
