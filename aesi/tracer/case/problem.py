@@ -144,8 +144,12 @@ class InverseProblem:
                 if sd is not None:
                     out.append(own(owner, name, p, sd))
         for effect_id in hypothesis:
-            out += of_effect(effect_id, self.effects[effect_id].parameters, self.cell.nominal_capacity_ah)
+            out += self.parameters_of(effect_id)
         return tuple(out)
+
+    def parameters_of(self, effect: str) -> list[FreeParameter]:
+        """What an effect under test moves, by its id: all of its parameters, in order."""
+        return of_effect(effect, self.effects[effect].parameters, self.cell.nominal_capacity_ah)
 
     def _soc0_sd(self, record: PreparedRecord) -> float:
         """Standard deviation of the initial state of charge."""

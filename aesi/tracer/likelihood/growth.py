@@ -21,7 +21,6 @@ from aesi.tracer.case.free_parameter import (
     FURTHEST_SDS,
     FreeParameter,
     by_owner,
-    of_effect,
     starts,
     values_of,
 )
@@ -118,9 +117,7 @@ class EffectGrowth:
         self.known = known
         self.problem, fit = parent.problem, parent.fit
         self.rest = np.array([j for j in parent.movable if fit.free[j].owner != effect], dtype=int)
-        self.added = tuple(
-            of_effect(effect, self.problem.effects[effect].parameters, self.problem.cell.nominal_capacity_ah)
-        )
+        self.added = tuple(self.problem.parameters_of(effect))
         bounds = np.array([f.bounds for f in self.added]).reshape(-1, 2)
         self.low, self.high = bounds[:, 0], bounds[:, 1]
         self.near = near

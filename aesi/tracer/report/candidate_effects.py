@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aesi.tracer.case.free_parameter import of_effect
 from aesi.tracer.decide.verdict import Verdict
 from aesi.tracer.likelihood.credible import reaches
 from aesi.tracer.likelihood.fit import FittedHypothesis
@@ -87,8 +86,7 @@ def _remark(path: Path, one: Explanation) -> str:
 def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
     """The parameters of one effect of a hypothesis, each with what 90 % of its posterior density covers: to both sides
     of one inside its bounds, from the bound inwards of one that the data push onto it."""
-    problem = path.problem
-    known = of_effect(effect, problem.effects[effect].parameters, problem.cell.nominal_capacity_ah)
+    known = path.problem.parameters_of(effect)
     reach, placed, out = _reach(path, one), one.placed, {}
     for free in known:
         if free.key not in placed:  # stays where the hypothesis had it that this one grew from
@@ -109,8 +107,7 @@ def _reach(path: Path, one: Explanation) -> dict[tuple[str, str], tuple[float, f
     """(owner, name) -> how far below and above a parameter its interval reaches, in deviations of its prior."""
     point, keys = one.point, [free.key for free in one.free]
     if isinstance(one, Grown):  # a score leaves out what a descent left on a bound
-        known = path.problem.effects[one.hypothesis[-1]].parameters
-        added = of_effect(one.hypothesis[-1], known, path.problem.cell.nominal_capacity_ah)
+        added = path.problem.parameters_of(one.hypothesis[-1])
         further = [j for j, free in enumerate(added) if free.key in one.on_bounds]
         keys += [added[j].key for j in further]
         point = Linearised(
