@@ -19,7 +19,7 @@ from aesi.bench import CaseRow
 from aesi.bench.hybrid.split_figures import summary, table
 from aesi.bench.hybrid.splits import EXPERIMENTS, SplitCase, chosen_splits, judged
 from aesi.bench.limit import Stopwatch
-from aesi.errors import AesiError
+from aesi.errors import AesiError, FitError
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.load import Loaded
@@ -165,7 +165,10 @@ def search_and_fit(config: ExperimentConfig) -> tuple[Loaded, Mapping[str, float
         on_candidate=lambda number, _, outcome: known.__setitem__(number, outcome),
     )
     chosen = averaged([known[number] for number in found.fittest(top_share(config))])
-    fitted = conformalise(final_models(problem, chosen, config), problem, chosen, config, loaded.left_out)
+    models = final_models(problem, chosen, config)
+    if models.unfitted:
+        raise FitError(" ".join(models.unfitted))  # figures of cases are compared model by model
+    fitted = conformalise(models.fitted, problem, chosen, config, loaded.left_out)
     validation = validation_mser(loaded, problem, [c for c in known.values() if isinstance(c, Candidate)])
     return loaded, validation, fitted
 

@@ -58,7 +58,7 @@ def _stages(
     from aesi.pipeline.notes import together
     from flows.base.stage_cache import Cache
     from flows.search.study import run_study
-    from flows.tracking.experiment_log import CandidateTracker, track_result, track_start
+    from flows.tracking.experiment_log import UNFITTED, CandidateTracker, track_result, track_start
 
     loaded = run("data and physics", lambda: load(request.config()), retries=2)
     config = loaded.config  # that of the fallback where it fell back to one
@@ -91,7 +91,13 @@ def _stages(
         "final models",
         lambda: cache.get("final models", key, lambda: final_models(problem, found.chosen, config)),
     )
-    fitted = run("intervals", lambda: conformalise(models, problem, found.chosen, config, loaded.left_out))
+    for note in models.unfitted:
+        console.say(f"  {note}")
+    if models.unfitted:
+        tracker.parameters({}, {UNFITTED: " ".join(models.unfitted)})
+    fitted = run(
+        "intervals", lambda: conformalise(models.fitted, problem, found.chosen, config, loaded.left_out)
+    )
     validation = validation_mser(loaded, problem, found.candidates())
     evaluation = run("evaluation", lambda: evaluate_models(fitted, loaded.split, validation))
     seconds = time.monotonic() - started
@@ -107,6 +113,7 @@ def _stages(
         tracker.run_id,
         seconds,
         failed=len(found.result.trials) - len(rows),
+        unfitted=models.unfitted,
     )
     summary = run("report", lambda: write_outputs(folder, result))
     console.say(summary["finding"])

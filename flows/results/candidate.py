@@ -106,7 +106,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
     one = rebuilt.candidate.better
     only = rebuilt.config.model_copy(update={"models": (one.name,)})
     (fitted,) = conformalise(
-        final_models(rebuilt.problem, rebuilt.candidate, only),
+        final_models(rebuilt.problem, rebuilt.candidate, only).fitted,
         rebuilt.problem,
         rebuilt.candidate,
         only,

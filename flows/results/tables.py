@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from aesi.errors import InputError
 from aesi.pipeline.report import tables
+from flows.tracking.experiment_log import UNFITTED
 from flows.tracking.store import KIND, Store, without_login
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
@@ -155,6 +156,6 @@ def _footer(name: str, runs: Sequence[Any], format: str) -> str:
     if about and below:  # without a note what came of that one run stands there alone
         text = f"{text} {about.splitlines()[0].rstrip('.')}."
     for run in runs:
-        if "aesi.fallback" in run.data.tags:
-            text = f"{text} {run.data.tags['aesi.fallback']}"
+        told = (run.data.tags.get(tag) for tag in ("aesi.fallback", UNFITTED))
+        text = " ".join((text, *filter(None, told)))
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]

@@ -23,7 +23,7 @@ from flows.tracking.store import without_login
 from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
-CHOSEN = "aesi.chosen"
+CHOSEN, UNFITTED = "aesi.chosen", "aesi.unfitted"
 INPUTS, RECORDS, LEFT_OUT, DECLARED = "inputs", "records.bin", "left_out.bin", "declared"
 """What a candidate is made from: the error series by role, those of training drives under physics that has not seen
 them, and the declared cell with its effects."""

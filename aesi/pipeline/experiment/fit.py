@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from aesi.conformal import Calibrated, FreeRunBands, RefittedIntervals
+from aesi.errors import FitError
 from aesi.pipeline.experiment.candidate import genome_space, weights
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import cuts
@@ -42,6 +43,14 @@ class Fitted:
     trials: tuple[Mapping[str, Any], ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class FinalModels:
+    """fitted : in the experiment's order.  unfitted : a sentence each baseline that could not be fitted."""
+
+    fitted: tuple[Fitted, ...]
+    unfitted: tuple[str, ...] = ()
+
+
 def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
     """The search problem over the training records: library, resamples, factors."""
     library, search = config.library, config.search
@@ -66,15 +75,27 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
     return Problem.build(loaded.split, options, left_out=loaded.left_out.parts)
 
 
-def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) -> tuple[Fitted, ...]:
-    """The chosen candidate's two ensembles, and the baselines that the experiment names, in its order."""
-    fitted = []
+def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) -> FinalModels:
+    """The chosen candidate's two ensembles, and the baselines that the experiment names, in its order.
+
+    A baseline that cannot be fitted is left out: it is what the rest is compared with, and no reason to lose the
+    search. Raises FitError where nothing else is to be judged.
+    """
+    fitted, unfitted = [], []
     for name in config.models:
         started = time.monotonic()
         trials: list[Mapping[str, Any]] = []
-        model, terms = _model(name, problem, chosen, replace(_tuning(problem, config), told=trials.append))
-        fitted.append(Fitted(model, terms, time.monotonic() - started, trials=tuple(trials)))
-    return tuple(fitted)
+        try:
+            model, terms = _model(
+                name, problem, chosen, replace(_tuning(problem, config), told=trials.append)
+            )
+        except FitError as error:
+            unfitted.append(f"{name} could not be fitted and is left out: {error}")
+        else:
+            fitted.append(Fitted(model, terms, time.monotonic() - started, trials=tuple(trials)))
+    if not fitted:
+        raise FitError(" ".join(unfitted))
+    return FinalModels(tuple(fitted), tuple(unfitted))
 
 
 def _model(name: str, problem: Problem, chosen: Candidate, tuning: Tuning) -> tuple[ErrorModel, int]:

@@ -38,7 +38,8 @@ class Result:
 
     candidates : rows with number, oob, valid, terms, fitness, feasible, front, chosen.
     chosen : the candidates the models come from, as one.  run_id : of the tracked run.  seconds : wall time so far.
-    failed : how many candidates more were evaluated and came to nothing.
+    failed : how many candidates more were evaluated and came to nothing.  unfitted : a sentence each baseline that
+    could not be fitted.
     """
 
     config: ExperimentConfig
@@ -51,6 +52,7 @@ class Result:
     run_id: str
     seconds: float
     failed: int = 0
+    unfitted: tuple[str, ...] = ()
 
     @property
     def best(self) -> str:
@@ -106,11 +108,13 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
 
 
 def notes(result: Result) -> tuple[str, ...]:
-    """What a reader should know: of the data, of terms left out, of intervals that could not be calibrated."""
+    """What a reader should know: of the data, of terms and models left out, of intervals not calibrated."""
     without_intervals = (note for one in result.fitted for note in one.notes)
     alone = f"The saved model is the {result.corrected} alone, without bands: {result.best} cannot be kept with it."
     told = () if result.kept else (alone,)
-    return together((*result.loaded.notes, *result.problem.notes, *without_intervals, *told))
+    return together(
+        (*result.loaded.notes, *result.problem.notes, *result.unfitted, *without_intervals, *told)
+    )
 
 
 def published_by(model: ModelName) -> Callable[[str], str]:

@@ -250,6 +250,21 @@ def test_a_killed_run_is_closed_by_the_next(aesi, arguments, tracked, run):
     assert sorted(run.info.status for run in runs) == ["FINISHED", "KILLED"]
 
 
+def test_a_baseline_that_cannot_be_fitted_ended_a_run_after_its_search(run):
+    from flows.results.tables import tables_of
+
+    folder = run("library.p_c=[0, 0]", "search.candidates=3", 'models=["ESPM", "AESI I", "DMD with control"]')
+    summary = json.loads((folder / "summary.json").read_text())
+    assert [row["name"] for row in summary["models"]] == ["ESPM", "ESPM + AESI I"]
+    (note,) = [note for note in summary["notes"] if "left out" in note]
+    assert note.startswith("DMD with control could not be fitted and is left out: ")
+    assert note.endswith("raise p_c and d to at least 1.")
+    assert note in (folder / "report.html").read_text()
+    _, parent, _ = tracked_runs()
+    assert parent.data.tags["aesi.unfitted"] == note
+    assert note in tables_of("smoke")
+
+
 def test_two_workers_give_the_candidates_of_one(run, finished):
     run("search.workers=2")
     assert fingerprint(tracked_runs()[2]) == fingerprint(tracked_runs(workspace=finished)[2])

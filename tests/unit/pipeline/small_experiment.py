@@ -76,5 +76,5 @@ def fitted(record: Path) -> tuple[Loaded, Candidate, tuple]:
     problem = build_problem(loaded, config)
     chosen = evaluate(problem, Genome.whole(problem.library, 1.0, 1e-3, 0.5, 1, 1, feedback=False))
     assert isinstance(chosen, Candidate)
-    models = conformalise(final_models(problem, chosen, config), problem, chosen, config)
+    models = conformalise(final_models(problem, chosen, config).fitted, problem, chosen, config)
     return loaded, chosen, models

@@ -5,6 +5,7 @@ import pytest
 from small_experiment import SOC0, build_problem, conformalise, experiment, final_models, fitted, write_record
 
 from aesi.data import read_measurement
+from aesi.errors import FitError
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.outputs import Result, hybrid, notes
 
@@ -19,7 +20,9 @@ def result(record, *models):
     config = experiment(record, models=list(models))
     loaded, chosen, _ = fitted(record)
     problem = build_problem(loaded, config)
-    judged = conformalise(final_models(problem, chosen, config), problem, chosen, config, loaded.left_out)
+    judged = conformalise(
+        final_models(problem, chosen, config).fitted, problem, chosen, config, loaded.left_out
+    )
     return Result(config, loaded, problem, chosen, [], judged, evaluate_models(judged, loaded.split), "", 0.0)
 
 
@@ -46,3 +49,11 @@ def test_physics_that_is_saved_keeps_its_bands(record):
     one = result(record, "ESPM recalibrated", "ESPM")
     assert not [note for note in notes(one) if "saved model" in note]
     assert covered(hybrid(one), record) > 0.8
+
+
+def test_models_of_which_none_can_be_fitted_are_an_error(record):
+    library = {"inputs": ["I"], "p_c": [0, 0], "d": [1, 1], "special": True, "fade": False}
+    config = experiment(record, library=library, models=["DMD with control"])
+    problem = build_problem(fitted(record)[0], config)
+    with pytest.raises(FitError, match=r"DMD with control could not be fitted.*raise p_c and d"):
+        final_models(problem, fitted(record)[1], config)
