@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, TypeVar
 
@@ -13,38 +14,82 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 
-def in_processes(function: Callable[[T], R], items: Sequence[T], workers: int) -> Iterator[R]:
+def in_processes(
+    function: Callable[[T], R], items: Sequence[T], workers: int, lost: Callable[[T], R] | None = None
+) -> Iterator[R]:
     """Results by processes that start anew; `function` is one that they can import, or a partial of one.
 
     What has not begun is given up where the caller stops asking.
+    lost : what an item comes to whose process the system ended, as it does where memory runs out; the others go on.
+    Without it that raises BrokenProcessPool.
     """
-    from concurrent.futures import ProcessPoolExecutor, as_completed
+    from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+    from concurrent.futures.process import BrokenProcessPool
     from multiprocessing import get_context
 
-    with ProcessPoolExecutor(
-        workers, mp_context=get_context("spawn"), initializer=environment.prepare_process
-    ) as pool:
-        with leaving_interrupts_to_us():
-            futures = [pool.submit(function, item) for item in items]
-        try:
-            for future in as_completed(futures):
-                yield future.result()
-        finally:
+    def begin(pool: ProcessPoolExecutor) -> None:
+        if waiting:
+            item = waiting.popleft()
+            with leaving_interrupts_to_us():
+                running[pool.submit(function, item)] = pool, item
+
+    def anew() -> ProcessPoolExecutor:
+        context = get_context("spawn")
+        pools.append(ProcessPoolExecutor(1, mp_context=context, initializer=environment.prepare_process))
+        return pools[-1]
+
+    # A pool that loses a process gives up all that its others are at, and does not tell which one it was: so each
+    # process has a pool of its own.
+    pools: list[ProcessPoolExecutor] = []
+    waiting = deque(items)
+    running: dict[Future[R], tuple[ProcessPoolExecutor, T]] = {}
+    try:
+        for _ in range(min(workers, len(items))):
+            begin(anew())
+        while running:
+            results = []
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
+                pool, item = running.pop(future)
+                try:
+                    results.append(future.result())
+                except BrokenProcessPool:
+                    if lost is None:
+                        raise
+                    results.append(lost(item))
+                    pool = anew()
+                begin(pool)
+            yield from results
+    finally:
+        for pool in pools:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def on_dask(function: Callable[[T], R], items: Sequence[T], workers: int, address: str | None) -> Iterator[R]:
+def on_dask(
+    function: Callable[[T], R],
+    items: Sequence[T],
+    workers: int,
+    address: str | None,
+    lost: Callable[[T], R] | None = None,
+) -> Iterator[R]:
     """Results by the scheduler at an address, or by a cluster of `workers` processes here.
 
-    Raises as `connect` does.
+    lost : as above, for an item that Dask gives up because worker after worker ended over it; without it that raises
+    KilledWorker. Raises as `connect` does.
     """
     client, cluster = connect(address, workers)
-    from distributed import as_completed
+    from distributed import KilledWorker, as_completed
 
     try:
         futures: Any = client.map(function, list(items), pure=False)
+        given = dict(zip((future.key for future in futures), items, strict=True))
         for future in as_completed(futures, loop=client.loop):
-            yield future.result()
+            try:
+                result = future.result()
+            except KilledWorker:
+                if lost is None:
+                    raise
+                result = lost(given[future.key])
+            yield result
     finally:
         client.close(timeout=5)
         if cluster is not None:

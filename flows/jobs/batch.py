@@ -10,7 +10,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from aesi.pipeline.batch.job import Settings, of_other_code, run_job
+from aesi.pipeline.batch.job import Settings, lost_job, of_other_code, run_job
 from aesi.pipeline.batch.plan import Job, read_plan, without_records
 from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
@@ -121,5 +121,6 @@ def _rows(
 ) -> Iterator[dict[str, Any]]:
     """Rows as they are done."""
     if runner == "dask":
-        return on_dask(partial(run_job, out=out.resolve(), settings=settings), jobs, workers, address)
-    return in_processes(partial(run_job, out=out, settings=settings), jobs, min(workers, len(jobs)))
+        run = partial(run_job, out=out.resolve(), settings=settings)
+        return on_dask(run, jobs, workers, address, lost_job)
+    return in_processes(partial(run_job, out=out, settings=settings), jobs, workers, lost_job)

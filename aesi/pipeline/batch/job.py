@@ -62,6 +62,15 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
     return row
 
 
+def lost_job(job: Job) -> dict[str, Any]:
+    """The row of a job whose process the system ended."""
+    reason = (
+        "the system ended the process that worked on it, perhaps for want of memory; the same command tries it again, "
+        "with fewer --workers there is more for each."
+    )
+    return _about(job, "failed") | {"reason": reason}
+
+
 def _about(job: Job, status: str) -> dict[str, Any]:
     return {"name": job.name, "specimen": job.specimen, "at": job.at, "status": status}
 

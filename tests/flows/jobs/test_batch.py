@@ -1,6 +1,7 @@
 """A batch: what is done is taken again, every cell is tracked, and one that failed says why."""
 
 import json
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -65,6 +66,37 @@ def test_a_batch_is_tracked_with_the_trend_of_its_specimens(tracked, runner):
     parent = runs["plan.csv"]
     assert parent.data.metrics["failed"] == 1.0
     assert parent.info.status == "FINISHED"
+
+
+KILLED = """
+import os, signal
+from aesi.pipeline.batch.job import run_job as work
+
+def run_job(job, out, settings):
+    if job.name == "large":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return work(job, out, settings)
+"""
+
+
+def test_a_process_that_the_system_killed_ended_the_whole_batch(tracked, monkeypatch):
+    from flows.jobs import batch
+
+    (tracked / "killed.py").write_text(KILLED)
+    monkeypatch.syspath_prepend(tracked)
+    monkeypatch.setattr(batch, "run_job", import_module("killed").run_job)
+    names = ("first", "large", "third", "fourth")
+    for name in names:
+        (tracked / f"{name}.csv").write_text(name)
+    plan = tracked / "plan.csv"
+    plan.write_text("name,data\n" + "".join(f"{name},{name}.csv\n" for name in names))
+    for job in read_plan(plan, CELL):
+        if job.name != "large":
+            done(tracked / "out" / job.name, job, 3.0)
+    rows = batch.batch(plan, tracked / "out", CELL, workers=2)
+    assert {row["name"]: row["status"] for row in rows} == dict.fromkeys(names, "done") | {"large": "failed"}
+    assert "the system ended the process that worked on it" in rows[1]["reason"]
+    assert "large" in (tracked / "out" / "summary.csv").read_text()
 
 
 def test_a_batch_for_a_scheduler_that_is_away_left_a_failed_run(workspace, monkeypatch, capsys):
