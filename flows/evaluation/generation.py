@@ -5,13 +5,14 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from aesi.records import Failed
 from flows.base import codec, fingerprint
 from flows.evaluation.outcome_store import Outcomes
 from flows.evaluation.pool import Pool
 
+T = TypeVar("T")
 POLL_S = 0.2
 """How often candidates that another process has claimed are looked for."""
 
@@ -50,6 +51,7 @@ class Evaluation:
         self._reuse = reuse
         self._lost_again = lost_again
         self._fresh: set[str] = set()
+        self._told = False
         self.tally = tally
 
     def key(self, genome: Any) -> str:
@@ -65,13 +67,13 @@ class Evaluation:
         while waiting:
             for key in [k for k in waiting if k not in working]:
                 outcome = self._stored(key)
-                if outcome is None and self._pool.idle and self._outcomes.claim(key):
+                if outcome is None and self._pool.idle and self._tried(self._outcomes.claim, key, True):
                     outcome = self._stored(key)  # finished between the look and the claim
                     if outcome is None:
                         self._pool.start(key, genomes[waiting[key][0]])
                         working.add(key)
                         continue
-                    self._outcomes.release(key)
+                    self._tried(self._outcomes.release, key, None)
                 if outcome is not None:
                     self.tally.found += 1
                     yield from ((position, outcome) for position in waiting.pop(key))
@@ -87,14 +89,14 @@ class Evaluation:
     def _stored(self, key: str) -> Any:
         if not self._reuse and key not in self._fresh:
             return None
-        data = self._outcomes.get(key)
+        data = self._tried(self._outcomes.get, key, None)
         if data is None:
             return None
         try:
             outcome = codec.loads(data)
         except codec.Damaged as error:
             self._say(f"cache: the stored candidate {key[:8]} is damaged ({error}); it is evaluated again.")
-            self._outcomes.discard(key)
+            self._tried(self._outcomes.discard, key, None)
             return None
         lost = isinstance(outcome, Failed) and outcome.of_machine
         return None if lost and self._lost_again and key not in self._fresh else outcome
@@ -104,6 +106,22 @@ class Evaluation:
             self._outcomes.put(key, codec.dumps(outcome))
             self._fresh.add(key)
         except OSError as error:
-            # The run itself needs no cache; only a resumed one would evaluate this candidate again.
-            self._say(f"cache: candidate {key[:8]} could not be stored ({error.strerror or error}).")
-        self._outcomes.release(key)
+            self._tell(error)
+        self._tried(self._outcomes.release, key, None)
+
+    def _tried(self, step: Callable[[str], T], key: str, otherwise: T) -> T:
+        """What the store says to a key; `otherwise` where it is lost."""
+        try:
+            return step(key)
+        except OSError as error:
+            self._tell(error)
+            return otherwise
+
+    def _tell(self, error: OSError) -> None:
+        """Say once that the store is lost: the run itself needs none."""
+        if not self._told:
+            self._told = True
+            self._say(
+                f"cache: candidates cannot be stored or looked up ({error.strerror or error}); the search goes on "
+                "without, and a resumed or another one evaluates them again."
+            )

@@ -7,6 +7,8 @@ import socket
 import threading
 import time
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from aesi.errors import InputError
@@ -39,7 +41,7 @@ class DatabaseOutcomes:
         self._thread.start()
 
     def get(self, key: str) -> bytes | None:
-        with self._engine.connect() as connection:
+        with self._reached() as connection:
             row = connection.execute(
                 self._sa.select(self._table.c.data).where(self._table.c.key == key)
             ).first()
@@ -47,21 +49,21 @@ class DatabaseOutcomes:
 
     def put(self, key: str, data: bytes) -> None:
         values = {"owner": None, "beat_s": None, "data": data}
-        with self._engine.begin() as connection:
+        with suppress(self._sa.exc.IntegrityError), self._reached() as connection:
             done = connection.execute(self._table.update().where(self._table.c.key == key).values(**values))
-            if done.rowcount == 0:
+            if done.rowcount == 0:  # who puts the same at the same moment is as good
                 connection.execute(self._table.insert().values(key=key, **values))
         self._mine.discard(key)
 
     def discard(self, key: str) -> None:
-        with self._engine.begin() as connection:
+        with self._reached() as connection:
             connection.execute(self._table.delete().where(self._table.c.key == key))
 
     def claim(self, key: str) -> bool:
         if key in self._mine:
             return True
         try:
-            with self._engine.begin() as connection:
+            with self._reached() as connection:
                 connection.execute(
                     self._table.insert().values(key=key, owner=self._owner, beat_s=self._now(connection))
                 )
@@ -77,20 +79,21 @@ class DatabaseOutcomes:
             self._mine.discard(key)
             table = self._table
             ours = (table.c.key == key, table.c.owner == self._owner)
-            with self._engine.begin() as connection:
+            with self._reached() as connection:
                 connection.execute(table.delete().where(*ours, table.c.data.is_(None)))
                 connection.execute(table.update().where(*ours).values(owner=None, beat_s=None))
 
     def close(self) -> None:
         self._stop.set()
         for key in list(self._mine):
-            self.release(key)
+            with suppress(OSError):  # what cannot be given back goes stale
+                self.release(key)
         self._engine.dispose()
 
     def _take_over(self, key: str) -> bool:
         """Win what nobody computes now: a result, to be made anew, or the claim of a heart that no longer beats."""
         table = self._table
-        with self._engine.begin() as connection:
+        with self._reached() as connection:
             now = self._now(connection)
             free = self._sa.or_(table.c.owner.is_(None), table.c.beat_s < now - self.STALE_S)
             done = connection.execute(
@@ -100,17 +103,29 @@ class DatabaseOutcomes:
 
     def _beat(self) -> None:
         while not self._stop.wait(self.BEAT_S):
-            if not self._mine:
+            mine = list(self._mine)  # what could not be given back is not among them, and goes stale
+            if not mine:
                 continue
             try:
                 with self._engine.begin() as connection:
                     connection.execute(
                         self._table.update()
-                        .where(self._table.c.owner == self._owner)
+                        .where(self._table.c.owner == self._owner, self._table.c.key.in_(mine))
                         .values(beat_s=self._now(connection))
                     )
             except self._sa.exc.SQLAlchemyError:
                 continue  # a missed beat is made up by the next; STALE_S is ten of them
+
+    @contextmanager
+    def _reached(self) -> Iterator[Any]:
+        """A transaction.  Raises OSError where the database is lost, IntegrityError for a key that is there already."""
+        try:
+            with self._engine.begin() as connection:
+                yield connection
+        except self._sa.exc.IntegrityError:
+            raise
+        except self._sa.exc.SQLAlchemyError as error:
+            raise OSError(_reason(error)) from error
 
     def _now(self, connection: Any) -> float:
         """The database's clock where it has one, because the workers' clocks may differ."""
@@ -131,8 +146,13 @@ class DatabaseOutcomes:
                 exists = False
             if not exists:
                 where = self._engine.url.render_as_string(hide_password=True)
-                reason = str(error.__cause__ or error).strip().splitlines()[0]
-                raise InputError(f"runner.storage {where} cannot be used: {reason}.") from None
+                raise InputError(f"runner.storage {where} cannot be used: {_reason(error)}.") from None
+
+
+def _reason(error: Exception) -> str:
+    """What the driver said, without the statement."""
+    cause = error.__cause__ or error
+    return (str(cause).strip().splitlines() or [type(cause).__name__])[0]
 
 
 def with_driver(url: str) -> str:

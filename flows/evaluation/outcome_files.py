@@ -42,7 +42,7 @@ class FileOutcomes:
     def release(self, key: str) -> None:
         lock = self._locks.pop(key, None)
         if lock is not None:
-            with suppress(PermissionError):  # Windows keeps a file that is open
+            with suppress(OSError):  # Windows keeps a file that is open
                 lock.path.unlink(missing_ok=True)
             lock.release()
 

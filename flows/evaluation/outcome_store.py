@@ -13,7 +13,7 @@ from flows.evaluation.outcome_files import FileOutcomes
 
 
 class Outcomes(Protocol):
-    """A store of results by key; keys are hexadecimal."""
+    """A store of results by key; keys are hexadecimal. All but `close` raise OSError where it is lost."""
 
     def get(self, key: str) -> bytes | None:
         """What was stored under the key, or None."""

@@ -7,6 +7,7 @@ import pytest
 from aesi.records import Failed
 from flows.evaluation import generation as evaluation
 from flows.evaluation.generation import Evaluation, Tally
+from flows.evaluation.outcome_database import DatabaseOutcomes
 from flows.evaluation.outcome_files import FileOutcomes
 
 
@@ -119,6 +120,24 @@ def test_a_full_disk_stops_nothing(made, monkeypatch, said):
     monkeypatch.setattr(FileOutcomes, "put", full)
     assert dict(made([])([1, 2])) == {0: 2, 1: 4}
     assert "No space left on device" in said[0]
+
+
+def test_a_database_that_was_lost_in_mid_search_ended_the_run(tmp_path, said):
+    outcomes, calls = DatabaseOutcomes(f"sqlite:///{tmp_path}/outcomes.db"), []
+
+    def work(genome):
+        if genome == 2:
+            outcomes._engine.dispose()
+            (tmp_path / "outcomes.db").unlink()  # the next connection finds no table
+        return genome * 2
+
+    found = dict(Evaluation(Inline(calls, work), outcomes, "s", said.append, Tally())([1, 2, 3, 4]))
+    outcomes.close()
+    assert found == {0: 2, 1: 4, 2: 6, 3: 8}
+    assert sorted(calls) == [1, 2, 3, 4]
+    (told,) = said
+    assert "no such table" in told
+    assert "the search goes on without" in told
 
 
 def test_two_at_a_time_share_the_work(made):

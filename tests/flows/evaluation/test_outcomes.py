@@ -136,6 +136,24 @@ def test_a_beating_heart_keeps_the_claim(tmp_path, monkeypatch):
     other.close()
 
 
+def test_a_claim_that_could_not_be_given_back_was_held_until_its_owner_ended(tmp_path, monkeypatch):
+    monkeypatch.setattr(DatabaseOutcomes, "BEAT_S", 0.1)
+    monkeypatch.setattr(DatabaseOutcomes, "STALE_S", 0.5)
+    url = f"sqlite:///{tmp_path}/outcomes.db"
+    owner, other = DatabaseOutcomes(url), DatabaseOutcomes(url)
+    assert owner.claim(KEY)
+    assert owner.claim("cd" * 16)  # so that its heart beats on
+    with monkeypatch.context() as away:
+        away.setattr(owner, "_engine", engine_of(f"sqlite:///{tmp_path}/nowhere/outcomes.db"))
+        with pytest.raises(OSError, match="unable to open"):
+            owner.release(KEY)
+    time.sleep(1.0)
+    assert other.claim(KEY)
+    assert not other.claim("cd" * 16)
+    owner.close()
+    other.close()
+
+
 @pytest.mark.parametrize("address", ["postgresql://127.0.0.1:9/none", "postgres://127.0.0.1:9/none"])
 def test_the_study_in_postgresql_asked_for_another_driver_than_its_candidates(address):
     from flows.search.published_study import study_storage
