@@ -29,7 +29,7 @@ from aesi.physics.effect import ActiveEffect, Record, Trace, check_contribution,
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
-from aesi.records.checked import check_increasing, check_row, numbers
+from aesi.records.checked import check_row, check_times, numbers
 
 ModelName = Literal["espm", "dfn"]
 MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
@@ -256,7 +256,7 @@ def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
         )
     check_row(time, "time_s")
     check_row(current, "current_a")
-    check_increasing(time, "time_s")
+    check_times(time, "time_s")
     return np.ascontiguousarray(time), np.ascontiguousarray(current)
 
 

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array
 from aesi.over_time import stamp
+
+LONGEST_STEP_S = 365 * 24 * SECONDS_PER_HOUR
+"""Between two rows: a year. A convention: no test stands still for longer, and times in nanoseconds do."""
 
 
 def numbers(values: object, name: str) -> Array:
@@ -50,13 +54,20 @@ def check_row(values: Array, name: str) -> None:
         )
 
 
-def check_increasing(time_s: Array, name: str) -> None:
-    """Raises DataError for the first stamp that is not after the one before it."""
-    still = np.diff(time_s) <= 0.0
+def check_times(time_s: Array, name: str) -> None:
+    """Raises DataError for the first stamp that is not after the one before it, or more than LONGEST_STEP_S after."""
+    steps = np.diff(time_s)
+    still = steps <= 0.0
     if still.any():
         row = int(np.argmax(still)) + 1
         raise DataError(
             f"{name} does not increase at {stamp(time_s[row])} s ({row_words(row)}); sort or drop duplicate stamps."
+        )
+    if steps.size and steps.max() > LONGEST_STEP_S:
+        row = int(np.argmax(steps > LONGEST_STEP_S)) + 1
+        raise DataError(
+            f"{name} has a step of {steps[row - 1]:.4g} s before {row_words(row)}, longer than a year "
+            f"({LONGEST_STEP_S:.4g} s); time has to be in seconds."
         )
 
 

@@ -12,7 +12,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, ComplexArray, Numbers
 from aesi.over_time import extent, over_time
-from aesi.records.checked import check_increasing, check_row, numbers
+from aesi.records.checked import check_row, check_times, numbers
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -108,7 +108,7 @@ class Measurement:
             if column.shape != time.shape:
                 raise DataError(f"{self.name}: {label} has {_rows(column)}, time_s has {_rows(time)}.")
             object.__setattr__(self, label, column)
-        check_increasing(time, f"{self.name}: time_s")
+        check_times(time, f"{self.name}: time_s")
 
     def __len__(self) -> int:
         return len(self.time_s)

@@ -1,10 +1,15 @@
 """What a record says of itself."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import aesi
 from aesi.errors import DataError
 from aesi.records import Measurement
+
+BPX = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
 
 
 def test_the_charge_of_a_pulse_between_far_rows_depends_on_how_the_current_runs():
@@ -38,3 +43,11 @@ def test_a_row_stamped_since_1970_was_told_by_six_digits_which_all_rows_share(of
     time = offset + np.array([0.0, 2.5, 2.5])
     with pytest.raises(DataError, match=f"time_s does not increase at {told}"):
         Measurement(time, np.ones(3), np.full(3, 3.7))
+
+
+def test_times_in_nanoseconds_were_simulated_without_an_end():
+    told = r"time_s has a step of 1e\+11 s before row 2, counted from 1, longer than a year .*has to be in seconds"
+    with pytest.raises(DataError, match=told):
+        aesi.simulate(aesi.Cell.from_bpx(BPX), [0.0, 1e11], [0.0, 0.0], 0.5)
+    with pytest.raises(DataError, match=f"drive: {told}"):
+        Measurement(np.array([0.0, 1e11]), np.zeros(2), np.zeros(2), name="drive")
