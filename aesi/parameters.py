@@ -39,10 +39,10 @@ class Parameter:
     the voltage moves with its square, as with a standard deviation, which a fit then moves: from nought it could not
     move the parameter itself. `linear` says that the voltage is all but linear in it, so that a fit need not take its
     slope anew at every step. `low_is_limit` says that the lower bound stands for nought, which a logarithmic scale does
-    not reach: to end there is a value like others. `spread` says by how much cell files are off in it, so that a
-    hypothesis about something else may move it by that much. `counted` says how a value stands to what the cell file
-    declares of the same: by itself, `added` to it, or a `share` of it. `shift_of` names what it is a shift of, as a
-    discovery writes that with its unit (`declared_degc`); empty where it is none.
+    not reach: to end there is a value like others, and nought itself may be given. `spread` says by how much cell files
+    are off in it, so that a hypothesis about something else may move it by that much. `counted` says how a value stands
+    to what the cell file declares of the same: by itself, `added` to it, or a `share` of it. `shift_of` names what it
+    is a shift of, as a discovery writes that with its unit (`declared_degc`); empty where it is none.
     """
 
     default: float
@@ -81,12 +81,12 @@ class Parameter:
         self.check("default", self.default)
 
     def check(self, name: str, value: float) -> float:
-        """Return `value` if it lies within the bounds.
+        """Return `value` if it lies within the bounds, or is the nought that the lower one stands for.
 
         Raises ParameterError naming the value, the range and its source.
         """
         low, high = self.bounds
-        if low <= value <= high:  # this way round, NaN fails too
+        if low <= value <= high or (self.low_is_limit and value == 0.0):  # this way round, NaN fails too
             return value
         raise ParameterError(
             f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit} ({self.source}). "

@@ -8,7 +8,7 @@ import pytest
 
 from aesi.calibration.heat import fitted, with_heat
 from aesi.calibration.records.prepared import prepared
-from aesi.errors import CellError
+from aesi.errors import CellError, ParameterError
 from aesi.physics import Cell, simulate
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.effects.self_heating import of_file
@@ -77,3 +77,22 @@ def test_records_that_do_not_warm_leave_the_file_as_it_is(warming):
 def test_a_file_without_thermal_data_is_told_what_it_lacks():
     with pytest.raises(CellError, match="Specific heat"):
         of_file(replace(NMC, specific_heat_j_kg_k=None))
+
+
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_a_file_of_a_cell_that_gives_off_no_heat_was_refused(model):
+    """Without a way out the heat stays: two pulses of opposite signs and a rest end as warm as the pulses left it."""
+    time = np.arange(0.0, 900.0, 2.0)
+    current = np.select([time < 200, time < 400], [30.0, -30.0], 0.0)
+    tight = of_file(replace(NMC, heat_transfer_w_m2_k=0.0))
+    kelvin = simulate(NMC, time, current, 0.6, [tight], model=model).series["temperature_k"]
+    assert tight.parameters["heat_transfer_w_k"] == 0.0
+    assert kelvin[210] > kelvin[0] + 0.5
+    assert np.diff(kelvin[250:]).min() > -1e-9  # through 1 mW/K, the bound, it would lose 9e-6 K a row
+
+
+def test_no_other_value_below_a_lower_bound_that_stands_for_nought_is_taken():
+    with pytest.raises(ParameterError, match=r"heat_transfer_w_k = 0\.0001"):
+        CATALOGUE["self_heating"].activate(heat_transfer_w_k=1e-4)
+    with pytest.raises(ParameterError, match="heat_capacity_factor = 0 "):
+        CATALOGUE["self_heating"].activate(heat_capacity_factor=0.0)
