@@ -14,7 +14,7 @@ from aesi.data.virtual import DEFAULT_MIX
 from aesi.errors import ConfigError, DataError, did_you_mean
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.experiment.config import NO_ROLES, ExperimentConfig
-from aesi.pipeline.experiment.sections import DataConfig, DiscoverConfig
+from aesi.pipeline.experiment.sections import DataConfig, DiscoverConfig, FallbackConfig
 from aesi.records import ROLES, Measurement, Role
 
 if TYPE_CHECKING:
@@ -69,12 +69,22 @@ def check_roles(config: ExperimentConfig) -> None:
 
 
 def named_files(config: ExperimentConfig) -> dict[str, Path]:
-    """The files of one's own that an experiment names (a saved model is a folder), by the key that names them."""
-    names = {} if config.cell.bpx == "catalogue" else {"cell": config.cell.bpx}
-    names |= {f"cell: effect_files: {name}": name for name in config.cell.effect_files}
-    if config.data.kind == "files":
-        names |= {f"data: {name}": name for name in _listed(config.data)}
+    """The files of one's own that an experiment and its fallback name (a saved model is a folder), by the key that
+    names them."""
+    names = _named(config)
+    if config.fallback is not None:
+        names |= {f"fallback: {key}": name for key, name in _named(config.fallback).items()}
     return {key: config.path(name) for key, name in names.items()}
+
+
+def _named(sections: ExperimentConfig | FallbackConfig) -> dict[str, str]:
+    """As `named_files`, of one cell and its data, as they are written."""
+    cell, data = sections.cell, sections.data
+    names = {} if cell.bpx == "catalogue" else {"cell": cell.bpx}
+    names |= {f"cell: effect_files: {name}": name for name in cell.effect_files}
+    if data.kind == "files":
+        names |= {f"data: {name}": name for name in _listed(data)}
+    return names
 
 
 def _listed(data: DataConfig) -> tuple[str, ...]:
@@ -91,8 +101,9 @@ def check_had(config: ExperimentConfig) -> None:
 
 def check_there(config: ExperimentConfig) -> None:
     """Raises ConfigError for a file of one's own that the experiment names and that is not there, with the nearest:
-    what can be known before anything is started."""
-    for what, path in named_files(config).items():
+    what can be known before anything is started. Those of a fallback are asked for where it is fallen back to."""
+    for what, name in _named(config).items():
+        path = config.path(name)
         if not path.exists() and not (what == "cell" and config.fallback):
             beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
             raise ConfigError(

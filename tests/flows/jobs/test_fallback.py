@@ -99,3 +99,22 @@ def test_what_is_wrong_with_data_that_are_there_was_told_as_data_that_cannot_be_
     monkeypatch.setattr("aesi.data.catalogue.locate", lambda name, file: record)
     with pytest.raises(DataError, match=r"drive_cycle\.csv.*voltage_v"):
         load(read_experiment(experiment, [f"cell.bpx={read_experiment(experiment).fallback.cell.bpx}"]))
+
+
+@pytest.mark.parametrize("edited", ["cell.bpx.json", "own.py", "fallback.bpx.json", "own_of_fallback.py"])
+def test_a_run_was_gone_on_with_over_an_edited_fallback(experiment, tmp_path, edited):
+    from aesi.pipeline.experiment.config import read_experiment
+    from flows.jobs.run_session import resume_key
+
+    names = {
+        "cell": ("cell.bpx.json", "own.py"),
+        "fallback.cell": ("fallback.bpx.json", "own_of_fallback.py"),
+    }
+    overrides = [f"{key}={{bpx: {bpx}, effect_files: [{own}]}}" for key, (bpx, own) in names.items()]
+    for name in sum(names.values(), ()):
+        (tmp_path / name).write_text("as it was")
+    config = read_experiment(experiment, overrides)
+    before = resume_key(config)
+    assert resume_key(config) == before
+    (tmp_path / edited).write_text("edited")
+    assert resume_key(config) != before
