@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from aesi import bench
 from aesi.bench import CaseRow
@@ -19,6 +19,9 @@ from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import fingerprint
 from flows.base.console import Console
 from flows.evaluation.spread import in_processes, on_dask
+
+if TYPE_CHECKING:
+    from flows.tracking.tracker import Tracker
 
 
 @dataclass(frozen=True)
@@ -39,35 +42,35 @@ class Cases:
 
 
 def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Iterator[CaseRow]:
-    """One row a case as it is judged, and a last one with `summary`: true.
+    """One row a case as it is judged, and a last one with `summary`: true; runs of the same name that were killed are
+    closed first.
 
     workers : processes on this machine.  address : of a Dask scheduler, whose workers see the same files.
     """
     from flows.base import environment
-    from flows.tracking.store import Store
-    from flows.tracking.tracker import Subject, Tracker
+    from flows.jobs.run_session import tracked_job
+    from flows.tracking.tracker import Subject
 
     environment.prepare_process()
     digest = sha256(repr(cases.specs).encode()).hexdigest()[:16]
     quiet = TrackingConfig(system_metrics=False, log_model=False)
-    tracker = Tracker(Store(), Subject(cases.name, cases.seed, digest, quiet), Console().say)
-    tracker.parameters({"seed": cases.seed, "cases": len(cases.specs)})
+    subject, title = Subject(cases.name, cases.seed, digest, quiet), f"{cases.name}, seed {cases.seed}"
     rows = []
-    try:
+    with tracked_job(subject, title, Console()) as tracker:
+        if tracker is not None:
+            tracker.parameters({"seed": cases.seed, "cases": len(cases.specs)})
         for row in _judged(cases, workers, address):
             rows.append(row)
-            _track(tracker, row, cases.shown)
+            if tracker is not None:
+                _track(tracker, row, cases.shown)
             yield row
         rows.sort(key=lambda row: str(row["case"]))
         last = {"seed": cases.seed, **cases.summary(rows)}
-        tracker.metrics({k: v for k, v in last.items() if isinstance(v, float)})
-        if "confusion" in last:
-            tracker.json("confusion.json", last["confusion"])
-        tracker.json("summary.json", last)
-    except BaseException:
-        tracker.end("FAILED", wait_s=5)
-        raise
-    tracker.end("FINISHED")
+        if tracker is not None:
+            tracker.metrics({k: v for k, v in last.items() if isinstance(v, float)})
+            if "confusion" in last:
+                tracker.json("confusion.json", last["confusion"])
+            tracker.json("summary.json", last)
     yield last
 
 
@@ -136,7 +139,7 @@ def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow
     return in_processes(cases.judge, cases.specs, workers)
 
 
-def _track(tracker: Any, row: CaseRow, shown: tuple[str, ...]) -> None:
+def _track(tracker: Tracker, row: CaseRow, shown: tuple[str, ...]) -> None:
     parameters = {k: v if isinstance(v, str) else json.dumps(v) for k, v in row.items() if k in shown}
     metrics = {k: float(v) for k, v in row.items() if isinstance(v, bool | float) and k not in shown}
     tracker.nested(f"case:{row['case']}", row["case"], "case", parameters, metrics, seconds=row["ours_s"])

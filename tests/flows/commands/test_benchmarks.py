@@ -1,12 +1,15 @@
 """The benchmarks of the platform, small: they measure what they say, and leave nothing behind."""
 
 import json
+import time
 from pathlib import Path
 
 import pytest
 
 from aesi.errors import InputError
 from flows import benchmarks
+from flows.benchmarks.cases import Cases
+from flows.benchmarks.cases import tracked as of_cases
 from flows.benchmarks.history import (
     WATCHED,
     Entry,
@@ -16,6 +19,7 @@ from flows.benchmarks.history import (
     worth_keeping,
     write_history,
 )
+from flows.tracking.run_records import RunLock, RunRecord, records
 from flows.tracking.store import KIND, Store
 
 
@@ -54,6 +58,27 @@ def test_the_options_of_every_benchmark_are_checked():
     for name in benchmarks.BENCHMARKS:
         with pytest.raises(InputError, match="has no such option"):
             next(benchmarks.run(name, no_such_option=1))
+
+
+def test_a_benchmark_that_was_killed_was_tracked_as_running_for_ever(tracked):
+    store = Store()
+    killed = store.create_run(store.experiment("small"), "small, seed 0", {KIND: "run"})
+    RunRecord(killed, "small", "0", store.uri, time.time()).write()
+    cases = Cases("small", 0, ["a", "b"], lambda spec: {"case": spec, "ours_s": 0.0}, lambda rows: {}, ())
+    lines = of_cases(cases)
+    next(lines)
+    (now,) = [record for record in records("small") if record.status == "running"]
+    assert not RunLock(now.run_id).acquire()
+    assert [line.get("case") for line in lines] == ["b", None]
+    ended = {
+        run.info.run_id: run.info.status
+        for run in store.runs(store.find_experiment("small"), f"tags.`{KIND}` = 'run'")
+    }
+    assert ended == {killed: "KILLED", now.run_id: "FINISHED"}
+    assert {record.run_id: record.status for record in records("small")} == {
+        killed: "killed",
+        now.run_id: "finished",
+    }
 
 
 @pytest.mark.slow
