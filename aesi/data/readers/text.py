@@ -193,10 +193,10 @@ class TextTable:
             )
         for position in positions:
             cell = cells[position].strip()
-            if cell not in MISSING and not NUMBER.fullmatch(cell.replace(self._layout.decimal, ".")):
+            if cell not in MISSING and not _is_number(cell, self._layout.decimal):
                 raise DataError(
                     f"{place}: column {self.header[position]!r} holds {cell[:40]!r}, which is not a "
-                    f"number{_advice(cell)}."
+                    f"number{_advice(cell, self._layout)}."
                 )
 
     def _damaged(self, error: Exception) -> DataError:
@@ -216,11 +216,24 @@ class TextTable:
         return layout_of(text, encoding, whole=len(head) < HEAD_BYTES, name=self.path.name, wanted=wanted)
 
 
-def _advice(cell: str) -> str:
+def _is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell is a number with that decimal sign: beside a decimal comma a point is none."""
+    return bool(NUMBER.fullmatch(cell.replace(decimal, "."))) and (decimal == "." or "." not in cell)
+
+
+def _advice(cell: str, layout: Layout) -> str:
     if re.match(r"\d{1,4}[-/.:]\d{1,2}[-/.:]\d", cell):
         return (
             ": declare what it is: --unit time_s=h:m:s, --unit time_s=date (2024-05-31 12:00:00), or a pattern such as "
             "--unit 'time_s=%m/%d/%Y %H:%M:%S.%f'"
+        )
+    if layout.decimal == "," and "." in cell:
+        return (
+            ": other numbers have a decimal comma; write it in all of them, and nothing between the thousands"
+        )
+    if "," in cell and layout.separator != ",":
+        return (
+            ": other numbers have a decimal point; write it in all of them, and nothing between the thousands"
         )
     if "," in cell:
         return (

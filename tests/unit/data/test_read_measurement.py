@@ -135,6 +135,20 @@ def test_one_bad_row_is_named(tmp_path, line, words):
 
 
 @pytest.mark.parametrize(
+    ("decimal", "cell", "sign"),
+    [(",", "1.000", "comma"), (",", "1.000,0", "comma"), (",", "4.5", "comma"), (".", "1,000.0", "point")],
+)
+def test_a_number_written_otherwise_than_the_rest_was_told_in_the_words_of_a_library(
+    tmp_path, decimal, cell, sign
+):
+    lines = text(separator=";", header="time_s;current_a;voltage_v").replace(".", decimal).splitlines()
+    lines[100] = f"{cell};5{decimal}0;3{decimal}7"
+    message = refusal(tmp_path, "\n".join(lines))
+    assert f"drive.csv, row 100 (line 101): column 'time_s' holds '{cell}'" in message
+    assert f"other numbers have a decimal {sign}; write it in all of them" in message
+
+
+@pytest.mark.parametrize(
     ("order", "words"),
     [
         pytest.param(np.arange(N)[::-1], "199 times in all: sort the rows", id="reversed"),
