@@ -61,13 +61,22 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
         raw = json.loads(text, object_pairs_hook=_each_once)
     except json.JSONDecodeError as error:
         raise CellError(
-            f"{path} is not JSON ({error.msg} in line {error.lineno}), so no BPX file; is it a record?"
+            f"{path} is not JSON ({error.msg} in line {error.lineno}), so no BPX file{_of_text(text)}"
         ) from None
     except _Twice as error:
         raise CellError(f"{path}: the field {error} is there twice in one section; leave one.") from None
     if not isinstance(raw, dict):
         raise CellError(f"{path} does not hold a BPX object with a Header and a Parameterisation.")
     return raw, str(path)
+
+
+def _of_text(text: str) -> str:
+    """What a file that is no JSON rather is, by how it begins; the end of a sentence."""
+    if not text.strip():
+        return ": it is empty; copy or export it again."
+    if text.lstrip().startswith(("{", "[")):
+        return ": it is damaged or cut short; correct that line, or copy or export it again."
+    return "; is it a record or an experiment?"
 
 
 class _Twice(Exception):

@@ -432,6 +432,21 @@ def test_a_file_that_is_no_text_is_refused_in_one_sentence(tmp_path):
         Cell.from_bpx(tmp_path / "record.mpr")
 
 
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ('{"Header": {', "it is damaged or cut short"),
+        ("\n", "it is empty"),
+        ("name: smoke\n", "is it a record or an experiment?"),
+    ],
+)
+def test_a_cell_file_that_was_cut_short_was_taken_for_a_record(tmp_path, content, words):
+    (tmp_path / "cell.json").write_text(content)
+    with pytest.raises(CellError) as refused:
+        Cell.from_bpx(tmp_path / "cell.json")
+    assert words in str(refused.value)
+
+
 @pytest.mark.parametrize("soc", [0.02, 0.4, 0.97])
 def test_the_rest_voltage_leads_back_to_the_state_of_charge(lg_m50, soc):
     voltage = float(lg_m50.rest_voltage_v(soc)[0])
