@@ -23,6 +23,8 @@ from aesi.physics.cell import checked_soh
 CELL_FILES = ("*.bpx.json", "*.json")
 LAID_BESIDE = (".", "~$")
 """How the names of what systems lay beside files begin: hidden ones, and locks of open workbooks."""
+OTHER_SIGNS = {";": "semicolons", "\t": "tabs"}
+"""What else separates the cells of tables, and is not read: a semicolon stands between the files of one cell."""
 COLUMNS = ("name", "data", "cell", "test", "soc0", "soh", "specimen", "at")
 
 
@@ -152,6 +154,12 @@ def _of_table(table: Path, cell: Path | None) -> tuple[Job, ...]:
 def _jobs(table: Path, stream: TextIO, cell: Path | None) -> Iterator[Job]:
     reader = csv.DictReader(stream)
     header = tuple(reader.fieldnames or ())
+    other = next((sign for sign in OTHER_SIGNS if len(header) == 1 and sign in header[0]), None)
+    if other is not None:
+        raise InputError(
+            f"{table} is separated by {OTHER_SIGNS[other]}; separate its cells by commas (several files of one cell "
+            "are separated by ;)."
+        )
     unknown = [name for name in header if name not in COLUMNS]
     if unknown or not {"name", "data"} <= set(header):
         raise InputError(

@@ -110,6 +110,8 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
         ("name,data\n,s.csv\n", "have to be given"),
         ("name,data\n../a,s.csv\n", "without slashes"),
         ("name,data\n..,s.csv\n", "starts with no dot"),
+        ("name;data\na;s.csv\n", "is separated by semicolons; separate its cells by commas"),
+        ("name\tdata\na\ts.csv\n", "is separated by tabs; separate its cells by commas"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_one_sentence(tmp_path, content, words):
