@@ -79,6 +79,10 @@ def wanted(fault: Mapping[str, Any]) -> str:
         return "has to be a list, in [ ]"
     if fault["type"] == "missing":
         return "lacks a value"
+    if fault["type"] == "dict_type":
+        return "takes keys with a value each, as in {KEY: VALUE}"
+    if fault["type"] in ("bool_parsing", "bool_type"):
+        return "has to be true or false"
     said = fault["msg"].rstrip(".").split(", unable to ")[0].split(", got ")[0]
     own = said.removeprefix("Input should ")
     return f"has to {own}" if own != said else said[:1].lower() + said[1:]

@@ -96,6 +96,11 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
             "window = 18 cannot hold the 19 residuals that enbpi needs at alpha = 0.1",
         ),
         ({"data": {"kind": "virtual", "virtual": {"seed": -1}}}, "data.virtual.seed = -1"),
+        ({"data": {"kind": "files", "columns": "I"}}, "it takes keys with a value each, as in {KEY: VALUE}"),
+        (
+            {"library": {"special": "ja"}},
+            "library.special = 'ja' is not admissible: it has to be true or false",
+        ),
     ],
 )
 def test_an_inadmissible_value_is_named(changes, words):
