@@ -21,6 +21,8 @@ NEEDED = ("frequency_hz", "z_real_ohm", "z_imag_ohm")
 STATES = ("soc", "discharged_ah")
 MOST_AGAIN = 1
 """Frequencies of one spectrum that come again: one of 27 measured ones has one twice."""
+SLOW_HZ = 1.0
+"""Below it a cell is capacitive: so are all 27 spectra measured of the Panasonic NCR18650PF, in each row."""
 DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
 
 
@@ -56,6 +58,7 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     if not (columns["frequency_hz"] > 0.0).all():
         raise DataError(f"{file}, column frequency_hz: a frequency has to be positive.")
     _check_temperature(columns, table)
+    _check_capacitive(columns, table)
     told_apart: list[AnyArray] = [columns[name] for name in STATES if name in columns]
     if LABEL in header:
         told_apart += [np.array(words) for words in table.read_text((header.index(LABEL),))]
@@ -76,6 +79,16 @@ def _check_temperature(columns: dict[str, Array], table: TableFile) -> None:
         raise DataError(
             f"{table.path.name}, {table.where(row)}, column temperature_degc: {degc[row]:.6g} degC is outside "
             f"{COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; correct the column or leave it out."
+        )
+
+
+def _check_capacitive(columns: dict[str, Array], table: TableFile) -> None:
+    """Raises DataError where the imaginary part is positive in all slow rows: written as in a plot of Nyquist, -Im."""
+    slow = np.flatnonzero(columns["frequency_hz"] < SLOW_HZ)
+    if slow.size and (columns["z_imag_ohm"][slow] > 0.0).all():
+        raise DataError(
+            f"{table.path.name}, {table.where(int(slow[0]))}, column z_imag_ohm: it is positive in all rows below "
+            f"{SLOW_HZ:g} Hz, where a cell is capacitive and it has to be negative; if it holds -Im(Z), turn its sign."
         )
 
 

@@ -77,3 +77,9 @@ def test_spectra_of_two_files_were_called_alike_by_what_is_before_the_first_poin
 def test_of_a_column_that_is_there_twice_the_first_was_taken_without_a_word(tmp_path):
     with pytest.raises(DataError, match="has 2 columns named 'soc'; rename all but one"):
         read_spectra(written(tmp_path, f"{COLUMNS},soc,soc", f"{POINTS[0]},0.5,0.6"))
+
+
+def test_an_imaginary_part_as_nyquist_plots_have_it_was_drawn_the_wrong_way_up(tmp_path):
+    rows = ("100,0.010,-0.001,0.5", "0.1,0.011,0.002,0.5", "0.01,0.012,0.004,0.5")
+    with pytest.raises(DataError, match=r"row 2 \(line 3\), column z_imag_ohm: .* turn its sign"):
+        read_spectra(written(tmp_path, f"{COLUMNS},soc", *rows))
