@@ -8,6 +8,7 @@ Nocedal & Wright, Numerical Optimization, 2nd ed. (2006), chapters 10, 11 and 16
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import count
 from typing import Protocol
@@ -174,3 +175,28 @@ def _within(curvature: Array, gradient: Array, least: Array, most: Array) -> Arr
 
 def _half_square(residual: Array) -> float:
     return 0.5 * float(residual @ residual)
+
+
+def slope_within(
+    function: Callable[[Array], Array | None],
+    x: Array,
+    here: Array,
+    j: int,
+    bounds: tuple[float, float],
+    step: float,
+) -> Array | None:
+    """(n,) slope of a function of x (k,) over x[j] by a one-sided difference: forward where the bounds leave room, else
+    backward; to the other side where the function has no value.
+
+    function : x -> (n,), None where it has no value.  here : (n,) at x.  bounds : of x[j]; the step is at most a
+    quarter of what they span.  None where there is a value on neither side.
+    """
+    low, high = bounds
+    size = min(step, 0.25 * (high - low))
+    for h in (size, -size) if x[j] + size <= high else (-size, size):
+        moved = x.copy()
+        moved[j] += h
+        there = function(moved) if low <= moved[j] <= high else None
+        if there is not None:
+            return (there - here) / h
+    return None

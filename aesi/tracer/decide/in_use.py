@@ -13,6 +13,7 @@ from itertools import product
 import numpy as np
 
 from aesi.errors import AesiError
+from aesi.numerics.bounded import slope_within
 from aesi.numerics.typing import Array, BoolArray
 from aesi.records import Measurement
 from aesi.tracer.case.blocks import Blocks
@@ -77,10 +78,8 @@ def _slopes_v(
     for j, one in enumerate(fit.free):
         if one.record is not None:
             continue
-        sides = (STEP, -STEP) if x[j] + STEP <= one.bounds[1] else (-STEP, STEP)
-        beside = ((h, voltage_v(x + h * (np.arange(len(x)) == j))) for h in sides)
-        found = next(((there - held) / h for h, there in beside if there is not None), None)
-        if found is None:
+        slope = slope_within(voltage_v, x, held, j, one.bounds, STEP)
+        if slope is None:
             return None
-        slopes[:, j] = found
+        slopes[:, j] = slope
     return slopes

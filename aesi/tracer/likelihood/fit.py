@@ -9,7 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
-from aesi.numerics.bounded import descend
+from aesi.numerics.bounded import descend, slope_within
 from aesi.numerics.metrics import rms
 from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array, BoolArray
@@ -107,20 +107,22 @@ class HypothesisFitter:
 
     def _slope(self, x: Array, residual: Array, j: int) -> tuple[Array | None, int]:
         """(n,) V, None where the model fails on both sides, and the simulations that it took."""
-        one = self.free[j]
-        size = min(STEP, 0.25 * (self.high[j] - self.low[j]))
-        only = one.record
+        only = self.free[j].record
         rows = slice(None) if only is None else self.problem.slices[only]
-        sides = (size, -size) if x[j] + size <= self.high[j] else (-size, size)
-        for count, h in enumerate(sides, start=1):
-            moved = x.copy()
-            moved[j] = x[j] + h
+        simulations = 0
+
+        def error_v(moved: Array) -> Array | None:
+            nonlocal simulations
+            simulations += 1
             predicted = self.problem.predict(values_of(self.free, moved), only)
-            if predicted is not None:
-                column = np.zeros(len(residual))
-                column[rows] = (residual[rows] - (self.problem.measured[rows] - predicted)) / h
-                return column, count
-        return None, len(sides)
+            return None if predicted is None else self.problem.measured[rows] - predicted
+
+        slope = slope_within(error_v, x, residual[rows], j, (self.low[j], self.high[j]), STEP)
+        if slope is None:
+            return None, simulations
+        column = np.zeros(len(residual))
+        column[rows] = -slope
+        return column, simulations
 
     def descend(
         self,

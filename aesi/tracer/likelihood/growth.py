@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from aesi.numerics.bounded import descend, foreseen_cost
+from aesi.numerics.bounded import descend, foreseen_cost, slope_within
 from aesi.numerics.typing import Array, IntArray
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.free_parameter import (
@@ -144,31 +144,24 @@ class EffectGrowth:
         """(n,) V, or None where the model fails."""
         key = u.tobytes()
         if key not in self._errors:
-            self.simulations += 1
-            values = {**self.held, **values_of(self.added, u)}
-            predicted = self.problem.predict(values)
-            self._errors[key] = None if predicted is None else self.problem.measured - predicted
+            self._errors[key] = self._simulated_error_v(u)
         return self._errors[key]
+
+    def _simulated_error_v(self, u: Array) -> Array | None:
+        self.simulations += 1
+        predicted = self.problem.predict({**self.held, **values_of(self.added, u)})
+        return None if predicted is None else self.problem.measured - predicted
 
     def jacobian(self, u: Array, e: Array) -> Array | None:
         """(n, k) V of the model, by one-sided differences within the bounds."""
         if u.tobytes() in self._slopes:
             return self._slopes[u.tobytes()]
         out = np.zeros((len(e), len(u)))
-        for j in range(len(u)):
-            size = min(STEP, 0.25 * (self.high[j] - self.low[j]))
-            for h in (size, -size) if u[j] + size <= self.high[j] else (-size, size):
-                moved = u.copy()
-                moved[j] += h
-                if not self.low[j] <= moved[j] <= self.high[j]:
-                    continue
-                self.simulations += 1
-                predicted = self.problem.predict({**self.held, **values_of(self.added, moved)})
-                if predicted is not None:
-                    out[:, j] = (e - (self.problem.measured - predicted)) / h
-                    break
-            else:
+        for j, bounds in enumerate(zip(self.low, self.high, strict=True)):
+            slope = slope_within(self._simulated_error_v, u, e, j, bounds, STEP)
+            if slope is None:
                 return None
+            out[:, j] = -slope
         self._slopes[u.tobytes()] = out
         return out
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear, rosen
 
-from aesi.numerics.bounded import descend
+from aesi.numerics.bounded import descend, slope_within
 
 
 @dataclass
@@ -117,3 +117,29 @@ def test_a_step_that_goes_too_far_is_damped_until_it_gains():
     flat = Counted(lambda x: x, lambda x: np.array([[1e-3]]))
     found = descend(flat, np.array([1.0]), np.array([-9.0]), np.array([9.0]), 20, 1e-9)
     assert found.cost < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("at", "fails", "slope"),
+    [
+        (0.0, lambda x: False, 1.0),  # forward
+        (1.0, lambda x: False, -1.0),  # no room forward
+        (0.5, lambda x: x > 0.5, -1.0),  # no value forward
+        (0.0, lambda x: x > 0.0, None),  # and none within the bounds on the other side
+        (0.5, lambda x: True, None),
+    ],
+)
+def test_a_slope_is_taken_within_the_bounds_and_where_there_is_a_value(at, fails, slope):
+    def kinked(x):  # about `at`: its slope tells on which side it was taken
+        return None if fails(x[1]) else np.array([abs(x[1] - at), 3.0 * x[0]])
+
+    found = slope_within(kinked, np.array([2.0, at]), np.array([0.0, 6.0]), 1, (0.0, 1.0), 1e-3)
+    assert (found is None) == (slope is None)
+    if slope is not None:
+        assert found == pytest.approx([slope, 0.0])
+
+
+def test_a_step_is_at_most_a_quarter_of_what_the_bounds_span():
+    asked = []
+    slope_within(lambda x: asked.append(x[0]), np.array([0.5]), np.zeros(1), 0, (0.5, 0.54), 1.0)
+    assert asked == pytest.approx([0.51])
