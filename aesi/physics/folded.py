@@ -12,7 +12,8 @@ from aesi.physics.model import EspmModel
 
 @dataclass(frozen=True)
 class Folded:
-    """cell : with what it can hold.  held, left : the effects that are in it now, and those that are not."""
+    """cell : with what it can hold, named in its description, which else would tell of a file's author alone.
+    held, left : the effects that are in it now, and those that are not."""
 
     cell: Cell
     held: tuple[ActiveEffect, ...]
@@ -41,6 +42,9 @@ def folded(cell: Cell, effects: Iterable[ActiveEffect]) -> Folded:
         else:
             cell = changed
             held.append(active)
+    if held:
+        changed_by = f"Values changed by {', '.join(map(repr, held))}."
+        cell = replace(cell, description=f"{cell.description} {changed_by}".strip())
     return Folded(cell, tuple(held), tuple(left))
 
 

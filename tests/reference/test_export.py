@@ -62,6 +62,9 @@ def test_a_written_bpx_file_gives_the_same_voltage(cell, tmp_path):
     done = export(saved(cell, INSIDE, tmp_path), tmp_path / "found.json", "bpx")
     assert any("User-defined" in sentence for sentence in done.left)
     again = aesi.Cell.from_bpx(done.files[0])
+    # whose values they were, and that some are others now
+    assert again.description.startswith(cell.description)
+    assert "Values changed by series_resistance(resistance_ohm=0.008), solid_diff" in again.description
     ours = aesi.simulate(cell, TIME, CURRENT, soc0=0.8, effects=INSIDE).voltage_v
     np.testing.assert_allclose(aesi.simulate(again, TIME, CURRENT, soc0=0.8).voltage_v, ours, atol=1e-5)
 
