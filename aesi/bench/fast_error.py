@@ -23,8 +23,9 @@ import numpy as np
 from aesi.bench.real.case import RealCase
 from aesi.bench.real.judge import HELD_OUT, declared_cell, record
 from aesi.bench.real.plan import chosen
-from aesi.bench.real.repeatability import ratio, rms
+from aesi.bench.real.repeatability import ratio
 from aesi.constants import MV_PER_V
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import OHMIC_SHARE

@@ -31,6 +31,7 @@ from aesi.calibration.shapes import SPAN_K, Shapes
 from aesi.calibration.start import one_branch, sized, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
@@ -80,7 +81,7 @@ def calibrate(
     weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
     scaled = jacobian * weights[:, None]
     covariance = np.linalg.inv(scaled.T @ scaled)
-    rms = {name: [_rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
+    left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
     shares = capacities(model, x)
     return Calibration(
         cell=replace(found, fitted_with=model.physics, capacity_shares=tuple(shares.items())),
@@ -89,7 +90,7 @@ def calibrate(
         undetermined=undetermined(model, scaled),
         at_bounds=at_bounds(model, x),
         errors=tuple(
-            RecordError(r.name, _degc(r), rms["declared"][i], rms["fitted"][i], rms["simulated"][i])
+            RecordError(r.name, _degc(r), left_v["declared"][i], left_v["fitted"][i], left_v["simulated"][i])
             for i, r in enumerate(model.records)
         ),
         capacities=shares,
@@ -177,10 +178,6 @@ def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tup
         if at_s := {words: at for words, at in found.items() if at is not None}:
             out.append(ran_out(record.name, at_s))
     return tuple(out)
-
-
-def _rms(error_v: Array) -> float:
-    return float(np.sqrt(np.mean(error_v**2)))
 
 
 def _told(model: Model, x: Array) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 
 from aesi.calibration.records.prepared import Prepared
 from aesi.constants import ZERO_CELSIUS_K
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.simulation import simulate
@@ -85,7 +86,7 @@ def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float) -> HeatFit
     rows = sum(len(watts) for _, watts in driven)
     errors = off(z)[:rows]
     counts = np.concatenate([np.full(len(w), len(w) ** 0.5) for _, w in driven])
-    rmse = float(np.sqrt(np.mean((errors * counts * READING_K) ** 2)))
+    rmse = rms(errors * counts * READING_K)
     return HeatFit(
         float(start_j_k * np.exp(z[0])),
         float(TYPICAL_W_K * np.exp(z[1])),
@@ -109,7 +110,7 @@ def heat_w(cell: Cell, record: Prepared) -> Array:
         on_depletion="clip",
     )  # fmt: skip
     soc = np.clip(run.series["soc"], 0.0, 1.0)
-    theta_n, theta_p = cell.stoichiometries(soc)  # type: ignore[arg-type]
+    theta_n, theta_p = cell.balance.stoichiometries(soc)
     entropic = cell.positive.entropic(np.asarray(theta_p)) - cell.negative.entropic(np.asarray(theta_n))
     rise = record.kelvin - cell.reference_temperature_k
     open_circuit = cell.rest_voltage_v(soc) + rise * entropic

@@ -10,6 +10,7 @@ import numpy as np
 
 from aesi.calibration.model import Model
 from aesi.constants import MV_PER_V
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 
@@ -139,11 +140,11 @@ def information_weights(model: Model, errors: Sequence[Array]) -> list[Array]:
     out = []
     for record, error, weight in zip(model.records, errors, model.weights, strict=True):
         seen = error[record.trusted]
-        rms = max(float(np.sqrt(np.mean(seen**2))), 1e-6)
+        scale = max(rms(seen), 1e-6)
         centred = seen - seen.mean()
         rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
         share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
-        out.append(np.sqrt(share) / rms / np.where(weight > 0.0, weight, 1.0))
+        out.append(np.sqrt(share) / scale / np.where(weight > 0.0, weight, 1.0))
     return out
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from aesi.numerics.typing import Array
@@ -18,9 +20,9 @@ def rmse(truth: Array, prediction: Array) -> float:
     return float(np.sqrt(mse(truth, prediction)))
 
 
-def rms(values: Array) -> float:
+def rms(values: Array | Sequence[float]) -> float:
     """Root mean square of values of any shape, in their own unit."""
-    return float(np.sqrt(np.mean(values**2)))
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def mser(error: Array, prediction: Array) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, SECONDS_PER_HOUR
 from aesi.errors import DataError, SimulationError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, IntArray, Numbers
 from aesi.over_time import extent, over_time
 from aesi.physics import Cell, ModelName, simulate
@@ -77,7 +78,7 @@ class CrossCheck:
 
     @property
     def rmse_mv(self) -> float:
-        return MV_PER_V * float(np.sqrt(np.mean((self.ours_v - self.pybamm_v) ** 2)))
+        return MV_PER_V * rms(self.ours_v - self.pybamm_v)
 
     @property
     def max_mv(self) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 
 from aesi.data.readers import open_table
 from aesi.errors import DataError, InputError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.effect import ActiveEffect
@@ -154,7 +155,7 @@ def held_against(
         z = impedance(cell, spectrum.frequency_hz, soc, degc, effects, model=model)
         seen = (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
         ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
-        off = float(np.sqrt(np.mean(ratio**2))) if seen.any() else None
+        off = rms(ratio) if seen.any() else None
         out.append(SpectrumError(spectrum, soc, z, off))
     return tuple(out), tuple(told)
 

@@ -16,6 +16,7 @@ from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
 from aesi.data.resample import DENSE
 from aesi.errors import DataError, InputError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
@@ -181,7 +182,7 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
     if np.all(np.isfinite(record.voltage_v)):
         error = MV_PER_V * (record.voltage_v - voltage_v)
         said.append(
-            f"{record.name}: against the measured voltage {np.sqrt(np.mean(error**2)):.2f} mV RMSE, "
+            f"{record.name}: against the measured voltage {rms(error):.2f} mV RMSE, "
             f"{np.mean(error):+.2f} mV in the mean (measured minus model), at most {np.max(np.abs(error)):.1f} mV."
         )
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known

@@ -172,10 +172,10 @@ def resume_key(config: ExperimentConfig) -> str:
 def _unfinished(config: ExperimentConfig, store: Store, console: Console) -> RunRecord | None:
     """The newest unfinished run of the same experiment, settings, files and program that is still in the store and that
     nobody works on."""
-    for record in records(config.name):
-        if record.status not in UNFINISHED or record.uri != store.uri:
-            continue
-        if record.config_digest != resume_key(config) or not store.holds(record.run_id):
+    there = [one for one in records(config.name) if one.status in UNFINISHED and one.uri == store.uri]
+    key = resume_key(config) if there else ""
+    for record in there:
+        if record.config_digest != key or not store.holds(record.run_id):
             continue
         lock = RunLock(record.run_id)
         if lock.acquire():

@@ -22,6 +22,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V
 from aesi.errors import InputError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import reach
@@ -127,13 +128,13 @@ def _figures(one: Fitted, tests: Sequence[ErrorSeries]) -> dict[str, Any]:
     declared = np.concatenate([series.left_by(DECLARED) for series in tests])
     left = truth - np.concatenate([run.error_v for run in runs])
     figures: dict[str, Any] = {
-        "rmse_mv": MV_PER_V * float(np.sqrt(np.mean(left**2))),
+        "rmse_mv": MV_PER_V * rms(left),
         "mser_pct": float(100.0 * (1.0 - np.mean(left**2) / np.mean(declared**2))),
         "diverged": sum(run.diverged_at is not None for run in runs),
     }
     ends = np.cumsum([len(series) for series in tests])[:-1]
     drives = {
-        series.name: {"rmse_mv": MV_PER_V * float(np.sqrt(np.mean(part**2)))}
+        series.name: {"rmse_mv": MV_PER_V * rms(part)}
         for series, part in zip(tests, np.split(left, ends), strict=True)
     }
     figures["drives"] = drives

@@ -19,6 +19,7 @@ from aesi.bench.limit import Stopwatch
 from aesi.calibration import calibrate
 from aesi.calibration.fit import EVALUATIONS
 from aesi.constants import MILLI, MV_PER_V
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, simulate
 from aesi.physics.cell.relations import scaled
@@ -98,4 +99,4 @@ def _record(truth: Cell, name: str, current: Array, soc0: float, rng: np.random.
 
 def _error_mv(cell: Cell, record: Measurement, soc0: float) -> float:
     run = simulate(cell, record.time_s, record.current_a, soc0, hold="backward", model="espm")
-    return round(MV_PER_V * float(np.sqrt(np.mean((record.voltage_v - run.voltage_v) ** 2))), 2)
+    return round(MV_PER_V * rms(record.voltage_v - run.voltage_v), 2)

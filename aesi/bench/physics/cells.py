@@ -26,6 +26,7 @@ from aesi.constants import MV_PER_V
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import Cell, initial_state, simulate
 from aesi.records import Measurement
@@ -216,7 +217,7 @@ def free_run(cell: Cell, data: Measurement) -> FreeRunError:
     """A free run over all rows, held backward as loggers write, from the state of charge of the first."""
     error, gone = _errors(cell, data, initial_state(cell, data).soc)
     out_s = float(data.time_s[int(np.argmax(gone))]) if gone.any() else None
-    return FreeRunError(round(MV_PER_V * float(np.sqrt(np.mean(error**2))), 2), out_s)
+    return FreeRunError(round(MV_PER_V * rms(error), 2), out_s)
 
 
 def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
@@ -227,7 +228,7 @@ def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
     soc = initial_state(cell, data).soc - data.discharged_ah("backward") / cell.capacity_ah
     parts = [slice(k, k + rows) for k in range(0, len(data), rows)]
     errors = [_errors(cell, data.take(part), float(soc[part.start]))[0] for part in parts]
-    return round(MV_PER_V * float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), 2)
+    return round(MV_PER_V * rms(np.concatenate(errors)), 2)
 
 
 def _errors(cell: Cell, data: Measurement, soc0: float) -> tuple[Array, BoolArray]:

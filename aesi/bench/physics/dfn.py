@@ -22,6 +22,7 @@ from aesi.bench.physics.espm import STEP_S, random_load
 from aesi.bench.physics.published import published
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import InputError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, EspmModel
 from aesi.physics.dfn.run import run_porous_electrode
@@ -196,6 +197,6 @@ def _peer(load: Load, across: int, within: int, graded: bool = False) -> PybammR
 
 def _errors_mv(a: Array, b: Array) -> CaseRow:
     return {
-        "rmse_mv": 1e3 * float(np.sqrt(np.mean((a - b) ** 2))),
+        "rmse_mv": 1e3 * rms(a - b),
         "max_mv": 1e3 * float(np.abs(a - b).max()),
     }

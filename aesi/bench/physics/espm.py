@@ -12,6 +12,7 @@ import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
 from aesi.errors import InputError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, simulate
 from aesi.physics.simulation import forget_solutions
@@ -85,4 +86,4 @@ def _timed(cell: Cell, time: Array, current: Array) -> tuple[float, Array]:
 
 
 def _rmse_mv(a: Array, b: Array) -> float:
-    return float(np.sqrt(np.mean((a - b) ** 2))) * 1e3
+    return rms(a - b) * 1e3

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from aesi.bench import CaseRow
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError
+from aesi.numerics.metrics import rms
 from aesi.physics import Cell, simulate
 
 SET = "about_energy_nmc"
@@ -38,5 +37,5 @@ def published() -> Iterator[CaseRow]:
         except AesiError as error:
             yield row | {"error": str(error)}
             continue
-        ours = MV_PER_V * float(np.sqrt(np.mean((run.voltage_v - data.voltage_v) ** 2)))
+        ours = MV_PER_V * rms(run.voltage_v - data.voltage_v)
         yield row | {"rmse_mv": ours, "apart_mv": abs(ours - theirs)}

@@ -20,6 +20,7 @@ from aesi.bench.physics.cells import HG2, NCR, cell_of
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError, DataError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, initial_state
 from aesi.records import Measurement
@@ -91,7 +92,7 @@ def figures(rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
         sd = np.array([r["sd"] for r in read if r["basis"] == basis])
         if len(off):
             key = basis.replace(" ", "_")
-            out |= {key: len(off), f"{key}_rms_points": _points(np.sqrt(np.mean(off**2)))}
+            out |= {key: len(off), f"{key}_rms_points": _points(rms(off))}
             out |= {f"{key}_worst_points": _points(np.abs(off).max()), f"{key}_worst_sds": _worst(off, sd)}
     if read:
         out["right_doubted_pct"] = _points(np.mean([r["doubted"] for r in read]))

@@ -18,6 +18,7 @@ import numpy as np
 
 from aesi.constants import MILLI, ZERO_CELSIUS_K
 from aesi.errors import DataError
+from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.simulation import model_with
@@ -54,7 +55,7 @@ def course_row(found: Discovery, told: Measurement, measured_degc: Array) -> dic
     return {
         "measured_mean_degc": float(np.mean(measured_degc)),
         "mean_off_k": float(np.mean(difference)),
-        "course_rms_k": float(np.sqrt(np.mean(difference**2))),
+        "course_rms_k": rms(difference),
     }
 
 

@@ -24,6 +24,7 @@ from aesi.bench.real.case import Take
 from aesi.bench.real.judge import declared_cell, record
 from aesi.bench.real.plan import CELLS, HG2, NMC, PANASONIC, WINDOW_S
 from aesi.constants import MV_PER_V
+from aesi.numerics.metrics import rms
 from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import Grown, Parent
@@ -106,10 +107,6 @@ def main() -> None:
         "model_error_mv": round(float(np.exp(np.mean(np.log(errors_mv)))), 2),
     }
     print(json.dumps({"summary": True, **summary}))
-
-
-def rms(values: list[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 if __name__ == "__main__":

@@ -217,8 +217,7 @@ class CellParameters:
 
     def stoichiometries(self, soc: float) -> tuple[float, float]:
         """Rest stoichiometries (negative, positive) at a state of charge, by the declared limits."""
-        theta_n, theta_p = self.balance.stoichiometries(soc)
-        return theta_n, theta_p
+        return self.balance.stoichiometries(soc)
 
     def rest_voltage_v(self, soc: float | Array) -> Array:
         """(n,) V, the open-circuit voltage at the reference temperature."""

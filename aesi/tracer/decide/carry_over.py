@@ -48,7 +48,7 @@ class LeftOut:
     @property
     def pooled_v(self) -> float:
         """Root mean square over the records, V."""
-        return rms(np.array(self.by_record))
+        return rms(self.by_record)
 
     def harms(self, other: LeftOut) -> bool:
         """Is the model worse than another one in a range of charge, by more than models of measured cells err by and
