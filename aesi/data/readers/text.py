@@ -227,18 +227,13 @@ def _advice(cell: str, layout: Layout) -> str:
             ": declare what it is: --unit time_s=h:m:s, --unit time_s=date (2024-05-31 12:00:00), or a pattern such as "
             "--unit 'time_s=%m/%d/%Y %H:%M:%S.%f'"
         )
-    if layout.decimal == "," and "." in cell:
-        return (
-            ": other numbers have a decimal comma; write it in all of them, and nothing between the thousands"
-        )
-    if "," in cell and layout.separator != ",":
-        return (
-            ": other numbers have a decimal point; write it in all of them, and nothing between the thousands"
-        )
+    if re.match(r"[+-]?[\d.,]+\s*(?!e[+-]?\d)[^\W\d_]", cell, re.IGNORECASE):
+        return ": write numbers alone, and the unit in the name of the column"
+    if layout.separator != "," and ("," in cell or (layout.decimal == "," and "." in cell)):
+        sign = "comma" if layout.decimal == "," else "point"
+        return f": other numbers have a decimal {sign}; write it in all of them, and nothing between the thousands"
     if "," in cell:
         return (
             ": write nothing between the thousands and a decimal point, or separate the cells by semicolons"
         )
-    if re.match(r"[+-]?[\d.]+\s*[^\W\d_]", cell):
-        return ": write numbers alone, and the unit in the name of the column"
     return ""

@@ -136,7 +136,15 @@ def test_one_bad_row_is_named(tmp_path, line, words):
 
 @pytest.mark.parametrize(
     ("decimal", "cell", "sign"),
-    [(",", "1.000", "comma"), (",", "1.000,0", "comma"), (",", "4.5", "comma"), (".", "1,000.0", "point")],
+    [
+        (",", "1.000", "comma"),
+        (",", "1.000,0", "comma"),
+        (",", "1,000,0", "comma"),
+        (",", "4.5", "comma"),
+        (",", "4.5e1", "comma"),
+        (".", "1,000.0", "point"),
+        (".", "1,000.0e0", "point"),
+    ],
 )
 def test_a_number_written_otherwise_than_the_rest_was_told_in_the_words_of_a_library(
     tmp_path, decimal, cell, sign
@@ -146,6 +154,14 @@ def test_a_number_written_otherwise_than_the_rest_was_told_in_the_words_of_a_lib
     message = refusal(tmp_path, "\n".join(lines))
     assert f"drive.csv, row 100 (line 101): column 'time_s' holds '{cell}'" in message
     assert f"other numbers have a decimal {sign}; write it in all of them" in message
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_a_unit_in_a_cell_with_a_decimal_comma_was_taken_for_a_wrong_decimal_sign(tmp_path, decimal):
+    lines = text(separator=";", header="time_s;current_a;voltage_v").replace(".", decimal).splitlines()
+    lines[100] = f"99{decimal}0;5{decimal}0 A;3{decimal}7"
+    message = refusal(tmp_path, "\n".join(lines))
+    assert f"column 'current_a' holds '5{decimal}0 A', which is not a number: write numbers alone" in message
 
 
 @pytest.mark.parametrize(
