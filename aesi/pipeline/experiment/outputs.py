@@ -149,7 +149,6 @@ def hybrid(result: Result) -> HybridModel:
 
 def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
     """What the report shows."""
-    counts = result.problem.counts
     genome = result.chosen.genome
     shown = published_by(result.loaded.model)
     return RunView(
@@ -162,10 +161,9 @@ def run_view(result: Result, rows: Sequence[Mapping[str, Any]]) -> RunView:
         candidates=tuple(result.candidates),
         terms=tuple(_terms(result)),
         bootstrap=BootstrapView(
-            n=counts.shape[1],
-            block=result.problem.block,
-            unique_fraction=(counts > 0).mean(axis=1),
             lengths=tuple(b - a for a, b in result.problem.spans),
+            block=result.problem.block,
+            unique_fraction=(result.problem.counts > 0).mean(axis=1),
         ),
         settings={
             "lambda1": f"{genome.lambda1:.3g}",

@@ -57,15 +57,12 @@ class RecordTrace:
 
 @dataclass(frozen=True, eq=False)
 class BootstrapView:
-    """The moving block bootstrap: n samples, block length, share of distinct samples in each resample.
+    """The moving block bootstrap: samples of each record, over whose ends no block runs, length of a block, share of
+    distinct samples in each resample."""
 
-    lengths : samples of each record, over whose ends no block runs; without it all are of one.
-    """
-
-    n: int
+    lengths: tuple[int, ...]
     block: int
     unique_fraction: Array
-    lengths: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -115,7 +115,7 @@ def run_view(n=4000, seed=0, name="synthetic_cell"):
             }
             for t in terms
         ),
-        bootstrap=BootstrapView(88_200, 500, rng.normal(0.635, 0.01, 100)),
+        bootstrap=BootstrapView((88_200,), 500, rng.normal(0.635, 0.01, 100)),
         settings={"lambda1": "1.2e-04", "lambda2": "0.31", "tau": "0.52", "p_c": "1", "d": "2"},
         notes=(
             "UDDS: 3 duplicate rows dropped at 12.4 s.",

@@ -156,13 +156,13 @@ def test_the_bootstrap_of_several_records_was_expected_to_be_that_of_one(lengths
     from aesi.sparse.search.rows import spans_of
 
     drawn = coverage(moving_block_weights(spans_of(lengths), block, 400, np.random.default_rng(0)))
-    fig = ensemble.bootstrap_figure(BootstrapView(sum(lengths), block, drawn, lengths))
+    fig = ensemble.bootstrap_figure(BootstrapView(lengths, block, drawn))
     expected = float(fig.layout.meta["caption"].rpartition("(dashed) ")[2].removesuffix(" %."))
     assert expected == pytest.approx(100.0 * drawn.mean(), abs=1.0)
 
 
 def test_the_caption_of_the_bootstrap_states_mean_and_expectation():
-    fig = ensemble.bootstrap_figure(BootstrapView(1000, 10, np.array([0.6, 0.7])))
+    fig = ensemble.bootstrap_figure(BootstrapView((1000,), 10, np.array([0.6, 0.7])))
     assert "mean (full line) 65.0 %" in fig.layout.meta["caption"]
 
 

@@ -136,9 +136,9 @@ def coefficient_figure(terms: Sequence[Row]) -> Figure | None:
 def bootstrap_figure(bootstrap: BootstrapView) -> Figure:
     """Share of distinct samples in every resample of the moving block bootstrap."""
     share = 100 * np.sort(bootstrap.unique_fraction)
-    expected = 100 * expected_unique_fraction(bootstrap.lengths or (bootstrap.n,), bootstrap.block)
+    expected = 100 * expected_unique_fraction(bootstrap.lengths, bootstrap.block)
     caption = (
-        f"Share of distinct samples in each of {len(share)} resamples of {bootstrap.n:,} samples in blocks "
+        f"Share of distinct samples in each of {len(share)} resamples of {sum(bootstrap.lengths):,} samples in blocks "
         f"of {bootstrap.block}; mean (full line) {share.mean():.1f} %, expected (dashed) {expected:.1f} %."
     )
     fig = style.figure("Coverage of the moving block bootstrap", caption, 300, showlegend=False)
