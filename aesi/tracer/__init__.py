@@ -4,6 +4,7 @@ From `discover` to the verdict, in the order of the calls (each folder imports o
 decide, search, likelihood, case):
 
     case/records           measurements with their noise and initial state, thinned     -> PreparedRecord
+    case/trust             how far the cell's file is believed
     case/problem           these, the cell, and what hypotheses may move                -> InverseProblem
     decide/model_choice    single particle or porous electrode: with each that is tried
     decide/evidence        searches at several trusts, judged, and the model written    -> Evidence
@@ -24,7 +25,10 @@ Words that mean one thing throughout:
     own parameter    of the declared model, moved by every hypothesis within a prior: what the file declares, and the
                      initial state of each record
     trust            how far the declared parameters are believed: widths of the own priors, and size of the model error
-    owner            id of the effect that a parameter belongs to; a word of its own for what belongs to a record
+    good             of a record: nothing is sought in it, but in others what they have beside it (trust `beside`)
+    competing        of an effect that may be named; addable : to a hypothesis that has not named it
+    owner            id of the effect that a parameter belongs to, with an ending where good records share it
+                     (`OF_ALL_RECORDS`); a word of its own for what belongs to a record (`OF_ONE_RECORD`)
     x                coordinate of a parameter: from the centre of its prior, in standard deviations of it
     size             standard deviation of the model error, V
     block            rows that are left out together.  fold : blocks left out at once.  partition : folds of one kind

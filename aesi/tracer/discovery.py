@@ -41,7 +41,7 @@ from aesi.tracer.search.archive import Archive, context_of
 class TriedHypothesis:
     """One hypothesis as it was tried.
 
-    effects : ids, in the order in which they were added.  trust : in the declared parameters, see `case.problem.Trust`.
+    effects : ids, in the order in which they were added.  trust : in the declared parameters, see `case.trust.Trust`.
     gain_nats : what it says more of unseen data than its parent.  rmse_v : what it leaves of what was fitted.
     delta_v : size of the model error at which it says most.  values : owner -> name -> value of what it moved.
     simulations : spent on it.
@@ -94,7 +94,7 @@ class Discovery:
     notes : what was assumed, and what a reader should know of the records and the search.
     contradicted : whether what explains the data leaves more of the test part than a right explanation may.
     warnings : that, and where the written model does worse on the test part than another one.
-    seconds, simulations : spent.
+    seconds : spent.  simulations : of the hypotheses that were tried, without what judges them.
     """
 
     cell: Cell
@@ -170,8 +170,8 @@ def discover(
         look = gathered_beside if one.has_good else gathered
         return look(one, most, fits, Thresholds(), spent)
 
-    def archive_of(one: InverseProblem, beside: Archive | None) -> Archive:
-        return Archive(archive, context_of(one), beside)
+    def archive_of(one: InverseProblem, other_model: Archive | None) -> Archive:
+        return Archive(archive, context_of(one), other_model)
 
     evidence, choice = with_model(problem, model, search, archive_of, max_effects)
     found = _told(

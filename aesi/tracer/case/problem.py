@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
-from aesi.parameters import Parameter
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.simulation import ModelName
@@ -31,18 +29,8 @@ from aesi.tracer.case.free_parameter import (
     state_of_charge,
 )
 from aesi.tracer.case.records import PreparedRecord
+from aesi.tracer.case.trust import AGEING, MEASURED_CELL, Trust, own_sd, start_sd
 
-Trust = Literal["exact", "tight", "loose", "measured", "lasting", "beside"]
-"""How far the declared parameters are believed. exact: fitted to this very cell by this very model.  tight: a careful
-parametrisation of this cell.  loose: one of another cell of its make.  measured: fitted to this very cell by a model
-that errs as models of measured cells do, its records read by instruments that may be off.  lasting: the same, where
-what is gone within seconds does not count.  beside: as lasting, with records of the cell that are known to be good, so
-that the question is what is different about the others."""
-MEASURED_CELL: tuple[Trust, ...] = ("measured", "lasting", "beside")
-"""Where the file is believed, and the model errs as models of measured cells do."""
-AGEING: tuple[Trust, ...] = ("loose", "measured", "lasting")
-"""Where the records of a cell may be of several ages: not where something explains them all, and what is sought beside
-good records is what has changed since."""
 SHARE_SD = 0.024
 """Of the logarithm of a record's capacity over the file's: root mean square of the shares that the two shipped files
 over temperatures give the twelve records that they were calibrated on, within weeks of each other
@@ -60,17 +48,10 @@ BESIDE_TIMES = 2.0
 """So many times as many samples of it are independent where good records show how large it is in this cell: with it the
 sizes of effects that 24 pairs of development records do not have scatter by 0.97 of their standard deviations, and one
 pair has one beyond 2.58 of them (`python -m aesi.bench.real.repeatability`)."""
-BESIDE_SOC0_SD = 5e-3
-"""Least standard deviation of an initial state of charge there: starts at a full charge are off by 0.33 % RMS on the
-same pairs."""
 OHMIC_SHARE = 0.03
 """Of the resistance that a cell shows from row to row, what its file is off by: 0.7 to 4.0 % on five development
 records, 20 % (too much, which no contact is) on that of a published file, in the median 2.7 %
 (`python -m aesi.bench.fast_error`)."""
-EXACT_SHARE = 0.1
-"""Of the tight spread of a declared parameter, where the file is believed exactly. A convention: not nought, so that
-what the numerics round off is no evidence for an effect."""
-
 STEP = 4e-3
 """Of finite differences, in standard deviations of a parameter's prior: short against how well data can tell it. Ten
 rows a second tell a lag to a thousandth of its spread."""
@@ -132,7 +113,9 @@ class InverseProblem:
 
     def free(self, hypothesis: Sequence[str]) -> tuple[FreeParameter, ...]:
         """What a hypothesis may move: states of charge, own parameters, then those of its effects."""
-        out = [state_of_charge(i, r.soc0, self._soc0_sd(r)) for i, r in enumerate(self.records)]
+        out = [
+            state_of_charge(i, r.soc0, start_sd(self.trust, r.soc0_sd)) for i, r in enumerate(self.records)
+        ]
         if self.several_ages:
             out += [capacity_share(i, SHARE_SD) for i in range(len(self.records))]
         for effect in self.effects.values():
@@ -140,7 +123,7 @@ class InverseProblem:
                 continue
             owner = of_all_records(effect.id) if self.has_good else effect.id
             for name, p in effect.parameters.items():
-                sd = self._spread(effect, p)
+                sd = own_sd(self.trust, effect, p, self.cell.nominal_capacity_ah)
                 if sd is not None:
                     out.append(own(owner, name, p, sd))
         for effect_id in hypothesis:
@@ -150,23 +133,6 @@ class InverseProblem:
     def parameters_of(self, effect: str) -> list[FreeParameter]:
         """What an effect under test moves, by its id: all of its parameters, in order."""
         return of_effect(effect, self.effects[effect].parameters, self.cell.nominal_capacity_ah)
-
-    def _soc0_sd(self, record: PreparedRecord) -> float:
-        """Standard deviation of the initial state of charge."""
-        return max(record.soc0_sd, BESIDE_SOC0_SD) if self.trust == "beside" else record.soc0_sd
-
-    def _spread(self, effect: Effect, p: Parameter) -> float | None:
-        """Standard deviation of an own parameter at this trust, None where nothing is open."""
-        if p.spread is None:
-            return None
-        measured_cell = self.trust in MEASURED_CELL
-        as_it_is = measured_cell and effect.kind == "instrument"
-        sd = p.spread.loose if self.trust == "loose" or as_it_is else p.spread.tight
-        if sd is None:
-            return None
-        if (self.trust == "exact" or measured_cell) and effect.kind == "parameter":
-            sd *= EXACT_SHARE
-        return sd * self.cell.nominal_capacity_ah**p.capacity_power
 
     def active(self, values: ValuesByOwner, good: bool = False) -> tuple[ActiveEffect, ...]:
         """The effects to simulate with.  One under test is among them at its neutral point too: some rewrite the cell

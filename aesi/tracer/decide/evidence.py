@@ -9,7 +9,8 @@ import numpy as np
 
 from aesi.numerics.metrics import rms
 from aesi.tracer.case.blocks import Blocks, blocks_of
-from aesi.tracer.case.problem import InverseProblem, Trust
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.trust import Trust
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
 from aesi.tracer.decide.confidence import frequency_maps, kind_of
 from aesi.tracer.decide.one_cause import in_one

@@ -29,7 +29,7 @@ FIRST_LOOK = 1
 what it approximates, no names explain, and looking for two and three of them takes most of the time. They are looked
 for where one explains the data, where none could, or where the porous electrode needs names, too."""
 ArchiveOf = Callable[[InverseProblem, Archive | None], Archive]
-"""The archive of a problem with one model of the cell, beside that of the same case with the other one."""
+"""The archive of a problem with one model of the cell, which knows that of the same case with the other one."""
 
 
 @dataclass(frozen=True)

@@ -146,7 +146,7 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     if left > allowed:
         margin = float(np.log(left / allowed))
         reason = (
-            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, {_beside(path)} "
+            f"{1e3 * left:.2f} mV beyond the noise are left on data that the fit has not seen, {_with_what(path)} "
             f"({1e3 * allowed:.2f} mV would be within what a right model leaves)"
         )
         return Verdict("unknown", (), (), 0.0, left, allowed, reason, margin)
@@ -173,7 +173,7 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
     return Verdict("found", path.chosen.hypothesis, groups, 0.0, left, allowed, reason, margin)
 
 
-def _beside(path: Path) -> str:
+def _with_what(path: Path) -> str:
     tried = path.steps or path.beyond_reach_v is not None
     return "whichever effects that were tried are added" if tried else "with no effect added"
 

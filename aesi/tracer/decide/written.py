@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.trust import MEASURED_CELL
 from aesi.tracer.decide.carry_over import FAST_C, ORDINARY_C, LeftOut, left_out_errors, range_fault
 from aesi.tracer.decide.in_use import foretold_in_use
 from aesi.tracer.decide.verdict import FORETOLD_SHARE, foretold_share

@@ -26,7 +26,8 @@ import numpy as np
 from aesi.numerics.noise.discrepancy import whiten
 from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks
-from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem, Trust
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.trust import MEASURED_CELL, Trust
 
 LOG_2PI = float(np.log(2.0 * np.pi))
 SIZES_V = tuple(float(v) for v in 1e-3 * np.geomspace(0.0125, 25.6, 12))

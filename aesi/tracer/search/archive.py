@@ -24,11 +24,11 @@ from aesi.tracer.case.problem import InverseProblem
 class Archive:
     """Coordinates by name of a fit, appended one JSON line each; lines of another case are passed over.
 
-    beside : the archive of the same case with the other model of the cell.
+    other_model : the archive of the same case with the other model of the cell.
     """
 
-    def __init__(self, path: Path | None, context: str, beside: Archive | None = None) -> None:
-        self.path, self.context, self.beside = path, context, beside
+    def __init__(self, path: Path | None, context: str, other_model: Archive | None = None) -> None:
+        self.path, self.context, self.other_model = path, context, other_model
         self._lock = threading.Lock()
         self._kept: dict[str, Array] = {}
         if path is not None and path.exists():
@@ -47,7 +47,7 @@ class Archive:
 
     def near(self, name: str, size: int) -> Array | None:
         """(size,) coordinates where that fit ended with the other model of the cell, or None."""
-        return None if self.beside is None else self.beside.get(name, size)
+        return None if self.other_model is None else self.other_model.get(name, size)
 
     def put(self, name: str, x: Array) -> None:
         """Keep where a fit ended, unless it is there."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from aesi.numerics.threads import side_by_side
 from aesi.numerics.typing import Array
-from aesi.tracer.case.problem import MEASURED_CELL, InverseProblem
+from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.case.trust import MEASURED_CELL
 from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent, promise
 from aesi.tracer.likelihood.model_error import PRIORS, Size, replace_fast
 from aesi.tracer.search.archive import Archive, fit_name
@@ -29,13 +30,13 @@ def growths_on(
     slopes : of each effect on a parent before, (n, k) V; none for the bare model.
     """
     best = parents[0]
-    growths = {name: _growth(best, name, archive) for name in competing(best)}
+    growths = {name: _growth(best, name, archive) for name in addable(best)}
     if not slopes:
         return list(growths.values())
-    pairs = [(parent, name) for parent in parents for name in competing(parent)]
+    pairs = [(parent, name) for parent in parents for name in addable(parent)]
     keys = [_key(parent, name, "promised") for parent, name in pairs]
     if any(archive.get(key, 1) is None for key in keys):
-        if archive.beside is None and not best.fit.as_declared:
+        if archive.other_model is None and not best.fit.as_declared:
             slopes = {**slopes, **_first_slopes(growths)}
         for key, (parent, name) in zip(keys, pairs, strict=True):
             gain = archive.near(key, 1)
@@ -71,7 +72,7 @@ def most_promising(promised: Sequence[tuple[Parent, str, float]]) -> list[tuple[
     return list(best.values())[:PROMISING]
 
 
-def competing(parent: Parent) -> list[str]:
+def addable(parent: Parent) -> list[str]:
     """Effects that may be added to a hypothesis."""
     return [
         name

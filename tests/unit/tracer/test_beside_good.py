@@ -13,7 +13,7 @@ from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
-from aesi.tracer.search.grown import competing
+from aesi.tracer.search.grown import addable
 
 OFFSET_V = 8e-3
 TRIED = ("series_resistance", "current_sensor_gain", "voltage_sensor_offset", "ocv_hysteresis")
@@ -88,7 +88,7 @@ def test_what_the_cell_is_made_with_and_its_age_do_not_compete_beside_good_recor
     )
 
     def tried(problem):
-        return set(competing(SimpleNamespace(problem=problem, fit=SimpleNamespace(hypothesis=()))))
+        return set(addable(SimpleNamespace(problem=problem, fit=SimpleNamespace(hypothesis=()))))
 
     assert tried(beside) == {
         "ambient_temperature",

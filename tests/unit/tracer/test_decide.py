@@ -399,7 +399,7 @@ def test_an_archive_knows_an_effect_by_what_it_is(path, tmp_path):
     two = Archive(tmp_path / "a.jsonl", context_of(path.problem))
     assert two.get("fit", 2).tolist() == [1.0, 2.0]
     assert two.get("fit", 3) is None
-    other = Archive(tmp_path / "a.jsonl", "another case", beside=two)
+    other = Archive(tmp_path / "a.jsonl", "another case", other_model=two)
     assert other.get("fit", 2) is None
     assert other.near("fit", 2).tolist() == [1.0, 2.0]
     assert two.near("fit", 2) is None
