@@ -1,6 +1,7 @@
 """Which run is gone on with: one that the tracking store has no more is none."""
 
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -31,6 +32,15 @@ def unfinished(store, workspace):
 def test_a_run_that_is_there_is_gone_on_with(store, unfinished):
     config, record = unfinished
     assert _unfinished(config, store, Console()) == record
+
+
+@pytest.mark.parametrize("before_s", [-60.0, 60.0])
+def test_of_two_runs_the_newer_one_is_gone_on_with(store, unfinished, before_s):
+    config, record = unfinished
+    run_id = store.create_run(store.experiment("small"), "small, seed 0, again", {})
+    other = replace(record, run_id=run_id, started_s=record.started_s + before_s)
+    other.write()
+    assert _unfinished(config, store, Console()) == (other if before_s > 0.0 else record)
 
 
 @pytest.mark.parametrize("gone", ["deleted", "never there"])

@@ -93,6 +93,14 @@ def test_all_failed_is_one_clear_error(problem):
         result.best()
 
 
+def test_of_two_candidates_alike_the_earlier_one_is_picked(problem):
+    good = Genome.whole(problem.library, 1e-2, 1e-3, 0.5, 2, 2, feedback=False)
+    result = search(problem, 2, seed=0, settings=SearchSettings(2, warm_start=(good, good)))
+    assert result.trials[0].losses == result.trials[1].losses
+    assert result.best().trial.number == 0
+    assert result.fittest(1.0) == (0, 1)
+
+
 def test_the_front_is_not_dominated_and_the_pick_lies_on_it(problem):
     result = search(problem, 30, seed=1, settings=SearchSettings(10))
     front = result.front()

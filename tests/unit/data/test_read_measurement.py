@@ -251,6 +251,17 @@ def test_a_sparsely_logged_rest_is_no_gap_but_a_note(tmp_path):
     assert any("rested" in note for note in measurement.notes)
 
 
+@pytest.mark.parametrize(
+    ("seconds", "after_v"),
+    [pytest.param(3700.0, 3.7, id="too long"), pytest.param(450.0, 3.69, id="another voltage")],
+)
+def test_hours_without_rows_or_another_voltage_after_them_are_no_rest(tmp_path, seconds, after_v):
+    time = np.concatenate([np.arange(50.0), 49.0 + seconds + np.arange(50.0)])
+    current = np.concatenate([np.tile([5.0, -5.0], 20), np.zeros(20), np.tile([5.0, -5.0], 20)])
+    voltage = np.where(time < 50.0, 3.7, after_v) - 0.01 * current
+    assert f"a gap of {seconds:g} s after 49 s" in refusal(tmp_path, text(time, current, voltage))
+
+
 def test_a_lone_row_long_after_the_test_is_dropped_and_that_is_said(tmp_path):
     content = text() + "50000.0,0.0,3.9\n"
     measurement = read_measurement(written(tmp_path, content))

@@ -1,9 +1,11 @@
 """Fewer rows for fits: the charge is kept, and what is too short for a window stays as it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from aesi.data.thinning import averaged_over
+from aesi.data.thinning import Spacing, averaged_over, condensed
 from aesi.records import Measurement
 
 
@@ -26,3 +28,31 @@ def test_windows_are_centred_averages_of_a_straight_line(rows):
     np.testing.assert_allclose(
         thin.voltage_v, 4.0 - 0.01 * thin.time_s, rtol=1e-12
     )  # the mean of a line is its middle
+
+
+@pytest.mark.parametrize("factor", [2, 3, 10])
+def test_windows_side_by_side_count_every_row_once(factor):
+    data = record(20 * factor + 1, 1.0 / factor)
+    current = np.random.default_rng(0).normal(size=len(data))
+    thin = averaged_over(replace(data, current_a=current), step_s=1.0)
+    # By hand: the windows from the first one's centre on tile the record from half a window before it to half after.
+    begin = factor // 2
+    inside = current[begin - factor // 2 : len(current) - begin + factor // 2]
+    if factor % 2:
+        whole = inside[: factor * (len(thin) - 1)].sum()
+    else:  # the row between two windows is half of either
+        held = inside[: factor * (len(thin) - 1) + 1]
+        whole = held.sum() - 0.5 * (held[0] + held[-1])
+    assert factor * thin.current_a[1:].sum() == pytest.approx(whole, rel=1e-12)
+
+
+def test_the_rows_on_both_sides_of_a_step_stand_for_themselves():
+    time = np.arange(3000.0)
+    current = np.where((time >= 1000.0) & (time < 1100.0), 5.0, 0.0)
+    data = Measurement(time, current, 4.0 - 0.02 * current)
+    thin, rows = condensed(data, 5.0, 100.0, Spacing(first_s=1.0, growth=0.5))
+    assert len(thin) < 150
+    for at_s in (999.0, 1000.0, 1099.0, 1100.0):
+        (place,) = np.flatnonzero(thin.time_s == at_s)
+        assert rows[place] == 1.0
+        assert thin.voltage_v[place] == data.voltage_v[int(at_s)]

@@ -139,3 +139,13 @@ def test_nothing_is_to_be_reached_inside_the_range_or_where_nothing_is_held():
     inside, beyond = record([0.0] * 3, [1.0, -1.0, 0.5]), record([0.0] * 3, [3.0, 3.0, 0.5])
     assert not linear(0.5, 0.2).reach(inside).any()
     assert not linear(0.5, 0.2, outside="extrapolate").reach(beyond).any()
+
+
+@pytest.mark.parametrize("errors_v", [(-0.03, 0.01), (-0.01, 0.03)])
+def test_no_error_is_nought_when_scaled_whichever_way_errors_were_larger(errors_v):
+    block = np.column_stack([errors_v, (0.0, 5.0)])
+    scaling = Scaling.of([block])
+    assert scaling.error_to_scaled(np.zeros(1)) == pytest.approx(0.0, abs=1e-15)
+    np.testing.assert_allclose(scaling.error_to_scaled(np.array([-0.03, 0.03])), [-1.0, 1.0])
+    np.testing.assert_allclose(scaling.apply(block)[:, 1], [-1.0, 1.0])
+    assert not scaling.is_outside(block).any()

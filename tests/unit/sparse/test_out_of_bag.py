@@ -52,3 +52,10 @@ def test_losses_count_rows_as_the_fits_do(problem):
     bare = np.mean(problem.row_weights * (problem.target - problem.zero) ** 2)
     assert np.ptp(problem.row_weights) > 0.1
     np.testing.assert_allclose(losses, comparable(squares, rows, problem.unseen_sizes) / bare, rtol=1e-9)
+
+
+def test_pieces_weigh_by_what_members_leave_there_in_the_middle():
+    # Equation (1) by hand: the members in the middle leave 1 a row on the first piece and 5 on the second.
+    squares = np.array([[10.0, 10.0, 40.0], [0.0, 50.0, 50.0]])
+    rows = np.array([[10.0, 10.0, 10.0], [0.0, 10.0, 10.0]])
+    np.testing.assert_allclose(comparable(squares, rows, np.array([10.0, 10.0])), [3.0, 3.0, 4.5])
