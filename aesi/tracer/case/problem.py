@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -55,6 +55,8 @@ records, 20 % (too much, which no contact is) on that of a published file, in th
 STEP = 4e-3
 """Of finite differences, in standard deviations of a parameter's prior: short against how well data can tell it. Ten
 rows a second tell a lag to a thousandth of its spread."""
+REMEMBERED = 64
+"""Voltages of good records: those of a dozen hypotheses that effects grow on, side by side."""
 
 ValuesByOwner = Mapping[str, Mapping[str, float]]
 """owner -> name -> value."""
@@ -151,12 +153,8 @@ class InverseProblem:
             acting = {good: self.active(values, good) for good in {self.records[i].good for i in asked_for}}
             for i in asked_for:
                 good = self.records[i].good
-                asked = i, values[STATE_OF_CHARGE][str(i)], acting[good], share_of(values, i)
-                known = self._of_good.get(asked)
-                voltage = self._voltage_v(*asked) if known is None else known
-                if good:
-                    self._of_good[asked] = voltage
-                out.append(voltage)
+                voltage_v = self._of_good_v if good else self._voltage_v
+                out.append(voltage_v(i, values[STATE_OF_CHARGE][str(i)], acting[good], share_of(values, i)))
         except (AesiError, FloatingPointError, ZeroDivisionError, OverflowError):
             return None
         joined = np.concatenate(out)
@@ -166,9 +164,9 @@ class InverseProblem:
         return self.run(self.seen[i], soc0, effects, self.records[i].thin_hold, share=share).voltage_v
 
     @cached_property
-    def _of_good(self) -> dict[tuple[int, float, tuple[ActiveEffect, ...], float], Array]:
-        """Voltages of good records as they were simulated: what is under test does not act on them."""
-        return {}
+    def _of_good_v(self) -> Callable[[int, float, tuple[ActiveEffect, ...], float], Array]:
+        """`_voltage_v` of good records, remembered: what is under test does not act on them."""
+        return lru_cache(maxsize=REMEMBERED)(self._voltage_v)
 
     def run(
         self,

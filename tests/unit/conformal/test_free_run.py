@@ -63,6 +63,25 @@ def test_the_band_grows_from_the_shortest_horizon_to_the_whole_drive() -> None:
     assert np.all(np.diff(high) >= -1e-15)
 
 
+def test_between_the_longest_horizon_and_ten_times_it_the_width_runs_with_the_logarithm_of_time() -> None:
+    bands = fitted()
+    constant = np.full(200, 1e-3)
+    short, whole = (bands.at(h, constant)[1][0] for h in (10.0, WHOLE_DRIVE))
+    high = bands.along(DT, constant)[1]
+    for after_s in (20, 50):
+        share = math.log10(after_s / 10.0)
+        assert high[after_s] == pytest.approx((1 - share) * short + share * whole)
+
+
+def test_a_piece_is_judged_by_a_scale_that_has_not_seen_it() -> None:
+    # Eight pieces, seven that err by 1 mV and one by 10 mV: a scale that had seen that one would be of its size.
+    errors = [1e-3 * np.tile([1.0, -1.0], 50) for _ in range(7)] + [1e-2 * np.tile([1.0, -1.0], 50)]
+    (band,) = FreeRunBands.fit({WHOLE_DRIVE: errors}, DT).horizons
+    assert len(band.scales) == 8
+    np.testing.assert_allclose(band.scores[-1], 10.0)
+    np.testing.assert_allclose(band.scales[-1](np.array([[1.0, 0.0, 0.0]])), 1e-3)
+
+
 def test_survives_json() -> None:
     bands = replace(fitted(), root=np.tri(3))
     text = json.dumps(bands.to_dict(), default=lambda a: a.tolist(), allow_nan=False)

@@ -81,6 +81,28 @@ def test_effects_under_test_move_the_other_records_alone(cell, tried, erring):
     assert {"voltage_sensor_offset", of_all_records("voltage_sensor_offset")} <= owners
 
 
+def test_every_simulation_of_a_good_record_was_kept_as_long_as_the_search_lasted(monkeypatch, cell, make):
+    from aesi.tracer.case import problem as module
+
+    good, other = replace(make(seed=1, n=600), name="good"), replace(make(seed=2, n=600), name="other")
+    effects = {"voltage_sensor_offset": CATALOGUE["voltage_sensor_offset"]}
+    problem = inverse_problem(cell, [other], 0.9, effects=effects, good=[good])
+    counted, simulation = [], module.fit_simulation
+    monkeypatch.setattr(module, "fit_simulation", lambda *given: counted.append(1) or simulation(*given))
+
+    def simulated(good_soc0, offset_v):
+        """Simulations of both records."""
+        before = len(counted)
+        values = {"soc0": {"0": 0.9, "1": good_soc0}, "voltage_sensor_offset": {"offset_v": offset_v}}
+        assert problem.predict(values) is not None
+        return len(counted) - before
+
+    assert simulated(0.9, 0.0) == 2
+    assert simulated(0.9, 1e-3) == 1  # an effect under test does not act on the good one
+    assert all(simulated(0.9 + 1e-4 * k, 0.0) == 2 for k in range(1, module.REMEMBERED + 1))
+    assert simulated(0.9, 0.0) == 2  # forgotten by now
+
+
 def test_what_the_cell_is_made_with_and_its_age_do_not_compete_beside_good_records(cell, make):
     alone, beside = (
         replace(inverse_problem(cell, [make()], 0.9, good=good), trust="beside")
