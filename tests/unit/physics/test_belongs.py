@@ -36,6 +36,25 @@ def test_the_capacity_lies_within_its_bounds(m50, record):
     check_belongs(m50, [record])
 
 
+def test_a_drop_that_only_a_cold_cell_has_is_no_other_cells_in_the_cold(m50, record):
+    dropping = replace(record, voltage_v=record.voltage_v - 0.09 * record.current_a)
+    check_belongs(m50, [replace(dropping, temperature_degc=np.full(len(record), -10.0))])
+    for degc in (None, np.full(len(record), 25.0)):
+        with pytest.raises(DataError, match="Ah leave the cell"):
+            check_belongs(m50, [replace(dropping, temperature_degc=degc)])
+
+
+def test_a_voltage_that_is_still_low_after_a_discharge_says_of_no_smaller_cell(m50):
+    """Two thirds discharged at 1C, and then at rest 0.12 V below its open-circuit voltage for twenty minutes."""
+    time_s = np.arange(0.0, 3720.0, 2.0)
+    current_a = np.where((time_s > 120) & (time_s <= 2520), m50.capacity_ah, 0.0)
+    soc = 1.0 - np.cumsum(2.0 * current_a) / 3600.0 / m50.capacity_ah
+    late = np.where(time_s > 2520, 0.12, 0.0)
+    voltage_v = m50.rest_voltage_v(soc) - 0.03 * current_a - late
+    bounds = capacity_bounds(m50, Measurement(time_s, current_a, voltage_v, name="drive"))
+    assert bounds.low_ah <= m50.capacity_ah <= bounds.high_ah
+
+
 @pytest.mark.parametrize("share", [0.7, 1.25])
 def test_an_aged_cell_and_another_batch_belong(m50, record, share):
     check_belongs(m50, [replace(record, current_a=share * record.current_a)])
@@ -50,6 +69,7 @@ def test_an_aged_cell_and_another_batch_belong(m50, record, share):
         ({"current_a": 1000}, "--unit current_a=mA"),
         ({"current_a": 3}, "another cell's"),
         ({"current_a": 1 / 4}, "another cell's"),
+        ({"current_a": 1 / 2}, "another cell's"),
         ({"voltage_v": 1.1}, "is full at"),
     ],
 )
