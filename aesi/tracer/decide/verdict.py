@@ -174,7 +174,7 @@ def judged(path: Path, thresholds: Thresholds) -> Verdict:
 
 
 def _with_what(path: Path) -> str:
-    tried = path.steps or path.beyond_reach_v is not None
+    tried = path.beyond_reach_v is not None or any(step.grown or step.fitted for step in path.steps)
     return "whichever effects that were tried are added" if tried else "with no effect added"
 
 
@@ -201,8 +201,8 @@ def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
 
 
 def best_gain(path: Path) -> float:
-    """Nats that the best effect of any step says more, admitted or not."""
-    return max((step.best_gain for step in path.steps), default=0.0)
+    """Nats that the best effect of any step says more, admitted or not; nought where none could be grown."""
+    return max((step.best_gain for step in path.steps if step.grown), default=0.0)
 
 
 def look_alikes(

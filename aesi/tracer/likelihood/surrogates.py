@@ -31,8 +31,10 @@ scatter as their spreads say, the share that have one which is called wrong."""
 def admission_nats(parent: Parent, slopes_v: Mapping[str, Array], seed: int = 0) -> float:
     """What an effect has to say of unseen data more than the hypothesis without it, nats.
 
-    slopes_v : id of an effect -> (n, k) V, what its parameters do.
+    slopes_v : id of an effect -> (n, k) V, what its parameters do; none of them asks for nothing.
     """
+    if not slopes_v:
+        return 0.0
     gains = largest_gains(parent, slopes_v, DRAWS, np.random.default_rng(seed))
     return max(float(np.quantile(gains, 1.0 - FAMILY_WISE)), 0.0)
 
@@ -40,9 +42,7 @@ def admission_nats(parent: Parent, slopes_v: Mapping[str, Array], seed: int = 0)
 def largest_gains(
     parent: Parent, slopes_v: Mapping[str, Array], draws: int, rng: np.random.Generator
 ) -> Array:
-    """(draws,) nats, the largest gain over the effects on each surrogate; of none less than any number."""
-    if not slopes_v:
-        return np.full(draws, -np.inf)
+    """(draws,) nats, the largest gain over the effects, at least one, on each surrogate."""
     problem, blocks, size = parent.problem, parent.blocks, parent.fit.score.size
     white = _drawn(problem, blocks.windows, draws, rng)
     known = parent.white[size][0]

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from aesi.numerics.metrics import rms
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
@@ -32,9 +30,7 @@ class Step:
 
     @property
     def best_gain(self) -> float:
-        """Nats that the best effect says more than its parent, admitted or not."""
-        if not self.grown:
-            return -np.inf
+        """Nats that the best of what was grown (at least one effect) says more than its parent, admitted or not."""
         return max(g.score.total for g in self.grown) - max(p.score.total for p in self.parents)
 
 

@@ -11,7 +11,7 @@ from aesi.tracer.case.blocks import Windows, blocks_of
 from aesi.tracer.case.problem import OHMIC_SHARE
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
-from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, amplitude_v, whitened
+from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS, Size, SplitTable, amplitude_v, whitened
 from aesi.tracer.likelihood.surrogates import _drawn
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of, fitted_hypothesis
@@ -48,6 +48,26 @@ def test_what_lasts_counts_as_before_and_what_is_gone_by_its_own_size(problem):
     both = whitened(problem, blocks, slow + fast, SIZE)[0]
     assert both == pytest.approx(white + gone)
     assert np.sum(both**2) == pytest.approx(np.sum(white**2) + by_rows, rel=0.01)
+
+
+@pytest.mark.parametrize("trust", ["lasting", "measured"])
+def test_a_density_is_that_of_as_many_normal_samples_as_are_independent(problem, trust):
+    problem = replace(problem, trust=trust)
+    blocks = blocks_of(problem)
+    amplitude = amplitude_v(problem.steepness, SIZE.delta_v, trust)
+    _, log_det = whitened(problem, blocks, np.zeros((len(problem.time_s), 1)), SIZE)
+    normal = problem.independent @ np.log(2.0 * np.pi * amplitude**2)
+    if trust == "measured":  # of k rows of a window, one degree of freedom is its mean's
+        rows = np.bincount(blocks.windows.of_row)
+        each = np.bincount(blocks.windows.of_row, problem.independent) / rows
+        normal += each @ (rows - 1) * np.log(2.0 * np.pi * SIZE.fast_v**2)
+    assert np.sum(log_det) + len(log_det) * np.log(2.0 * np.pi) == pytest.approx(normal)
+
+
+def test_the_charge_that_a_measured_cells_model_errs_by_is_that_of_its_records():
+    flat, steep = amplitude_v(np.array([0.0, 1e4]), MEASURED_V, "measured")
+    assert flat == pytest.approx(MEASURED_V)
+    assert 1e-3 < steep / 1e4 < 6e-3  # of the charge, as far as development records were off
 
 
 def test_a_table_is_split_once_for_all_sizes_of_the_model_error(problem, monkeypatch):
