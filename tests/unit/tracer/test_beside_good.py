@@ -11,6 +11,8 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer import discover
 from aesi.tracer.case.free_parameter import acting_on, of_all_records
 from aesi.tracer.case.problem import BESIDE_TIMES
+from aesi.tracer.decide.beside import judged_beside
+from aesi.tracer.decide.verdict import Thresholds
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.search.archive import context_of
 from aesi.tracer.search.grown import addable
@@ -152,3 +154,24 @@ def test_without_good_records_nothing_is_told_apart(cell, tried, make):
     assert {f.owner for f in alone.free(())} == {"soc0", "voltage_sensor_offset"}
     assert context_of(alone) != context_of(beside)
     assert alone.active({"soc0": {"0": 0.9}}) == alone.fixed
+
+
+@pytest.mark.parametrize(("gain", "named"), [(30.0, ()), (50.0, ("a",))])
+def test_what_leaves_more_than_the_good_records_has_to_say_it_at_that_error(monkeypatch, gain, named):
+    """Twice the error is a quarter of the nats: of 30 are left 7.5, where 10 were asked for."""
+    good = np.array([True, False])
+    problem = SimpleNamespace(
+        good_rows=good,
+        compared=np.ones(2, dtype=bool),
+        independent=np.full(2, 1e6),
+        noise_v=1e-3,
+        records=[SimpleNamespace(name="other", good=False)],
+    )
+    base, chosen = SimpleNamespace(hypothesis=()), SimpleNamespace(hypothesis=("a",))
+    path = SimpleNamespace(
+        problem=problem, base=base, chosen=chosen, steps=(), admission_nats=10.0, gain=lambda one: gain
+    )
+    monkeypatch.setattr("aesi.tracer.decide.beside.left_v", lambda path, one, rows: 4e-3 if rows[0] else 8e-3)
+    monkeypatch.setattr("aesi.tracer.decide.beside.look_alikes", lambda *given: ((), 1.0))
+    verdict = judged_beside(path, Thresholds())
+    assert (verdict.word, verdict.effects) == ("unknown", named)

@@ -1,6 +1,7 @@
 """Verdicts as pure functions of frozen evidence, the archive, and the map from margin to frequency."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from aesi.tracer.decide.verdict import (
     Thresholds,
     foretold_share,
     judged,
+    look_alikes,
     partly,
     structured_v,
     unexplained_v,
@@ -442,3 +444,33 @@ def test_a_fit_with_the_whole_model_stands_before_a_linear_one_whatever_their_or
     told = {one.hypothesis: one for one in later.explanations()}
     assert told[path.chosen.hypothesis] is path.chosen
     assert () in told
+
+
+def told(hypothesis, total, nats=()):
+    score = SimpleNamespace(total=total, log_density={"block": np.array([*nats, 0.0, 0.0])})
+    return SimpleNamespace(hypothesis=hypothesis, score=score)
+
+
+def test_a_name_that_says_little_more_than_none_has_a_small_margin():
+    """2 nats are a likelihood ratio statistic of 4, two standard deviations (Wilks)."""
+    chosen, base = told(("a",), 2.0), told((), 0.0)
+    path = SimpleNamespace(chosen=chosen, explanations=lambda: [base, chosen], steps=(), admission_nats=0.5)
+    assert look_alikes(path, Thresholds(), 1e-3) == ((), pytest.approx(2.0))
+
+
+@pytest.mark.parametrize(("left_v", "group"), [(1.1e-3, (("a", "b"),)), (2e-3, ())])
+def test_what_leaves_far_more_is_no_look_alike_however_much_it_says(monkeypatch, left_v, group):
+    left = {("a",): 0.5e-3, ("b",): left_v}
+    monkeypatch.setattr(
+        "aesi.tracer.decide.verdict.unexplained_v", lambda problem, blocks, one, allowed: left[one.hypothesis]
+    )
+    chosen, other, base = told(("a",), 50.0), told(("b",), 49.0), told((), 0.0)
+    path = SimpleNamespace(
+        chosen=chosen,
+        explanations=lambda: [base, chosen, other],
+        steps=(),
+        admission_nats=3.0,
+        problem=None,
+        blocks=None,
+    )
+    assert look_alikes(path, Thresholds(), 1e-3)[0] == group

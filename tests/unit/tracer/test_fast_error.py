@@ -141,6 +141,9 @@ def test_draws_move_a_fast_column_by_as_much_as_it_weighs(problem):
     column = np.where(np.arange(len(draws)) % 2, 4e-3, -4e-3)[:, None]
     white = whitened(problem, blocks, column - blocks.windows.means(column), SIZE)[0][:, 0]
     assert np.var(white @ draws) == pytest.approx(white @ white, rel=0.1)
+    # What is gone within seconds has no mean over its window: that is of what lasts, once over its deviation.
+    means = blocks.windows.means(draws / np.sqrt(problem.independent)[:, None])
+    assert np.var(means) == pytest.approx(1.0, rel=0.1)
 
 
 def test_how_long_an_error_lasts():

@@ -21,6 +21,7 @@ from aesi.tracer.case.free_parameter import (
     state_of_charge,
     values_of,
 )
+from aesi.tracer.case.trust import own_sd
 
 FACTOR = Parameter(2.0, "1", bounds=(0.1, 10.0), source="test", log=True, neutral=1.0)
 OHM = Parameter(1e-3, "ohm", bounds=(0.0, 0.1), source="test", neutral=0.0)
@@ -110,3 +111,17 @@ def test_what_is_under_test_acts_beside_what_all_records_share_and_not_on_good_o
     assert acting_on(CATALOGUE, both, good=True) == {name: {"negative_factor": 2.0}}
     assert acting_on(CATALOGUE, both, good=False) == {name: {"negative_factor": pytest.approx(3.0)}}
     assert acting_on(CATALOGUE, {name: {"negative_factor": 1.5}}, good=True) == {}
+
+
+def test_a_file_of_a_measured_cell_is_believed_where_its_instruments_are_not():
+    declared, sensor = CATALOGUE["solid_diffusivity"], CATALOGUE["voltage_sensor_offset"]
+    for effect in (declared, sensor):
+        for p in (one for one in effect.parameters.values() if one.spread is not None):
+            tight, exact, loose, measured = (
+                own_sd(trust, effect, p, 1.0) for trust in ("tight", "exact", "loose", "measured")
+            )
+            assert (tight, loose) == (p.spread.tight, p.spread.loose)
+            assert measured == (exact if effect is declared else loose)
+            assert exact == (pytest.approx(0.1 * tight) if effect is declared else tight)
+    open_here = {n for n, p in declared.parameters.items() if own_sd("tight", declared, p, 1.0) is not None}
+    assert open_here

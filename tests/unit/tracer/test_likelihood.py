@@ -11,6 +11,7 @@ from aesi.tracer.case.records import prepare_all
 from aesi.tracer.likelihood.fit import HypothesisFitter
 from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums, held_at_bounds, score_at
 from aesi.tracer.likelihood.model_error import Size
+from aesi.tracer.likelihood.surrogates import _gains, _Sums
 
 RNG = np.random.default_rng(4)
 N, M = 60, 3
@@ -105,3 +106,25 @@ def test_a_slope_is_that_of_where_it_is_taken(cell, few, make):
     at = fitter.residual(x)
     told = (at - fitter.residual(beside)) / 0.01
     assert np.linalg.norm(fitter.jacobian(x, at)[:, lag] - told) < 0.01 * np.linalg.norm(told)
+
+
+def test_a_gain_on_a_surrogate_is_what_its_score_gains():
+    # One of three parameters is the effect; surrogates are whitened residuals about the point at nought.
+    table = RNG.normal(size=(N, M)) * [3.0, 2.0, 4.0]
+    white = RNG.normal(size=(N, 5))
+    folds = FOLDS | {"charge": ((0, 2), (1, 3))}
+    blocks = Blocks(STARTS, np.zeros(4, dtype=int), folds, np.ones(N, dtype=bool))
+    gains = _gains(blocks, _Sums.over_blocks(blocks, table, white), 2, [(2, 3)])
+    for surrogate, (gain,) in zip(white.T, gains.T, strict=True):
+        total = [
+            score_at(
+                blocks,
+                block_sums(blocks, np.column_stack([surrogate, table[:, :m]]), np.zeros(N)),
+                np.zeros(m),
+                np.tile([-np.inf, np.inf], (m, 1)),
+                Size(1.0),
+                0.0,
+            ).total
+            for m in (2, 3)
+        ]
+        assert gain == pytest.approx(total[1] - total[0], rel=1e-9)

@@ -1,6 +1,7 @@
 """Thinning, noise floor and continuations."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from aesi.tracer.case.checks import check_record
 from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test
 from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
+from aesi.tracer.likelihood.model_state import ModelState
 
 
 def measured(cell, time_s, current_a, soc0=0.8, **more):
@@ -149,3 +151,24 @@ def test_a_continuation_is_judged_only_after_what_was_seen(cell, degc):
     other = replace(rest, time_s=rest.time_s + 5000.0, current_a=np.zeros(300))
     stranger = prepare_test(cell, other, [seen], None)
     assert (stranger.lead_rows, stranger.continues) == (0, None)
+
+
+def test_a_few_rows_that_are_off_make_no_noise():
+    rng = np.random.default_rng(5)
+    voltage = 3.7 + 1e-3 * rng.normal(size=20_000)
+    voltage[rng.choice(len(voltage), 200, replace=False)] += 0.03
+    assert noise_floor_v(voltage, np.full(len(voltage), 2.0)) == pytest.approx(1e-3, rel=0.05)
+
+
+def test_a_full_charge_left_out_begins_where_the_fitted_full_charges_do():
+    records = [
+        SimpleNamespace(start=SimpleNamespace(basis=b)) for b in ("full charge", "rest", "full charge")
+    ]
+    problem = SimpleNamespace(
+        records=records, active=lambda values, good: (), run=lambda data, soc0, *_: soc0
+    )
+    left_out = SimpleNamespace(
+        continues=None, data=None, hold="linear", good=False, soc0=1.0, start=records[0].start
+    )
+    fitted = ModelState(problem, {"soc0": {"0": 0.98, "1": 0.5, "2": 1.0}})
+    assert fitted.simulated(left_out, None, thin=False) == pytest.approx(0.99)
