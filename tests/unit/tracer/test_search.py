@@ -204,3 +204,14 @@ def test_what_was_within_reach_is_within_reach_with_more_names(cell, few, make, 
     assert once.chosen.hypothesis == again.chosen.hypothesis == ("series_resistance",)
     assert again.beyond_reach_v is None
     assert looked(2, Archive(None, "")).beyond_reach_v == np.inf
+
+
+def test_what_all_effects_leave_is_told_beyond_the_noise():
+    """An error of 3 mV that no mark takes up and 4 mV that one does, beside noise of 1 mV."""
+    even, odd = np.tile([1.0, 1.0], 50), np.tile([1.0, -1.0], 50)
+    point = SimpleNamespace(residual_v=3e-3 * even + 4e-3 * odd, jacobian_v=np.zeros((100, 1)))
+    left_v = [
+        least_left_v(SimpleNamespace(point=point), marks, np.full(100, 1e-3))
+        for marks in ([], [7.0 * odd[:, None]], [odd[:, None], even[:, None]])
+    ]
+    assert left_v == pytest.approx([np.sqrt(24.0) * 1e-3, np.sqrt(8.0) * 1e-3, 0.0], abs=1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aesi.tracer.decide.verdict import Verdict
-from aesi.tracer.report.outcome import FileOutcome
+from aesi.tracer.report.outcome import FileOutcome, rmse_difference
 from aesi.tracer.report.warning import contradicted_by_v, warnings
 
 NOISE_V = 1e-3
@@ -75,3 +75,10 @@ def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them()
     assert warnings([outcome(5e-3)], verdict("unknown")) == ()
     (hardly,) = warnings([outcome(5.02e-3)], verdict("unknown"))
     assert hardly == "on the test part the written model leaves 5.02 mV, the recalibrated model 5.00 mV."
+
+
+def test_resampled_blocks_of_steady_errors_have_the_gain_of_all_rows():
+    time = np.arange(2000.0)
+    first, second = 3e-3 * np.where(time % 2, 1.0, -1.0), np.full(len(time), 1e-3)
+    gain = rmse_difference(first, second, time, np.random.default_rng(0))
+    assert gain == pytest.approx((2e-3, 2e-3, 2e-3))
