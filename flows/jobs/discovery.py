@@ -83,12 +83,11 @@ def _trace(case: Case, out: Path, run: Stages, console: Console, experiment: str
 
 def _page(content: dict[str, Any], out: Path, tracker: Tracker | None) -> str:
     """The finding as Prefect shows it: verdict, errors, and where the rest is."""
-    from aesi.pipeline.report.words.discoveries import reason_finding
+    from aesi.pipeline.report.words.discoveries import reason_finding, states_of
 
-    states = {"before": "as declared", "recalibrated": "recalibrated", "after": "with the finding"}
     lines = [f"# {content['verdict']}: {', '.join(content['effects']) or 'nothing to add'}", ""]
     lines += [reason_finding(content), "", "| model | fit, mV | test, mV |", "|---|---:|---:|"]
-    for state, words in states.items():
+    for state, words in states_of(content).items():
         figures = [content[state].get(part, {}).get("rmse_mv") for part in ("fit", "test")]
         shown = " | ".join("" if value is None else f"{value:.2f}" for value in figures)
         lines.append(f"| {words} | {shown} |")
@@ -207,7 +206,7 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
 
 def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: Path, started: float) -> None:
     from aesi.pipeline.notes import together
-    from aesi.pipeline.report.words.discoveries import name_confidence, reason_finding
+    from aesi.pipeline.report.words.discoveries import name_confidence, reason_finding, unchanged_finding
     from aesi.pipeline.report.words.moved import moved_findings
     from aesi.pipeline.report.words.sizes import finding_line
 
@@ -215,7 +214,7 @@ def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: P
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
     console.say(f"  {reason_finding(content)}")
-    for sentence in moved_findings(content):
+    for sentence in filter(None, (unchanged_finding(content), *moved_findings(content))):
         console.say(f"  {sentence}")
     for group in content["indistinguishable"]:
         console.say(f"  these data cannot tell apart: {', '.join(group)}")

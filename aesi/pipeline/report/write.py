@@ -74,12 +74,14 @@ def write_discovery_report(path: str | Path, view: DiscoveryView) -> Path:
         view=view,
         discovery=view.discovery,
         states=discoveries.states_of(view.discovery),
+        written=discoveries.written_model(view.discovery),
         finding=discoveries.discovery_finding(view),
         sentences=[
             sentence
             for sentence in (
                 discoveries.look_alike_finding(view),
                 discoveries.discovery_consequence(view),
+                discoveries.unchanged_finding(view.discovery),
                 *moved_findings(view.discovery),
                 discoveries.reason_finding(view.discovery),
                 discoveries.span_finding(view),
@@ -124,7 +126,7 @@ def discovery_figures(view: DiscoveryView) -> dict[str, Figure]:
     if view.files:
         figures["files"] = hypotheses.files_figure(view.files, states)
     if any(max(row["before"], row["after"]) > TELLING_SHARE for row in view.dependence):
-        figures["dependence"] = hypotheses.dependence_bars(view.dependence, bool(view.effects))
+        figures["dependence"] = hypotheses.dependence_bars(view.dependence, states)
     return figures
 
 

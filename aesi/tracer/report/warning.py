@@ -43,9 +43,13 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
     after_mv = _left_mv(tests, "after")
     less = {NAMES[state]: left_mv for state in OTHERS if (left_mv := _left_mv(tests, state)) < after_mv}
     if less:
+        same = next((state for state in OTHERS if _same(tests, state)), None)
         model = "the model with what was found" if verdict.effects else NAMES["after"]
+        if same is not None:
+            model = f"{NAMES[same]}, which is what is written,"
         others = " and ".join(f"{words} {left_mv:.2f} mV" for words, left_mv in less.items())
-        advice = ": do not use it there." if after_mv > AS_GOOD * min(less.values()) else "."
+        harms = same != "before" and after_mv > AS_GOOD * min(less.values())
+        advice = ": do not use it there." if harms else "."
         out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
     return tuple(out)
 
@@ -61,6 +65,11 @@ def _advice(files: Sequence[FileOutcome]) -> str:
 
 def _tests(files: Sequence[FileOutcome]) -> list[FileOutcome]:
     return [f for f in files if f.part == "test"]
+
+
+def _same(tests: Sequence[FileOutcome], state: State) -> bool:
+    """Whether the written model is no other than that of `state`."""
+    return all(np.array_equal(f.voltages["after"], f.voltages[state]) for f in tests)
 
 
 def _left_mv(tests: Sequence[FileOutcome], state: State) -> float:

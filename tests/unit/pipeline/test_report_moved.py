@@ -16,13 +16,15 @@ def row(parameter, value, deviations, at_limit=False, effect="solid_diffusivity"
     }
 
 
+REFIT = {"before": {"fit": 8.0}, "recalibrated": {"fit": 5.0}, "after": {"fit": 5.0}}
+OTHER = REFIT | {"after": {"fit": 1.0}}
 FAR = row("negative_factor", 0.18, -4.0, at_limit=True)
 STAYED = row("positive_factor", 1.02, 0.1)
 
 
 def test_what_moved_is_named_with_how_far_and_what_ended_on_its_limit_is_said_so():
     (text,) = moved_findings(
-        {"effects": [], "own_parameters": {"recalibrated": [FAR, STAYED], "after": [FAR]}}
+        REFIT | {"effects": [], "own_parameters": {"recalibrated": [FAR, STAYED], "after": [FAR]}}
     )
     assert text == (
         "Recalibrating moves solid diffusivity (negative) to 0.18 times declared (4.0 standard deviations of its "
@@ -38,13 +40,13 @@ def test_a_factor_that_moved_by_a_little_is_not_called_once_what_was_declared():
 
 def test_with_a_finding_the_fit_beside_it_is_told_too():
     texts = moved_findings(
-        {"effects": ["self_heating"], "own_parameters": {"recalibrated": [FAR], "after": [STAYED]}}
+        OTHER | {"effects": ["self_heating"], "own_parameters": {"recalibrated": [FAR], "after": [STAYED]}}
     )
     assert texts[1] == "Beside the finding the fit moves no declared parameter by more than its tolerance."
 
 
 def test_where_nothing_was_fitted_nothing_is_told():
-    assert moved_findings({"effects": [], "own_parameters": {"recalibrated": [], "after": []}}) == []
+    assert moved_findings(REFIT | {"effects": [], "own_parameters": {"recalibrated": [], "after": []}}) == []
 
 
 def test_a_state_of_charge_is_told_with_what_was_declared():
@@ -80,7 +82,7 @@ def estimate(value, low, high, unit):
 
 def colder(written_k):
     shift = {"shift_k": estimate(-13.2, -16.2, -10.1, "K")}
-    return {
+    return OTHER | {
         "effects": ["ambient_temperature"],
         "declared_degc": 25.0,
         "written": ["ambient_temperature"],
@@ -104,7 +106,7 @@ def test_another_size_is_told_in_the_units_of_the_finding():
         "loss": estimate(0.05, 0.04, 0.06, "dimensionless"),
         "resistance_ohm": estimate(8e-3, 7.9e-3, 8.1e-3, "ohm"),
     }
-    discovery = {
+    discovery = OTHER | {
         "effects": ["lithium_inventory_loss", "series_resistance"],
         "written_parameters": {
             "lithium_inventory_loss": {"loss": 0.09},

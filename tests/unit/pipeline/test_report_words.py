@@ -189,6 +189,31 @@ def test_an_unknown_that_is_worse_on_the_test_part_is_told_so_once(views, tmp_pa
     assert "data that chose nothing" not in header
 
 
+def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(views, tmp_path):
+    """A drive that no fit carried over from: `as written` hid `as declared` in each plot, and its figures were the
+    same; that no other model was written was nowhere told."""
+    view = views.discovery_view(200, verdict="unknown")
+    content = view.discovery | {"after": view.discovery["before"], "written": []}
+    assert list(discoveries.states_of(content)) == ["before", "recalibrated"]
+    assert discoveries.unchanged_finding(content).startswith("The model that is written is the declared one")
+    assert "the declared model, which is what is written, does worse" in discoveries.short_finding(content)
+    text = write_discovery_report(tmp_path / "r.html", replace(view, discovery=content)).read_text()
+    assert "as written" not in text
+    assert "The model that is written is the declared one" in text[: text.index("</header>")]
+    assert "The declared model, unchanged, is in" in text
+    assert discoveries.unchanged_finding(view.discovery) == ""
+
+
+def test_a_model_that_is_written_beside_a_refit_and_does_better_was_not_shown(views):
+    """A refit of other parameters than the recalibrated model's is a model of its own, without an effect in it."""
+    view = views.discovery_view(200, verdict="unknown")
+    content = view.discovery | {"written": [], "after": {"fit": {"rmse_mv": 4.0}, "test": {"rmse_mv": 5.0}}}
+    assert discoveries.states_of(content)["after"] == "as written"
+    assert "and the model as written by 5.0 mV" in discoveries.discovery_consequence(
+        replace(view, discovery=content)
+    )
+
+
 def test_the_cell_is_named_once(views):
     view = views.discovery_view(200)
     found = replace(view, discovery={**view.discovery, "effects": ["self_heating", "ambient_temperature"]})
@@ -250,7 +275,7 @@ def test_a_rest_that_follows_nothing_is_not_called_little(views):
     unknown = views.discovery_view(200, verdict="unknown").discovery
     assert "follows none of the model's variables" in discoveries.rest_finding(unknown)
     assert "is not known" in discoveries.rest_finding({**unknown, "explainable_mv": None})
-    assert "much structure" in discoveries.rest_finding({**unknown, "explainable_mv": 0.9})
+    assert "much structure" in discoveries.rest_finding({**unknown, "explainable_mv": 4.5})
     assert "little structure" in discoveries.rest_finding(views.discovery_view(200).discovery)
     easier = {**unknown, "explainable_mv": 7.2, "after": {"fit": {"rmse_mv": 9.4}, "test": {"rmse_mv": 4.8}}}
     assert "7.2 mV of the 9.4 mV on the data that were fitted" in discoveries.rest_finding(easier)
@@ -296,7 +321,13 @@ def test_lists_read_as_english():
     ],
 )
 def test_an_error_is_said_to_be_with_the_finding_only_where_that_is_what_is_written(effects, written, after):
-    shown = discoveries.states_of({"effects": effects, "written": written})
+    of_its_own = effects or written
+    errors = {
+        "before": {"fit": 8.0},
+        "recalibrated": {"fit": 5.0},
+        "after": {"fit": 1.0 if of_its_own else 5.0},
+    }
+    shown = discoveries.states_of(errors | {"effects": effects, "written": written})
     assert shown.get("after") == after
     assert list(shown)[:2] == ["before", "recalibrated"]
 

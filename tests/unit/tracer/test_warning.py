@@ -82,3 +82,13 @@ def test_resampled_blocks_of_steady_errors_have_the_gain_of_all_rows():
     first, second = 3e-3 * np.where(time % 2, 1.0, -1.0), np.full(len(time), 1e-3)
     gain = rmse_difference(first, second, time, np.random.default_rng(0))
     assert gain == pytest.approx((2e-3, 2e-3, 2e-3))
+
+
+def test_a_declared_model_that_is_written_unchanged_was_warned_of_as_if_it_were_another():
+    (sentence,) = warnings([outcome(9e-3)], verdict("unknown"))
+    assert sentence == (
+        "on the test part the declared model, which is what is written, leaves 9.00 mV, the recalibrated model 5.00 mV."
+    )
+    (refitted,) = warnings([outcome(5e-3, before_v=4e-3)], verdict("unknown"))
+    assert "the recalibrated model, which is what is written, leaves 5.00 mV" in refitted
+    assert refitted.endswith("do not use it there.")

@@ -94,23 +94,22 @@ def files_figure(files: Sequence[Row], labels: Mapping[str, str]) -> Figure:
     return fig
 
 
-def dependence_bars(rows: Sequence[Row], found: bool) -> Figure:
-    """What the residual depends on as declared and, where something was found, with it."""
+def dependence_bars(rows: Sequence[Row], labels: Mapping[str, str]) -> Figure:
+    """What the residual depends on as declared and, where another model is written, with that."""
     caption = "Share of the residual's variance on the fit part that each variable explains by itself."
     fig = style.figure(
         "What the residual depends on", caption, max(220, 110 + 34 * len(rows)), barmode="group"
     )
     rows = sorted(rows, key=lambda row: -row["before"])
     names = [row["variable"] for row in rows][::-1]
-    states = {"after": "with the finding", "before": "as declared"}
-    if not found:
-        del states["after"]
-    for state, label in states.items():
+    for state in ("after", "before"):
+        if state not in labels:
+            continue
         fig.add_bar(
             x=[100 * row[state] for row in rows][::-1],
             y=names,
             orientation="h",
-            name=label,
+            name=labels[state],
             marker={"color": style.STATE_COLOURS[state]},
             hovertemplate="%{y}: %{x:.1f} %<extra></extra>",
         )

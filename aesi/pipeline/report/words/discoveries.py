@@ -52,9 +52,12 @@ def _worse_on_test(discovery: Mapping[str, Any]) -> str:
     ]
     if not less:
         return ""
-    return (
-        f"on the test part the written model does worse, {left['after']:.2f} mV against {' and '.join(less)}"
-    )
+    model = {
+        "before": "the declared model, which is what is written,",
+        "recalibrated": "the recalibrated model, which is what is written,",
+        None: "the written model",
+    }[_written_as(discovery)]
+    return f"on the test part {model} does worse, {left['after']:.2f} mV against {' and '.join(less)}"
 
 
 def _verdict(view: DiscoveryView) -> str:
@@ -95,12 +98,34 @@ WITH_FINDING = "with the finding added"
 
 
 def states_of(discovery: Mapping[str, Any]) -> dict[str, str]:
-    """The states of the model worth showing, in words: the last one where it is more than a refit, or a worse one."""
+    """The states of the model worth showing, in words: the last one where it is another than the first two."""
     shown = {"before": "as declared", "recalibrated": "recalibrated"}
-    effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
-    if effects or written or _worse_on_test(discovery):
+    if _written_as(discovery) is None:
+        effects, written = set(discovery["effects"]), set(discovery.get("written", discovery["effects"]))
         shown["after"] = WITH_FINDING if effects and written == effects else "as written"
     return shown
+
+
+def _written_as(discovery: Mapping[str, Any]) -> str | None:
+    """The state that the written model is, where it is none of its own: it errs by the same on every part."""
+    return next((s for s in ("before", "recalibrated") if discovery.get(s) == discovery.get("after")), None)
+
+
+def written_model(discovery: Mapping[str, Any]) -> str:
+    """What `model/` holds, as the subject of a sentence."""
+    if (state := _written_as(discovery)) is not None:
+        return {"before": "the declared model, unchanged,", "recalibrated": "the recalibrated model"}[state]
+    return f"the model {states_of(discovery)['after']}"
+
+
+def unchanged_finding(discovery: Mapping[str, Any]) -> str:
+    """Where all that is written is the declared model, that; '' where something came of it."""
+    if _written_as(discovery) != "before":
+        return ""
+    text = "The model that is written is the declared one, unchanged"
+    if discovery["verdict"] == "unknown":
+        return f"{text}: no fit of these data carries over well enough to take its place."
+    return f"{text}."
 
 
 UNSEEN = "pieces of the data that were left out of the fit in turn"
