@@ -28,7 +28,7 @@ from aesi.calibration.result import (
 )
 from aesi.calibration.rewind import capacities, rewound
 from aesi.calibration.shapes import SPAN_K, Shapes
-from aesi.calibration.start import one_branch, sized, with_activation
+from aesi.calibration.start import one_branch, size_assumed, sized, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
 from aesi.numerics.metrics import rms
@@ -69,7 +69,8 @@ def calibrate(
     Raises DataError for records that do not fit a cell; FitError where the start cannot be simulated.
     """
     began = time.perf_counter()
-    model, notes = problem(cell, records, conditions or Conditions())
+    conditions = conditions or Conditions()
+    model, notes = problem(cell, records, conditions)
     x = descended(model, evaluations)
     found, warmth = with_heat(rewound(model, x), model.records)
     if warmth:  # how fast a winding follows its case is of the file, which is fitted as it is simulated
@@ -94,6 +95,7 @@ def calibrate(
             for i, r in enumerate(model.records)
         ),
         capacities=shares,
+        size_assumed="" if conditions.same_cell else size_assumed(cell, records),
         notes=(*notes, *_told(model, x), *_ran_out(model, states), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
@@ -129,7 +131,12 @@ def problem(
         check_charge(start, one)
     span = _span_k(start, ready)
     if span <= SPAN_K:
-        told = (*told, f"the records span {span:.1f} K: activation energies and entropy stay as they are.")
+        apart = (
+            f"the mean temperatures of the records are {span:.1f} K apart, less than {SPAN_K:g} K"
+            if len(ready) > 1
+            else "a single record does not tell how the cell answers to temperature"
+        )
+        told = (*told, f"{apart}: activation energies and entropy stay as they are.")
     measured = any(r.kelvin is not None for r in ready)
     start = with_interfaces(start, measured)
     ageing = Ageing.of(ready, conditions.dates, conditions.as_of)

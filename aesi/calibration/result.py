@@ -71,7 +71,8 @@ class Calibration:
 
     parameters : name -> value with its interval.  undetermined : combinations that the data leave open.
     at_bounds : parameters that ended on a bound.  errors : of each record.  capacities : share of the cell's capacity
-    that each record's has.  x, covariance : working vector and its covariance, for the posterior.
+    that each record's has.  size_assumed : that no record told the size of the cell, as a sentence, or ''.
+    x, covariance : working vector and its covariance, for the posterior.
     """
 
     cell: Cell
@@ -81,6 +82,7 @@ class Calibration:
     at_bounds: tuple[str, ...]
     errors: tuple[RecordError, ...]
     capacities: Mapping[str, float]
+    size_assumed: str
     notes: tuple[str, ...]
     seconds: float
     model: Model

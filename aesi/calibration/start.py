@@ -34,15 +34,24 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
     charges = [_full_discharge_ah(cell, m) for m in measurements]
     known = max((q for q in charges if q is not None), default=None)
     if known is None:
-        return cell, (
-            f"no full discharge among the data (from {cell.upper_voltage_v - FULL_WINDOW_V:.4g} V or more at its first "
-            f"row to {cell.lower_voltage_v + 2 * FULL_WINDOW_V:.4g} V or less): the capacity of {cell.capacity_ah:.3g} "
-            "Ah is believed.",
-        )
+        return cell, (size_assumed(cell, measurements),)
     factor = known / cell.capacity_ah
     note = f"capacity {known:.3f} Ah by a full discharge, {cell.capacity_ah:.3f} Ah declared"
     scaled = replace(cell, electrode_area_m2=cell.electrode_area_m2 * factor, nominal_capacity_ah=known)
     return scaled, (f"{note}; the electrode area is scaled by {factor:.3f}.",)
+
+
+def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:
+    """That the size of the cell is the file's, a sentence; '' where a full discharge among the measurements tells it.
+    What a fit says of capacity is within its windows of stoichiometry then, and the size is no parameter of it."""
+    if any(_full_discharge_ah(cell, m) is not None for m in measurements):
+        return ""
+    return (
+        f"no record holds a full discharge (from {cell.upper_voltage_v - FULL_WINDOW_V:.4g} V or more at its first row "
+        f"to {cell.lower_voltage_v + 2 * FULL_WINDOW_V:.4g} V or less): the size of the cell is taken from the start "
+        f"file, {cell.capacity_ah:.3g} Ah, and capacity, lithium and active material are off by as much as that is, "
+        "beyond their intervals."
+    )
 
 
 def with_activation(cell: Cell) -> tuple[Cell, tuple[str, ...]]:

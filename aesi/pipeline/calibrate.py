@@ -199,6 +199,7 @@ def calibration_content(
         "declared_capacity_ah": found.declared.capacity_ah,
         "declared_degc": found.declared.initial_temperature_k - ZERO_CELSIUS_K,
         "health": _health_rows(found),
+        "size_assumed": found.size_assumed,
         "undetermined": [
             {"weights": dict(o.weights), "narrowed": o.narrowed, "sentence": o.sentence}
             for o in found.undetermined

@@ -12,6 +12,7 @@ from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import sampled
 from aesi.calibration.records.conditions import Conditions
+from aesi.calibration.start import size_assumed
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -69,6 +70,20 @@ def test_the_state_of_health_holds_the_true_one_within_its_intervals(found, trut
     assert low < true.resistance_mohm < high
     low, high = intervals["capacity_ah"]
     assert high - low < 0.5 * true.capacity_ah
+
+
+def test_the_size_of_a_cell_is_said_to_be_the_files_where_no_record_is_a_full_discharge(found, records):
+    whole = Measurement([0.0, 1800.0, 3600.0], [5.0, 5.0, 5.0], [4.15, 3.6, 2.6], name="whole")
+    assert "size of the cell is taken from the start file, 5.15 Ah" in found.size_assumed
+    assert found.size_assumed in found.notes
+    assert size_assumed(found.declared, [*records, whole]) == ""
+
+
+def test_the_mean_temperatures_of_one_record_were_said_to_span_nothing(start, records):
+    _, notes = problem(start, records[:1], Conditions())
+    assert any(note.startswith("a single record does not tell how the cell answers") for note in notes)
+    _, notes = problem(start, [records[0], replace(records[0], name="again")], Conditions())
+    assert any("temperatures of the records are 0.0 K apart, less than 8 K" in note for note in notes)
 
 
 def test_what_the_records_leave_open_is_named_with_its_weights(found):

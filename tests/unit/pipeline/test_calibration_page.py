@@ -50,6 +50,7 @@ def content():
             "resistance_mohm": {"value": 12.0, "low": 10.0, "high": 14.0},
             "capacity_ah": {"value": 3.0, "low": None, "high": None},
         },
+        "size_assumed": "",
         "undetermined": [{"weights": {}, "narrowed": 1.0, "sentence": "the data do not determine it"}],
         "impedance": [],
         "at_bounds": ["negative.film"],
@@ -97,6 +98,17 @@ def test_the_finding_comes_first_and_the_best_known_parameter_before_the_others(
     assert "25.0, as declared" in html
     assert html.count("sampled [") == 1
     assert 'data-figure="nyquist_0"' not in html
+
+
+def test_a_size_that_no_record_told_stood_among_the_notes_alone(tmp_path, content):
+    """A drive of a cell of 2.9 Ah, fitted from a file of one of 5 Ah, came out as a state of health of 5.17 Ah."""
+    view = CalibrationView(content, "the single particle", traces(["pulses"]), HEALTH, "")
+    assert "size of the cell" not in page(tmp_path, view)
+    content["size_assumed"] = (
+        "no record holds it: the size of the cell is taken from the start file, 5.15 Ah."
+    )
+    html = page(tmp_path, view)
+    assert "No record holds it" in html[: html.index("</header>")]
 
 
 def test_spectra_are_drawn_by_temperature(tmp_path, content):

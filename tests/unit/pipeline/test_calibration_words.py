@@ -45,6 +45,7 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
                 file | {"name": "b", "temperature_degc": 9.5},
             ],
             "health": {},
+            "size_assumed": "no record tells it.",
             "parameters": {
                 "negative.rate": told | {"of_prior": 0.034},
                 "contact": told | {"of_prior": 1.001},
@@ -57,6 +58,7 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
         }
     )
     assert "**Warning:** a starts elsewhere." in text
+    assert "\nNo record tells it.\n" in text
     assert "| a | 25.0, as declared | 2.00 |" in text
     assert "| b | 9.5 | 2.00 |" in text
     assert "| negative.rate | 1 | 0.9 to 1.1 | factor | 3 | convention |" in text

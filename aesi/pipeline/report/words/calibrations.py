@@ -65,7 +65,9 @@ def _files(content: Mapping[str, Any]) -> list[str]:
 
 def _health(content: Mapping[str, Any]) -> list[str]:
     rows = [f"| {HEALTH_WORDS[name]} | {_with_interval(p)} |" for name, p in content["health"].items()]
-    return ["| state of health | value | 95 % interval |", "|---|---|---|", *rows]
+    assumed = content["size_assumed"]
+    said = ["", f"{assumed[0].upper()}{assumed[1:]}"] if assumed else []
+    return ["| state of health | value | 95 % interval |", "|---|---|---|", *rows, *said]
 
 
 def _parameters(content: Mapping[str, Any]) -> list[str]:
