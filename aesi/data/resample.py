@@ -21,7 +21,7 @@ from aesi.records import Hold, Measurement
 
 DENSE = 0.75
 """Below this share of the new step the old rows count as denser, and the voltage is averaged."""
-AVERAGES, AT_STAMPS = "interval averages", "values at the stamps"
+AVERAGES, AT_STAMPS = "averaged over each interval", "interpolated between rows"
 MOST_EVEN_ROWS = 20_000_000
 """A fortnight at 10 Hz and more: beyond, a wrong step is likelier than a wish."""
 
@@ -94,10 +94,7 @@ def to_even(measurement: Measurement, dt_s: float, hold: Hold = "backward") -> M
         )
     if is_even(time, dt_s):
         return measurement
-    note = (
-        f"Resampled from {len(time):,} rows to {{rows:,}} rows every {dt_s:g} s: {{current}} of the current, "
-        "{voltage} of the voltage."
-    )
+    note = f"Resampled from {len(time):,} rows to {{rows:,}} rows every {dt_s:g} s: {{how}}."
     return _onto(measurement, even_stamps(time, dt_s), note, hold)
 
 
@@ -113,10 +110,8 @@ def decimate(measurement: Measurement, max_rows: int) -> Measurement:
         raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")
     run = -(-(n - 1) // (max_rows - 1))
     left = (n - 1) % run
-    note = (
-        f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{current}} of the current, "
-        "{voltage} of the voltage"
-        + (f"; the last {left} rows, no whole run, were left out." if left else ".")
+    note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}" + (
+        f"; the last {left} rows, no whole run, were left out." if left else "."
     )
     return _onto(measurement, measurement.time_s[::run], note, "backward")
 
@@ -127,7 +122,8 @@ def _onto(measurement: Measurement, stamps: Array, note: str, hold: Hold) -> Mea
     along, voltage = (intervals.linear, AVERAGES) if dense else (intervals.sampled, AT_STAMPS)
     charge, current = (intervals.held, AVERAGES) if hold == "backward" else (along, voltage)
     temperature = measurement.temperature_degc
-    told = f"{measurement.name}: {note.format(rows=len(stamps), current=current, voltage=voltage)}"
+    how = f"current and voltage {voltage}" if current == voltage else f"current {current}, voltage {voltage}"
+    told = f"{measurement.name}: {note.format(rows=len(stamps), how=how)}"
     return replace(
         measurement,
         time_s=stamps,

@@ -92,6 +92,7 @@ def test_a_current_that_runs_straight_was_resampled_as_a_staircase():
     straight, held = to_even(record, 1.0, "linear"), to_even(record, 1.0)
     np.testing.assert_allclose(straight.current_a, 3.0 * straight.time_s)
     np.testing.assert_allclose(held.current_a[1:3], 6.0)  # A, of the row that ends the first interval
-    assert "values at the stamps of the current, values at the stamps of the voltage" in straight.notes[-1]
+    assert straight.notes[-1].endswith("every 1 s: current and voltage interpolated between rows.")
+    assert held.notes[-1].endswith("current averaged over each interval, voltage interpolated between rows.")
     dense = to_even(measurement(np.arange(0.0, 10.5, 0.5), np.arange(0.0, 10.5, 0.5)), 1.0, "linear")
     np.testing.assert_allclose(dense.current_a[1:], dense.time_s[1:] - 0.5)  # averages of the second before
