@@ -1,7 +1,8 @@
-"""One offline page over several runs: what differs in their settings, what came of it, and where the error is."""
+"""One offline page over several runs: what came of them, what differs in their settings, and where the error is."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,9 +13,10 @@ from aesi.pipeline.report.page import write_plain_page
 from aesi.pipeline.report.table_formats import ABSENT
 from aesi.sparse.search.genome import GENE_WORDS
 
+FREE_RUN_MV, FREE_RUN_MSER = "free_run/test_rmse_mv", "free_run/test_mser_pct"
 COLUMNS = {
-    "free_run/test_rmse_mv": "RMSE, free run, mV",
-    "free_run/test_mser_pct": "MSER, free run, %",
+    FREE_RUN_MV: "RMSE, free run, mV",
+    FREE_RUN_MSER: "MSER, free run, %",
     "free_run/test_mser_recalibrated_pct": "against recalibrated, %",
     "one_step/test_rmse_mv": "RMSE, one step, mV",
     "one_step/persistence_rmse_mv": "persistence, one step, mV",
@@ -25,7 +27,7 @@ COLUMNS = {
     "terms": "terms",
     "before/test_rmse_mv": "as declared, test, mV",
     "recalibrated/test_rmse_mv": "recalibrated, test, mV",
-    "after/test_rmse_mv": "with the finding, test, mV",
+    "after/test_rmse_mv": "as written, test, mV",
     "confidence": "confidence",
     "seconds": "fit and evaluation, s",
 }
@@ -98,7 +100,8 @@ def write_comparison(path: Path, runs: Sequence[ComparedRun]) -> Path:
         payload={"limit": limit, "maps": [content["mean_mv"] for _, content in maps]},
         scripts={"compare_js": "compare.js"},
         title=f"{len(runs)} runs compared",
-        heading=_heading(runs),
+        heading=_finding(runs),
+        what=f"{len(runs)} runs",
         experiments=list(dict.fromkeys(run.experiment for run in runs)),
         tables=[table for make in TABLES if (table := make(runs)) is not None],
         maps=[{"label": label, "range": _range_of(content)} for label, content in maps],
@@ -112,9 +115,42 @@ def differing_settings(runs: Sequence[ComparedRun]) -> list[str]:
     return [key for key in keys if len({run.settings.get(key) for run in runs}) > 1]
 
 
-def _heading(runs: Sequence[ComparedRun]) -> str:
-    changed = len(differing_settings(runs))
-    return f"{len(runs)} runs, {changed} setting{'s' if changed != 1 else ''} that differ{'s' if changed == 1 else ''}"
+def _finding(runs: Sequence[ComparedRun]) -> str:
+    """What came of the runs: which errs least in free run, and whether a correction helped; the verdicts."""
+    return (
+        " ".join(filter(None, (_least(runs), _harmed(runs), _found(runs)))) or f"{len(runs)} runs compared."
+    )
+
+
+def _least(runs: Sequence[ComparedRun]) -> str:
+    """The run that errs least, where the figures as shown tell it from the next."""
+    known = sorted((run.metrics[FREE_RUN_MV], run.label) for run in runs if FREE_RUN_MV in run.metrics)
+    if len(known) < 2:
+        return ""
+    (least, next_one, *_), most = [_text(value) for value, _ in known], _text(known[-1][0])
+    if least == next_one:
+        errors = " to ".join(dict.fromkeys((least, most)))
+        return f"The {len(known)} runs err by {errors} mV RMSE in free run on test records."
+    rest = "the other" if len(known) == 2 else f"the other {len(known) - 1}"
+    errors = " to ".join(dict.fromkeys((next_one, most)))
+    return f"{known[0][1]} errs least in free run on test records: {least} mV RMSE, {rest} by {errors} mV."
+
+
+def _harmed(runs: Sequence[ComparedRun]) -> str:
+    known = [run.metrics[FREE_RUN_MSER] for run in runs if FREE_RUN_MSER in run.metrics]
+    worse = sum(value < 0.0 for value in known)
+    if not worse:
+        return ""
+    who = "All" if worse == len(known) else f"{worse} of {len(known)}"
+    return f"{who} err{'s' if worse == 1 else ''} by more than the declared model alone."
+
+
+def _found(runs: Sequence[ComparedRun]) -> str:
+    verdicts = Counter(str(run.discovery["verdict"]) for run in runs if run.discovery)
+    if not verdicts:
+        return ""
+    told = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.most_common())
+    return f"Of {verdicts.total()} {'discovery' if verdicts.total() == 1 else 'discoveries'}: {told}."
 
 
 def _settings(runs: Sequence[ComparedRun]) -> PageTable | None:
@@ -253,9 +289,9 @@ def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
 
 
 TABLES: tuple[Callable[[Sequence[ComparedRun]], PageTable | None], ...] = (
-    _settings,
     _metrics,
     _verdicts,
+    _settings,
     _genes,
     _terms,
 )

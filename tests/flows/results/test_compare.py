@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -48,6 +49,35 @@ def test_only_settings_that_differ_are_shown(tmp_path):
     assert "T1(I)" not in html  # all runs hold it
 
 
+def heading_of(tmp_path, *runs):
+    html = write_comparison(tmp_path / "page.html", runs).read_text()
+    assert html.index("What came of it") < html.index("What was different")
+    return re.search("<h1>(.*?)</h1>", html)[1].replace("\u00a0", " ")
+
+
+def test_the_first_sentence_of_a_page_counted_settings_and_not_what_came_of_them(tmp_path):
+    best, second, third = (run_of(number) for number in (1, 2, 3))
+    text = heading_of(tmp_path, second, best, third)
+    assert (
+        text == f"{best.label} errs least in free run on test records: 3 mV RMSE, the other 2 by 4 to 5 mV."
+    )
+    assert heading_of(tmp_path, best, second).endswith("3 mV RMSE, the other by 4 mV.")
+    assert heading_of(tmp_path, best, best) == "The 2 runs err by 3 mV RMSE in free run on test records."
+    told_apart = heading_of(tmp_path, best, best, third)
+    assert told_apart == "The 3 runs err by 3 to 5 mV RMSE in free run on test records."
+    harmed = replace(second, metrics=second.metrics | {"free_run/test_mser_pct": -20.0})
+    assert heading_of(tmp_path, best, harmed).endswith(" 1 of 2 errs by more than the declared model alone.")
+    assert "All err by more than the declared" in heading_of(tmp_path, harmed, harmed)
+    found = [
+        replace(best, metrics={}, discovery={"verdict": word, "effects": [], "candidates": []})
+        for word in ("found", "unknown", "found")
+    ]
+    assert (
+        "<h1>Of 3 discoveries: 2 found, 1 unknown.</h1>"
+        in write_comparison(tmp_path / "d.html", found).read_text()
+    )
+
+
 def test_the_model_that_a_search_ended_with_is_no_setting(tracked):
     store, tags = Store(), {KIND: "run"}
     for chosen in ("ESPM + AESI I", "ESPM + AESI II"):
@@ -89,7 +119,7 @@ def test_the_page_explains_what_is_on_it(tmp_path):
         ComparedRun(f"{k:032x}", "trace", "discover", "now", {}, metrics, discovery=found) for k in (1, 2)
     ]
     html = write_comparison(tmp_path / "page.html", runs).read_text()
-    assert "with the finding, test, mV" in html
+    assert "as written, test, mV" in html  # which an unknown has no finding for
     for word in ("MSER", "Ranges below", '<th scope="col">model</th>'):
         assert word not in html
         assert word in write_comparison(tmp_path / "runs.html", [run_of(1), run_of(2)]).read_text()
