@@ -154,7 +154,8 @@ def with_temperatures(
         else:
             declared = cell.initial_temperature_k - ZERO_CELSIUS_K
             notes.append(
-                f"{record.name}: no temperature in it; taken at {declared:.4g} degC, as the cell's file declares."
+                f"{record.name}: no temperature in it; taken at {declared:.4g} degC, as the cell's file declares; "
+                "--temperature FILE=DEGC says another."
             )
         out.append(record)
     return tuple(out), tuple(notes)

@@ -45,10 +45,8 @@ def test_a_cold_record_of_a_cell_without_activation_energies_was_simulated_in_si
 def test_two_effects_that_change_the_temperature_were_one():
     cell, record = Cell.from_bpx(NMC), Measurement(np.arange(3.0), np.zeros(3), np.full(3, 3.7), name="rest")
     both = [CATALOGUE[name].activate() for name in ("self_heating", "ambient_temperature")]
-    assert temperature_sentence(cell, record, both).endswith(
-        "self_heating and ambient_temperature change it."
-    )
-    assert temperature_sentence(cell, record, both[:1]).endswith("and self_heating changes it.")
+    assert "self_heating and ambient_temperature change it; " in temperature_sentence(cell, record, both)
+    assert "and self_heating changes it; " in temperature_sentence(cell, record, both[:1])
 
 
 def test_a_shift_of_the_temperature_was_no_temperature_that_energies_are_missing_for():
