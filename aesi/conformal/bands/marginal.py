@@ -13,6 +13,9 @@ from aesi.conformal.regressors.model import Kinds
 from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, SavedState
 
+ROUND_OFF = 1e-9
+"""Of a rank, which must not be missed by it."""
+
 
 @dataclass(frozen=True, eq=False)
 class FixedBand(Band):
@@ -39,13 +42,17 @@ class FixedBand(Band):
 
 @kept_njit()
 def _window_quantiles(past: Array, levels: Array, out: Array) -> None:
-    # Position (n + 1) level among the order statistics: the rank of conformal prediction, interpolated.
+    # Position (n + 1) level among the order statistics: the rank of conformal prediction, interpolated. One that n
+    # residuals do not have is at infinity: the extreme in its place would make the band narrower than its level.
     ordered = np.sort(past)
     n = ordered.size
     for j in range(levels.size):
-        position = min(max((n + 1) * levels[j] - 1, 0.0), n - 1.0)
-        i = min(int(position), n - 2)
-        out[j] = ordered[i] + (position - i) * (ordered[i + 1] - ordered[i])
+        position = (n + 1) * levels[j] - 1
+        if -ROUND_OFF < position < n - 1 + ROUND_OFF:
+            i = min(max(int(position), 0), n - 2)
+            out[j] = ordered[i] + (position - i) * (ordered[i + 1] - ordered[i])
+        else:
+            out[j] = np.inf if position > 0 else -np.inf
 
 
 @kept_njit()
@@ -62,7 +69,8 @@ def _rolling(series: Array, window: int, needed: int, levels: Array, out: Array,
 class RollingBand(Band):
     """EnbPI's interval: the narrowest pair of quantiles of the last `window` residuals.
 
-    levels : (2 B,) pairs beta, 1 - alpha + beta.  needed : residuals before the extreme ranks exist.
+    levels : (2 B,) pairs beta, 1 - alpha + beta; a pair is one to choose from once the residuals have its ranks.
+    needed : residuals before any pair is.
     Xu & Xie, ICML 2021 (EnbPI).
     """
 

@@ -143,7 +143,7 @@ class EnbPI(Method):
         levels = level_pairs(data.alpha, self.n_betas)
         return RollingBand(data.window, self._needed(data.alpha), levels), Scale.none()
 
-    @staticmethod
-    def _needed(alpha: float) -> int:
-        """Residuals before the extreme ranks exist."""
-        return int(np.ceil(2 / alpha)) - 1
+    def _needed(self, alpha: float) -> int:
+        """Residuals before any pair of ranks exists."""
+        betas = level_pairs(alpha, self.n_betas)[: self.n_betas]
+        return int(np.ceil(1 / np.minimum(betas, alpha - betas).max() - 1e-9)) - 1
