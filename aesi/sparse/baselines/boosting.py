@@ -2,14 +2,16 @@
 
     e[k + 1] = g(U[k]) + memory (e[k] - g(U[k - 1]))
 
-The trees see the inputs alone: a tree that sees e[k] learns persistence, which is worth nothing in free run. Depth
-and learning rate come from a small grid, judged on the left-out pieces.
+The trees see the inputs alone: a tree that sees e[k] learns persistence, which is worth nothing in free run. Rows count
+as in every fit of the search. Number of leaves and of trees come from a small grid, judged as candidates of the search
+are: on what physics that has not seen them leaves of the left-out pieces, and on validation records. Where sparse
+corrections fade to the physics, so do the trees, but for the leverage, which is that of a regression.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -17,23 +19,27 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
-from aesi.sparse.search.judge import memory_of
+from aesi.sparse.fade import Fade
+from aesi.sparse.search.evaluate import FitnessWeights, fitness
+from aesi.sparse.search.judge import on_validation, runs_without_feedback
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.scaling import Scaling
 
-_ITERATIONS = 200
-"""Boosting rounds at most; early stopping ends them before."""
+LEAVES = (4, 15)
+TREES = (25, 50, 100, 200)
+"""The grid, at the default learning rate. Conventions."""
 
 
 @dataclass(frozen=True, eq=False)
 class BoostedErrorModel:
-    """A fitted regressor of the scaled next error on the scaled inputs."""
+    """A fitted regressor of the scaled next error on the scaled inputs; `fade` as of a sparse model."""
 
     regressor: Any
     scaling: Scaling
     input_names: tuple[str, ...]
     memory: float
+    fade: Fade | None = None
     name: str = "gradient boosting"
 
     def one_step(self, series: ErrorSeries) -> Array:
@@ -45,7 +51,7 @@ class BoostedErrorModel:
         start = float(series.error_v[0]) if error0_v is None else error0_v
         variables = self._variables(series)
         scaled0 = float(self.scaling.error_to_scaled(np.array(start)))
-        scaled = free_run.remember(self._given(variables), self.memory, scaled0)
+        scaled = free_run.remember(self._given(variables, series), self.memory, scaled0)
         error_v = np.append(start, self.scaling.error_to_volts(scaled))
         variables[:, 0] = error_v
         return FreeRun(error_v, None, self.scaling.is_outside(variables))
@@ -53,52 +59,65 @@ class BoostedErrorModel:
     def k_step(self, series: ErrorSeries, steps: int) -> Array:
         """(n,) V: the prediction of error_v[k] given error_v[k - steps]; the first ones from error_v[0]."""
         measured = self.scaling.error_to_scaled(series.error_v)
-        given = self._given(self._variables(series))
+        given = self._given(self._variables(series), series)
         scaled = free_run.remember_ahead(given, self.memory, measured, steps)
         return np.append(series.error_v[:1], self.scaling.error_to_volts(scaled))
 
     def _variables(self, series: ErrorSeries) -> Array:
         return np.column_stack([series.error_v, with_inputs(series, self.input_names).inputs])
 
-    def _given(self, variables: Array) -> Array:
-        return np.asarray(self.regressor.predict(self.scaling.apply(variables)[:-1, 1:]), dtype=float)
+    def _given(self, variables: Array, series: ErrorSeries) -> Array:
+        scaled = self.scaling.apply(variables)[:, 1:]
+        given = np.asarray(self.regressor.predict(scaled), dtype=float)
+        if self.fade is not None:
+            unheld = scaled + self.scaling.cut_off(variables)[:, 1:]
+            given = given * self.fade.weight(unheld, series.soc, series.temperature_degc, None)
+        return given[:-1]
 
 
 def gradient_boosting(problem: Problem, seed: int = 0) -> BoostedErrorModel:
-    """The best of the grid on the left-out pieces, fitted on all training rows."""
-    rows = np.vstack(
-        [
-            problem.scaling.apply(np.column_stack([record.error_v, record.inputs])[:-1])[:, 1:]
-            for record in problem.split.train
-        ]
+    """The fittest of the grid, fitted to all training rows."""
+    tried = [one for leaves in LEAVES for one in _tried(problem, leaves, seed)]
+    return max(tried, key=lambda one: one[0])[1]
+
+
+def _tried(problem: Problem, leaves: int, seed: int) -> Iterator[tuple[float, BoostedErrorModel]]:
+    """Fitness and model for each number of trees."""
+    left_out = [_left_out(problem, fold, leaves, seed) for fold in range(len(problem.folds))]
+    for number, trees in enumerate(TREES):
+        given = np.concatenate([each[number] for each in left_out])
+        runs, memory = runs_without_feedback(problem, np.column_stack([given] * 3))
+        regressor = _regressor(leaves, trees, seed)
+        model = BoostedErrorModel(
+            regressor.fit(problem.inputs, problem.target, problem.row_weights),
+            problem.scaling,
+            problem.library.variables[1:],
+            memory,
+            Fade(runs.amplitudes[0], problem.region) if problem.options.fade else None,
+        )
+        (valid,) = on_validation(problem, runs, (model,))
+        losses = runs.judge(problem, 0).loss, valid.loss, 0.0
+        yield fitness(losses, len(problem.library), FitnessWeights()), model
+
+
+def _left_out(problem: Problem, fold: int, leaves: int, seed: int) -> list[Array]:
+    """Predictions of a left-out piece by a fit to the rest, for each number of trees."""
+    a, b = problem.folds[fold]
+    others = np.r_[0:a, b : len(problem.target)]
+    regressor = _regressor(leaves, max(TREES), seed).fit(
+        problem.inputs[others], problem.fold_targets[fold, others], problem.row_weights[others]
     )
-    trials = []
-    for leaves, rate in product((4, 15), (0.03, 0.1)):
-        given = [_left_out(problem, rows, (a, b), leaves, rate, seed) for a, b in problem.folds]
-        left = problem.target - np.concatenate(given)
-        trials.append((float(np.mean(left**2)), leaves, rate, memory_of(problem, given)))
-    _, leaves, rate, memory = min(trials)
-    regressor = _regressor(leaves, rate, seed).fit(rows, problem.target)
-    return BoostedErrorModel(regressor, problem.scaling, problem.library.variables[1:], memory)
+    stages = enumerate(regressor.staged_predict(problem.inputs[a:b]), start=1)
+    return [np.asarray(given, dtype=float) for trees, given in stages if trees in TREES]
 
 
-def _left_out(
-    problem: Problem, rows: Array, piece: tuple[int, int], leaves: int, rate: float, seed: int
-) -> Array:
-    a, b = piece
-    others = np.r_[0:a, b : len(rows)]
-    return np.asarray(
-        _regressor(leaves, rate, seed).fit(rows[others], problem.target[others]).predict(rows[a:b])
-    )
-
-
-def _regressor(leaves: int, rate: float, seed: int) -> Any:
+def _regressor(leaves: int, trees: int, seed: int) -> Any:
     from sklearn.ensemble import HistGradientBoostingRegressor
 
     return HistGradientBoostingRegressor(
-        max_iter=_ITERATIONS,
+        max_iter=trees,
         max_leaf_nodes=leaves,
-        learning_rate=rate,
         l2_regularization=1.0,
+        early_stopping=False,  # it judges by single rows, whose neighbours were fitted
         random_state=seed,
     )

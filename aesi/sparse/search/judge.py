@@ -9,10 +9,9 @@ import numpy as np
 
 from aesi.numerics.metrics import mse, mser, pearson
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.records import ErrorSeries
+from aesi.records import ErrorModel, ErrorSeries
 from aesi.sparse import free_run
 from aesi.sparse.fade import amplitude
-from aesi.sparse.model import SparseModel
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.search.rows import balanced_weights, spans_of
 
@@ -103,7 +102,7 @@ def fold_runs(
         for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)
     ]
     if not any(functions.any() for _, functions in drives):
-        return _without_feedback(problem, np.vstack([drive[0] for drive, _ in drives]))
+        return runs_without_feedback(problem, np.vstack([drive[0] for drive, _ in drives]))
     parts = []
     for (a, b), (drive, functions) in zip(problem.folds, drives, strict=True):
         rows = slice(a, b)
@@ -124,8 +123,10 @@ def _sums(problem: Problem, given: Array) -> Array:
         return np.stack([products[a:b].sum(axis=0) for a, b in problem.folds], axis=1)
 
 
-def _without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
-    """given : (n, 3) scaled predictions by the inputs alone, of rows that the models have not seen."""
+def runs_without_feedback(problem: Problem, given: Array) -> tuple[FoldRuns, float]:
+    """`fold_runs` of models without feedback.
+
+    given : (n, 3) scaled predictions by the inputs alone, of rows that the models have not seen."""
     amplitudes = [1.0] * given.shape[1]
     sums = _sums(problem, given)
     if problem.options.fade:
@@ -158,7 +159,7 @@ def memory_of(problem: Problem, given: Sequence[Array]) -> float:
     return float(np.clip(np.median(each), 0.0, _MOST_MEMORY))
 
 
-def on_records(model: SparseModel, records: Sequence[ErrorSeries], problem: Problem) -> Judged:
+def on_records(model: ErrorModel, records: Sequence[ErrorSeries], problem: Problem) -> Judged:
     """How a model does on whole records, each started from its first measured error."""
     truth = [record.error_v[1:] for record in records]
     one_step = [model.one_step(record)[1:] for record in records]
@@ -184,7 +185,7 @@ def _relative_loss(truth: Sequence[Array], predictions: Sequence[Array], balance
     return float((weights @ left**2) / (weights @ joined**2))
 
 
-def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[SparseModel]) -> tuple[Judged, ...]:
+def on_validation(problem: Problem, runs: FoldRuns, models: Sequence[ErrorModel]) -> tuple[Judged, ...]:
     """How each model did on the validation records, or where there are none on the left-out pieces.
 
     models : AESI I and II, or a single one; on pieces the fold's fit and its refit stand for them.

@@ -98,6 +98,7 @@ class Problem:
     error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  temperature_degc : (n,), NaN where it
     was not measured.  region : what a fit to all rows is fitted to.
     unseen_error, unseen_target : the same by physics that has not seen the row's fold (unseen.py).
+    fold_targets : (n_folds, n) the target by the physics of each fold, which a fit without that fold learns.
     counts : (resamples, n) how often each resample holds a row.
     nearness : (n,) what is left of a correction at each row that was fitted without its fold (trained_region.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
@@ -120,6 +121,7 @@ class Problem:
     target: Array
     unseen_error: Array
     unseen_target: Array
+    fold_targets: Array
     soc: Array
     temperature_degc: Array
     region: TrainedRegion
@@ -203,6 +205,7 @@ class Problem:
             target=target,
             unseen_error=unseen.error,
             unseen_target=unseen.target,
+            fold_targets=unseen.targets if len(unseen.targets) else np.broadcast_to(target, (len(cut), n)),
             soc=soc,
             temperature_degc=temperature,
             region=region,
