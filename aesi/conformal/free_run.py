@@ -2,7 +2,8 @@
 
 Errors of a free run are autocorrelated over minutes, so the exchangeable unit is a piece of a drive and not a sample.
 The errors of piece i are normalised, |error| / s_i, by a scale that follows what the fitted rows leave open of the
-physics and of the correction (`local_scale`) and is fitted to the other pieces. The half-width k h at a sample solves
+physics and of the correction (`local_scale`) and is fitted to the pieces that share no row with it. The half-width
+k h at a sample solves
 
     sum_i n_i [share of the normalised errors r of piece i with s_i r <= h]   =   (1 - alpha) sum_i n_i        (1)
     k = t(1 - alpha / 2; m - 1) / z(1 - alpha / 2),     m the number of independent pieces                 (2)
@@ -83,6 +84,7 @@ class FreeRunBands:
         root: Array | None = None,
         energies_j_mol: Array | None = None,
         stretches: int | None = None,
+        records: Sequence[str] | None = None,
     ) -> FreeRunBands:
         """Calibrate on out-of-sample prediction errors: of records, or pieces, that the model was not fitted to.
 
@@ -95,6 +97,8 @@ class FreeRunBands:
         excess : one (n_i,) array a record, `FreeRun.excess` of that model; None where it keeps no leverage.
         seen, root, energies_j_mol : of the model that the bands are for.
         stretches : how many stretches of the records err independently over a whole drive; by default their pieces.
+        records : the name of the record that each array is of, where several are of one (its rows numbered alike): no
+        piece is scored by a scale that is fitted to its own rows under another model. By default each is of its own.
 
         Raises InputError for arrays that do not match, FitError for too few pieces or errors all zero.
         """
@@ -105,7 +109,9 @@ class FreeRunBands:
         columns = [covariates(p, x) for p, x in zip(spreads, excess or [None] * len(spreads), strict=True)]
         usable = inside or [np.ones(n, dtype=bool) for n in lengths]
         bands = [
-            calibrated_band(horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s, stretches)
+            calibrated_band(
+                horizon, errors_by_horizon[horizon], columns, usable, alpha, dt_s, stretches, records
+            )
             for horizon in sorted(errors_by_horizon)
         ]
         return cls(alpha, tuple(bands), seen, root, energies_j_mol)

@@ -12,7 +12,7 @@ from scipy.special import ndtri, stdtrit
 
 from aesi.conformal.local_scale import LocalScale
 from aesi.errors import FitError, InputError
-from aesi.numerics.typing import Array, BoolArray, SavedState
+from aesi.numerics.typing import Array, BoolArray, IntArray, SavedState
 
 WHOLE_DRIVE = math.inf
 """The horizon of a prediction from the start of a record to its end."""
@@ -100,10 +100,16 @@ class HorizonBand:
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """sizes : (n,) V, |error|.  columns : (n, p)."""
+    """sizes : (n,) V, |error|.  columns : (n, p).  record, rows : of which record, (n,) which of its rows."""
 
     sizes: Array
     columns: Array
+    record: str | int
+    rows: IntArray
+
+    def shares_rows_with(self, other: _Piece) -> bool:
+        """Whether a row is in both, be it by another model: as in itself."""
+        return self.record == other.record and np.intersect1d(self.rows, other.rows).size > 0
 
 
 def calibrated_band(
@@ -114,6 +120,7 @@ def calibrated_band(
     alpha: float,
     dt_s: float,
     stretches: int | None = None,
+    records: Sequence[str] | None = None,
 ) -> HorizonBand:
     """One horizon (s) calibrated at miss rate `alpha`, records sampled every dt_s (s).
 
@@ -121,16 +128,18 @@ def calibrated_band(
     `local_scale.covariates`.  inside : one (n_i,), True inside the trained range of the model that predicted.
     stretches : how many stretches of the rows err independently over a whole drive; by default, and where they are too
     few to be told apart, the pieces that they are cut into.
+    records : of which record each is, where several are of one: a part of a drive and the whole of it.
     Raises InputError where lengths differ, FitError for too few pieces or errors all zero.
     """
     if not [len(e) for e in errors] == [len(c) for c in columns] == [len(i) for i in inside]:
         raise InputError(
             f"errors at {horizon:g} s and covariates differ in length; give one row a sample of each."
         )
-    pieces = _pieces(errors, columns, inside)
+    names: Sequence[str | int] = records or range(len(errors))
+    pieces = _pieces(errors, columns, inside, names)
     extrapolated = len(pieces) < MIN_PIECES
     if extrapolated:
-        pieces = _pieces(errors, columns, [np.ones(len(e), dtype=bool) for e in errors])
+        pieces = _pieces(errors, columns, [np.ones(len(e), dtype=bool) for e in errors], names)
     if len(pieces) < MIN_PIECES:
         raise FitError(
             f"{len(pieces)} pieces of {MIN_ROWS} or more predictions {horizon:g} s ahead cannot calibrate a band: "
@@ -138,7 +147,9 @@ def calibrated_band(
         )
     if not any(piece.sizes.any() for piece in pieces):
         raise FitError(f"the errors at {horizon:g} s are zero; calibrate on predictions of measured voltage.")
-    scales = [_scale([other for other in pieces if other is not piece], alpha) for piece in pieces]
+    scales = [
+        _scale([other for other in pieces if not other.shares_rows_with(piece)], alpha) for piece in pieces
+    ]
     scores = [piece.sizes / scale(piece.columns) for piece, scale in zip(pieces, scales, strict=True)]
     counts = np.array([float(score.size) for score in scores])
     independent = float(np.maximum(1, counts * dt_s // (FORGOTTEN * horizon)).sum())
@@ -170,13 +181,18 @@ def _scale(pieces: Sequence[_Piece], alpha: float) -> LocalScale:
     )
 
 
-def _pieces(errors: Sequence[Array], columns: Sequence[Array], inside: Sequence[BoolArray]) -> list[_Piece]:
+def _pieces(
+    errors: Sequence[Array],
+    columns: Sequence[Array],
+    inside: Sequence[BoolArray],
+    records: Sequence[str | int],
+) -> list[_Piece]:
     """The usable rows of each record, long records cut; what is too short to count is left out."""
     usable = [np.flatnonzero(np.isfinite(e) & i) for e, i in zip(errors, inside, strict=True)]
     longest = max(MIN_ROWS, -(-sum(rows.size for rows in usable) // N_PIECES))
     return [
-        _Piece(np.abs(e[part]), c[part])
-        for e, c, rows in zip(errors, columns, usable, strict=True)
+        _Piece(np.abs(e[part]), c[part], record, part)
+        for e, c, rows, record in zip(errors, columns, usable, records, strict=True)
         for part in np.array_split(rows, max(1, round(rows.size / longest)))
         if part.size >= MIN_ROWS
     ]

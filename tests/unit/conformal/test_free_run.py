@@ -165,6 +165,20 @@ def test_the_band_reaches_as_far_as_the_model_would_go_on() -> None:
         np.testing.assert_allclose(held[0] - wide[0], reach)
 
 
+def test_a_whole_drive_does_not_scale_its_own_half() -> None:
+    # Six quiet drives and one with ten times the error, of which a half is left out too: rows of its own.
+    rng = np.random.default_rng(3)
+    errors = [size * rng.standard_normal(600) for size in (1e-3,) * 6 + (1e-2,)]
+    half = np.where(np.arange(600) < 300, errors[-1], np.nan)
+    names = [f"drive {k}" for k in range(7)]
+    flat = [np.zeros(600)] * 8
+    (told,) = FreeRunBands.fit({1.0: [*errors, half]}, DT, flat, records=[*names, names[-1]]).horizons
+    (alone,) = FreeRunBands.fit({1.0: errors}, DT, flat[:-1]).horizons
+    here = np.array([[1.0, 0.0, 0.0]])
+    for scale in (told.scales[-1], told.scales[-2]):
+        np.testing.assert_array_equal(scale(here), alone.scales[-1](here))
+
+
 def test_each_piece_is_scored_with_the_scale_of_the_others() -> None:
     # Seven quiet records and one with ten times the error: the quiet ones' scale covers next to nothing of it,
     # and that shows.

@@ -30,6 +30,7 @@ WHOLE = slice(1, None)
 class OutOfSampleErrors:
     """What predictions left of the error on samples their models had not seen, one (n_i,) array a record.
 
+    records : their names; a record is here once for each part of it that was left out.
     by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
     current_a, soc : A and 1.  inside : True where the model had been trained on such inputs.
     excess : `FreeRun.excess` of each model.  spread : V, what the rows that each was fitted to leave open there.
@@ -38,6 +39,7 @@ class OutOfSampleErrors:
     """
 
     dt_s: float
+    records: list[str]
     by_horizon: dict[float, list[Array]]
     current_a: list[Array]
     soc: list[Array]
@@ -63,6 +65,7 @@ class OutOfSampleErrors:
                 left[_others(len(left), rows)] = np.nan
         return cls(
             dt_s=pairs[0][1].dt_s,
+            records=[series.name for _, series, _ in pairs],
             by_horizon=by_horizon,
             current_a=[series.current_a for _, series, _ in pairs],
             soc=[series.soc for _, series, _ in pairs],
@@ -89,6 +92,7 @@ class OutOfSampleErrors:
             root=self.root,
             energies_j_mol=None if self.root is None else ENERGIES_J_MOL,
             stretches=stretches,
+            records=self.records,
         )
 
 
