@@ -22,7 +22,7 @@ from aesi.tracer.case.free_parameter import by_owner
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import gathered_beside
-from aesi.tracer.decide.evidence import Evidence, gathered
+from aesi.tracer.decide.evidence import Answer, Evidence, gathered
 from aesi.tracer.decide.model_choice import ModelChoice, with_model
 from aesi.tracer.decide.verdict import Thresholds, Verdict
 from aesi.tracer.likelihood.growth import Explanation
@@ -166,7 +166,7 @@ def discover(
         check_same_cell(problem, record, run)
     spent = _Spent(progress)
 
-    def search(one: InverseProblem, fits: Archive, most: int) -> Evidence:
+    def search(one: InverseProblem, fits: Archive, most: int) -> Answer:
         look = gathered_beside if one.has_good else gathered
         return look(one, most, fits, Thresholds(), spent)
 

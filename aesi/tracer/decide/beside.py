@@ -8,6 +8,7 @@ answer may leave is what the model leaves of the good ones. What the cell is mad
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import BoolArray
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.decide.carry_over import ORDINARY_C, range_fault
-from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Evidence, with_confidence
+from aesi.tracer.decide.evidence import MEASURED_EFFECTS, Answer, Evidence, with_confidence
 from aesi.tracer.decide.verdict import Thresholds, Verdict, best_gain, beyond, look_alikes
 from aesi.tracer.decide.written import limits_of
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
@@ -28,14 +29,18 @@ from aesi.tracer.search.wrong_parameters import NINETY
 
 def gathered_beside(
     problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
-) -> Evidence:
+) -> Answer:
     """Search for what the records have that the good ones have not, and judge.
 
     Raises DataError where the model cannot be simulated on the records.
     """
     beside = replace(problem, trust="beside")
     path = searched(beside, min(max_effects, MEASURED_EFFECTS), archive, report)
-    verdict = with_confidence(judged_beside(path, thresholds))
+    return Answer(path, judged_beside(path, thresholds), {"beside": path}, partial(_settled, path))
+
+
+def _settled(path: Path, verdict: Verdict) -> Evidence:
+    beside, verdict = path.problem, with_confidence(verdict)
     recalibrated = ModelState.of(beside, path.base)
     after = ModelState.of(beside, path.chosen) if verdict.effects else recalibrated
     fault = range_fault(after, ORDINARY_C)

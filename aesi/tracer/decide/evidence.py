@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -79,15 +80,39 @@ class _Searches:
         return self.paths[trust]
 
 
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """What the searches with one model of the cell answer, before it is settled what to write.
+
+    path : the search that is believed.  verdict : on it.  paths : all of them so far, by trust.
+    settled : of a verdict on that path, the evidence with the model that is written.
+    """
+
+    path: Path
+    verdict: Verdict
+    paths: dict[Trust, Path]
+    settled: Callable[[Verdict], Evidence]
+
+    @property
+    def evidence(self) -> Evidence:
+        """With the model that is written."""
+        return self.settled(self.verdict)
+
+
 def gathered(
     problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
-) -> Evidence:
-    """Search, judge, and check what carries over.
+) -> Answer:
+    """Search and judge; what carries over is checked where the answer is settled.
 
     Raises DataError where the model cannot be simulated on the records.
     """
     searches = _Searches(max_effects, archive, thresholds, report)
     path, verdict = _best_explanation(problem, searches)
+    return Answer(path, verdict, searches.paths, partial(_settled, problem, path, searches))
+
+
+def _settled(problem: InverseProblem, path: Path, searches: _Searches, verdict: Verdict) -> Evidence:
+    archive = searches.archive
     if verdict.word == "unknown":
         ages = of_several_ages(problem, archive)
         return _unexplained(replace(problem, ages=ages), path, verdict, searches)

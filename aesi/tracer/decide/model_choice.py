@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import Reduction, let_stand, reduction_of, with_fine_numerics
-from aesi.tracer.decide.evidence import Evidence, believed
-from aesi.tracer.decide.verdict import Thresholds, structured_v, tolerance_v
+from aesi.tracer.case.reduction import LEAST_V, Reduction, let_stand, reduction_of, with_fine_numerics
+from aesi.tracer.decide.evidence import Answer, Evidence, believed
+from aesi.tracer.decide.verdict import Thresholds, across_models, structured_v, tolerance_v
 from aesi.tracer.search.archive import Archive
-from aesi.tracer.search.path import Path, lowers_error, unseen_rmse_v
+from aesi.tracer.search.path import Path
 
-Search = Callable[[InverseProblem, Archive, int], Evidence]
+Search = Callable[[InverseProblem, Archive, int], Answer]
 """All that is searched and judged with one model of the cell, with at most so many names."""
 FIRST_LOOK = 1
 """Names that the single particle is tried with before the porous electrode, where the declared cell asks for that one:
@@ -86,17 +86,22 @@ def with_model(
         by_single = search(single, archive, max_effects)
     if believed((by_full.path, by_full.verdict), (by_single.path, by_single.verdict)):
         why = ", which explains the data with fewer or more usual effects"
-        return _chosen(by_single, "espm", reduction, why)
-    return _chosen(by_full, "dfn", reduction)
+        return _chosen(_of_both(by_single, by_full), "espm", reduction, why)
+    return _chosen(_of_both(by_full, by_single), "dfn", reduction)
+
+
+def _of_both(believed_one: Answer, other: Answer) -> Answer:
+    """What was searched with the model that is believed, with the look-alikes of both searches."""
+    return replace(believed_one, verdict=across_models(believed_one.verdict, other.verdict))
 
 
 def _chosen(
-    evidence: Evidence, name: ModelName, reduction: Reduction | None, why: str = ""
+    answer: Answer, name: ModelName, reduction: Reduction | None, why: str = ""
 ) -> tuple[Evidence, ModelChoice]:
     """What was searched with a model, and the choice of that one."""
     differ = "" if reduction is None else f"; {reduction.sentence}"
     words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
-    return evidence, ModelChoice(name, words, reduction)
+    return answer.evidence, ModelChoice(name, words, reduction)
 
 
 def _notable(reduction: Reduction | None) -> bool:
@@ -112,17 +117,17 @@ def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
     return max(known, key=lambda one: one.shift_v, default=None)
 
 
-def most_names(single: Evidence, max_effects: int) -> int:
+def most_names(single: Answer, max_effects: int) -> int:
     """Names with which the porous electrode could still be believed rather than a search with the single particle: no
-    more than that has, where it leaves nothing that further ones could lower."""
-    path = single.path
-    left_v = unseen_rmse_v(path.blocks, path.chosen)
-    if single.verdict.word == "unknown" or lowers_error(left_v, path.problem.noise_v):
+    more than that has, where what it leaves is likelier without a model error beyond what two solvers differ by, so
+    that there is nothing for further ones to explain."""
+    chosen = single.path.chosen
+    if single.verdict.word == "unknown" or chosen.score.delta_v > LEAST_V:
         return max_effects
-    return len(path.chosen.hypothesis)
+    return len(chosen.hypothesis)
 
 
-def _explains(single: Evidence, reduction: Reduction | None) -> bool:
+def _explains(single: Answer, reduction: Reduction | None) -> bool:
     """Does a search with the single particle explain the data, or could what the two models of the declared cell differ
     by be all that it leaves beyond what a right hypothesis may?"""
     path = single.paths["tight"]

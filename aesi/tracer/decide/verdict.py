@@ -233,6 +233,23 @@ def look_alikes(
     return tuple(groups), float(min(margin, _weakest_sds(path, tried), MOST_SDS))
 
 
+def across_models(verdict: Verdict, other: Verdict) -> Verdict:
+    """A finding with what a search with the other model of the cell names in the place of one of its effects, where all
+    others are the same: a look-alike, though each model tells the two apart.
+
+    Both searches explain the data to the noise, so that which of the names it is rests on what one of the models
+    approximates.
+    """
+    instead = set(other.effects) - set(verdict.effects)
+    same_count = len(other.effects) == len(verdict.effects)
+    if verdict.word != "found" or other.word != "found" or not same_count or len(instead) != 1:
+        return verdict
+    (named,) = set(verdict.effects) - set(other.effects)
+    sets = {one[0]: one for one in verdict.confidence_sets}
+    sets[named] = tuple(dict.fromkeys((*sets.get(named, (named,)), *instead)))
+    return replace(verdict, confidence_sets=tuple(sets[name] for name in verdict.effects if name in sets))
+
+
 def _as_adequate(path: Path, other: Explanation, anchor: Explanation, allowed_v: float) -> bool:
     """Does a rival leave about as little of what it could tell as what it is held against?"""
     left_v = [unexplained_v(path.problem, path.blocks, one, allowed_v) for one in (other, anchor)]

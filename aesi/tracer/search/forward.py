@@ -19,7 +19,7 @@ from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis, from_within
-from aesi.tracer.search.grown import ended, growths_on
+from aesi.tracer.search.grown import ended, growths_on, promising_first
 from aesi.tracer.search.path import Path, Report, Step, beyond_noise, unseen_rmse_v
 from aesi.tracer.search.plausible import most_plausible, plausibility
 from aesi.tracer.search.reach import REACH, within_reach
@@ -60,17 +60,18 @@ def searched(
     steps: list[Step] = []
     notes: list[str] = []
     parents, chosen = [base], base
-    slopes: dict[str, Array] = {}
-    first = growths_on([Parent(problem, blocks, base)], slopes, archive) if max_effects else []
+    first = growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects else []
     # Fewer effects than that are fitted in the time that looking would spare.
     if len(first) > FINALISTS and np.isfinite(allowed_v):
         least_v, first = within_reach(problem, base, first, REACH * allowed_v, archive)
         if least_v > REACH * allowed_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
+    first, slopes = promising_first(first, archive)
     for _ in range(max_effects):
         step, refused = _step(problem, blocks, parents, slopes, archive, report, first)
         first = []
-        slopes = slopes or {g.hypothesis[-1]: g.slopes_v for g in step.grown}
+        if not steps:
+            slopes |= {g.hypothesis[-1]: g.slopes_v for g in step.grown}
         notes += refused
         steps.append(step)
         if step.admitted is None:

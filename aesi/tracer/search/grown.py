@@ -56,6 +56,34 @@ def growths_on(
     ]
 
 
+def promising_first(
+    growths: Sequence[EffectGrowth], archive: Archive
+) -> tuple[list[EffectGrowth], dict[str, Array]]:
+    """Of what grows on the bare model, that which says most with the other model of the cell, or promises most to first
+    order with this one, and the slopes (n, k) V of the others; all of it, and no slopes, where the other model did not
+    grow the same."""
+    near = [archive.near(_key(growth.parent, growth.effect, "said"), 1) for growth in growths]
+    if any(gain is None for gain in near):
+        return list(growths), {}
+    slopes = _first_slopes({growth.effect: growth for growth in growths})
+
+    def said(growth: EffectGrowth, gain: Array) -> float:
+        own = slopes.get(growth.effect)
+        promised = np.inf if own is None else promise(growth.parent, own) - growth.parent.fit.score.total
+        return max(float(gain[0]), promised)
+
+    ranked = sorted(
+        (
+            (said(growth, gain), growth)
+            for growth, gain in zip(growths, near, strict=True)
+            if gain is not None
+        ),
+        key=lambda one: -one[0],
+    )
+    kept = [growth for _, growth in ranked[:PROMISING]]
+    return kept, {growth.effect: slopes[growth.effect] for _, growth in ranked[PROMISING:]}
+
+
 def _first_slopes(growths: Mapping[str, EffectGrowth]) -> dict[str, Array]:
     """Of each effect where its descent begins: that shows far better what it will say beside what was found than where
     it ended as a stand-in for all that was missing. Only for the model that is searched first: the other one goes by
@@ -104,13 +132,15 @@ def ended(growths: Sequence[EffectGrowth], archive: Archive) -> Iterable[Grown |
         found = growth.ended()
         if found is not None:
             archive.put(_key(growth.parent, growth.effect), found.u)
+            gain = found.score.total - growth.parent.fit.score.total
+            archive.put(_key(growth.parent, growth.effect, "said"), np.array([gain]))
         return found
 
     return side_by_side(one, growths)
 
 
 def _key(parent: Parent, name: str, what: str = "grown") -> str:
-    """Of a growth, or of what it promised, in the archive."""
+    """Of a growth, or of what it promised or said, in the archive."""
     kind = f"{what} as declared" if parent.fit.as_declared else what
     return fit_name(parent.problem, kind, (*parent.fit.hypothesis, name))
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from aesi.numerics.metrics import rms
 from aesi.tracer.case.blocks import Blocks
 from aesi.tracer.case.problem import InverseProblem
-from aesi.tracer.case.reduction import LEAST_V
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
 from aesi.tracer.likelihood.growth import Explanation, Grown
 
@@ -82,11 +81,6 @@ Report = Callable[[InverseProblem, Explanation, float], None]
 def unseen_rmse_v(blocks: Blocks, one: Explanation) -> float:
     """Root mean square of the residual on blocks that were left out, V."""
     return rms(held_out_residual(blocks, one)[blocks.compared])
-
-
-def lowers_error(before_v: float, after_v: float) -> bool:
-    """Does a root mean square error fall by more, as squares, than two solvers of one model differ by?"""
-    return before_v**2 - after_v**2 > LEAST_V**2
 
 
 def beyond_noise(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> float:

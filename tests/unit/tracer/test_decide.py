@@ -17,6 +17,8 @@ from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
 from aesi.tracer.decide.evidence import consistent, named_options
 from aesi.tracer.decide.verdict import (
     Thresholds,
+    Verdict,
+    across_models,
     foretold_share,
     judged,
     look_alikes,
@@ -474,3 +476,32 @@ def test_what_leaves_far_more_is_no_look_alike_however_much_it_says(monkeypatch,
         blocks=None,
     )
     assert look_alikes(path, Thresholds(), 1e-3)[0] == group
+
+
+def finding(*effects, sets=()):
+    return Verdict("found", effects, sets, 0.8, 1e-4, 6e-4, "made", 2.0)
+
+
+def test_what_the_other_model_names_in_the_same_place_is_a_look_alike():
+    full = finding("series_resistance", "ocp_shape", sets=(("ocp_shape", "electrode_thickness"),))
+    single = finding("ocv_hysteresis", "series_resistance", sets=(("ocv_hysteresis", "porosity"),))
+    both = across_models(full, single)
+    assert both.confidence_sets == (("ocp_shape", "electrode_thickness", "ocv_hysteresis"),)
+    assert replace(both, confidence_sets=full.confidence_sets) == full
+    alone = across_models(finding("ocp_shape"), finding("electrode_thickness"))
+    assert alone.confidence_sets == (("ocp_shape", "electrode_thickness"),)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        finding("ocp_shape", "series_resistance", sets=(("ocp_shape", "porosity"),)),
+        finding("series_resistance"),
+        finding("series_resistance", "ocv_hysteresis", "clock_skew"),
+        finding("clock_skew", "ocv_hysteresis"),
+        replace(finding("series_resistance", "ocv_hysteresis"), word="unknown"),
+    ],
+)
+def test_another_model_adds_no_look_alike_where_it_does_not_explain_the_rest_in_the_same_way(other):
+    full = finding("series_resistance", "ocp_shape", sets=(("ocp_shape", "electrode_thickness"),))
+    assert across_models(full, other) == full

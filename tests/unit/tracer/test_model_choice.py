@@ -82,28 +82,24 @@ def test_models_that_differ_by_less_than_the_noise_leave_the_single_particle(m50
     assert not one.choice.reduction.notable
 
 
-def explained(names, total, rmse_v, word="found"):
-    """A search that is over: what it chose, what that says and leaves of unseen data."""
-    n = 100
-    score = SimpleNamespace(total=total, evidence=total, shifts={"block": np.zeros((1, 0))})
-    point = SimpleNamespace(residual_v=np.full(n, rmse_v), jacobian_v=np.zeros((n, 0)))
-    chosen = SimpleNamespace(hypothesis=names, score=score, point=point)
-    blocks = SimpleNamespace(of_row=np.zeros(n, dtype=int), compared=np.ones(n, dtype=bool))
-    problem = SimpleNamespace(competing=lambda: range(20), noise_v=1e-3)
-    path = SimpleNamespace(chosen=chosen, blocks=blocks, problem=problem)
+def explained(names, total, delta_v=5e-5, word="found"):
+    """A search that is over: what it chose, what that says of unseen data, and with which size of the model error."""
+    score = SimpleNamespace(total=total, evidence=total, delta_v=delta_v)
+    chosen = SimpleNamespace(hypothesis=names, score=score)
+    path = SimpleNamespace(chosen=chosen, problem=SimpleNamespace(competing=lambda: range(20)))
     return SimpleNamespace(path=path, verdict=SimpleNamespace(word=word))
 
 
 def test_the_porous_electrode_is_tried_with_as_many_names_as_could_be_believed():
-    assert most_names(explained(("a",), 100.0, 1e-3), 3) == 1
-    assert most_names(explained((), 100.0, 1e-3, "none"), 3) == 0
-    assert most_names(explained(("a",), 100.0, 1.1e-3), 3) == 3  # further names could lower what is left
-    assert most_names(explained(("a",), 100.0, 1e-3, "unknown"), 3) == 3
+    assert most_names(explained(("a",), 100.0), 3) == 1
+    assert most_names(explained((), 100.0, word="none"), 3) == 0
+    assert most_names(explained(("a",), 100.0, 2e-4), 3) == 3  # there is more to explain
+    assert most_names(explained(("a",), 100.0, word="unknown"), 3) == 3
 
 
 def test_both_kinds_of_evidence_have_to_speak_for_a_further_name():
     def searched(names, total, plausible, word="found"):
-        one = explained(names, total, 1e-3, word)
+        one = explained(names, total, word=word)
         one.path.chosen.score.evidence = plausible + len(names) * np.log(20)
         return one.path, one.verdict
 
