@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from aesi.numerics.typing import Array
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,
@@ -14,7 +17,9 @@ from aesi.physics.cell.parts import (
     FITTED_WITH,
     RATE_FACTORS,
     THERMAL_CONDUCTIVITY,
+    CellParameters,
 )
+from aesi.physics.cell.relations import LEAST_TRANSPORT, WORKING_SPAN, LookupTable, Relation
 
 OWN_FIELDS = {
     CONTACT_RESISTANCE,
@@ -27,6 +32,8 @@ OWN_FIELDS = {
     ),
 }
 """Of the section `User-defined` that are read."""
+POINTS = 401
+"""At which relations are looked at."""
 BRANCHES = ("OCP (lithiation) [V]", "OCP (delithiation) [V]")
 
 
@@ -54,3 +61,38 @@ def unread(v1: Mapping[str, Any]) -> tuple[str, ...]:
     if own:
         said.append(f"fields of the cell's file that are not read (User-defined): {', '.join(own)}.")
     return tuple(said)
+
+
+def replaced_relations(cell: CellParameters) -> tuple[str, ...]:
+    """Sentences on relations that are not simulated as they are declared, where surfaces or the salt may come."""
+    said = []
+    stoichiometry = np.linspace(0.0, 1.0, POINTS)
+    for side, electrode in (("negative", cell.negative), ("positive", cell.positive)):
+        what = f"the diffusivity of the {side} electrode"
+        said += _no_number(electrode.diffusivity, stoichiometry, what, "stoichiometries of {}", "at 0.5")
+        ocp = electrode.ocp
+        if isinstance(ocp, LookupTable) and (ocp.x[0] > 0.0 or ocp.x[-1] < 1.0):
+            said.append(
+                f"the potential of the {side} electrode is a table from {ocp.x[0]:.4g} to {ocp.x[-1]:.4g}; "
+                "where surfaces leave that under load it stays at the last value, and the voltage falls or rises late."
+            )
+    electrolyte = cell.electrolyte
+    salt = electrolyte.c0_mol_m3 * np.linspace(*WORKING_SPAN, POINTS)
+    for name, relation in (
+        ("diffusivity", electrolyte.diffusivity),
+        ("conductivity", electrolyte.conductivity),
+    ):
+        said += _no_number(relation, salt, f"the {name} of the electrolyte", "{} mol/m3", "at rest")
+    return tuple(said)
+
+
+def _no_number(relation: Relation, at: Array, what: str, places: str, rest: str) -> list[str]:
+    values = relation(at)
+    wrong = at[~((values > 0.0) & np.isfinite(values))]
+    if not len(wrong):
+        return []
+    span = f"{wrong[0]:.4g}" + (f" to {wrong[-1]:.4g}" if len(wrong) > 1 else "")
+    return [
+        f"{what} is no positive number at {places.format(span)}: {LEAST_TRANSPORT:g} of that {rest} is taken there; "
+        "give a table, or a formula that holds."
+    ]

@@ -19,6 +19,12 @@ from aesi.physics.cell.expression import compile_expression
 TABLE_POINTS_IN_BPX = 1025
 """Rows written where a relation has no closed form of its own (a table plus an expression)."""
 
+LEAST_TRANSPORT = 1e-3
+"""Of a diffusivity at half filling, or of a transport property of the salt at rest: what is taken where its formula
+gives no positive number, as a polynomial may outside the range of its fit."""
+WORKING_SPAN = (0.05, 2.0)
+"""Concentrations of salt, relative to rest, at which cells work."""
+
 ADMISSIBLE = "a number, an expression in x or a table {'x': [...], 'y': [...]}"
 
 

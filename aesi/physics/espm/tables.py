@@ -10,7 +10,7 @@ import numpy as np
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
-from aesi.physics.cell.relations import Constant, Relation, tabulated
+from aesi.physics.cell.relations import LEAST_TRANSPORT, WORKING_SPAN, Constant, Relation, tabulated
 
 OCP_POINTS = 8193
 """Four times as many points move the voltage by less than 1e-4 mV RMS under the load of `aesi bench espm`, and so for
@@ -20,15 +20,11 @@ RATE_POINTS = 513
 ELECTROLYTE_POINTS = 2049
 ELECTROLYTE_SPAN = 4.0
 """Tables of electrolyte properties run from zero to this many times the rest concentration."""
-WORKING_SPAN = (0.05, 2.0)
-"""Concentrations, relative to rest, at which the stepping of the electrolyte has to be stable."""
 EXTRAPOLATED_MARGIN = 0.76
 """The exactly stepped diffusivity exceeds three quarters of the largest one where the explicit rest is extrapolated
 from two steps, so that it cannot grow, however long the step."""
 CORRECTED_MARGIN = 0.55
 """Half of it is enough where the rest is predicted and corrected within the step."""
-SMALLEST_DIFFUSIVITY_RATIO = 1e-3
-"""Of the value at rest: a polynomial outside the range of its fit may turn negative."""
 
 
 def ocp_table(ocp: Relation, side: str, what: str = "open-circuit potential") -> Array:
@@ -117,13 +113,13 @@ def solid_diffusion(diffusivity: Relation) -> DiffusionTable:
 def _split(
     diffusivity: Relation, reference: float, top: float, working: tuple[float, ...], margin: float
 ) -> DiffusionTable:
+    """What is no positive number, outside the range of a fit, is taken as `LEAST_TRANSPORT`; the rest as it is."""
     grid = np.linspace(0.0, top, ELECTROLYTE_POINTS)
     values = diffusivity(grid)
     at_reference = float(diffusivity(np.array([reference]))[0])
     if not at_reference > 0:
         raise CellError(f"a diffusivity is {at_reference:g} m2/s at {reference:g}; it has to be positive.")
-    values = np.where(np.isfinite(values), values, at_reference)
-    values = np.maximum(values, SMALLEST_DIFFUSIVITY_RATIO * at_reference)
+    values = np.where(np.isfinite(values) & (values > 0.0), values, LEAST_TRANSPORT * at_reference)
     largest = float(values[(grid >= working[0]) & (grid <= working[1])].max())
     d0 = max(at_reference, margin * largest)
     rest = values - d0
@@ -132,10 +128,13 @@ def _split(
 
 
 def conductivity_table(conductivity: Relation, c0: float) -> Array:
-    """(ELECTROLYTE_POINTS,) S/m on [0, ELECTROLYTE_SPAN c0].  Raises CellError unless positive at rest."""
+    """(ELECTROLYTE_POINTS,) S/m on [0, ELECTROLYTE_SPAN c0], kept off zero, which no salt at all has.
+
+    Raises CellError unless positive at rest.
+    """
     values = tabulated(conductivity, 0.0, ELECTROLYTE_SPAN * c0, ELECTROLYTE_POINTS)
     at_rest = float(conductivity(np.array([c0]))[0])
     if not at_rest > 0:
         raise CellError(f"the electrolyte conductivity is {at_rest:g} S/m at rest; it has to be positive.")
-    floor = SMALLEST_DIFFUSIVITY_RATIO * at_rest
+    floor = LEAST_TRANSPORT * at_rest
     return np.maximum(np.where(np.isfinite(values), values, floor), floor)

@@ -116,6 +116,20 @@ def test_particles_in_which_diffusion_is_ten_times_as_slow(peer):
     assert rmse_mv(ours.voltage_v, theirs) < SLOW_MV
 
 
+def test_a_diffusivity_that_falls_by_four_decades_within_the_window_was_held_at_a_thousandth(peer):
+    """As a staging plateau does: what the file declares was raised to a thousandth of its value at x = 1/2."""
+    content = read("nmc_30ah")
+    x = np.linspace(0.0, 1.0, 41)
+    falls = 1e-12 * 10.0 ** (-4.2 * np.clip((x - 0.5) / 0.27, 0.0, 1.0))
+    content["Parameterisation"]["Negative electrode"]["Diffusivity [m2.s-1]"] = {
+        "x": x.tolist(),
+        "y": falls.tolist(),
+    }
+    steep = Peer(content, Cell.from_bpx(content), peer.time, peer.current / 6.0, soc0=0.97)
+    ours = simulate(steep.cell, steep.time, steep.current, soc0=steep.soc0)
+    assert rmse_mv(ours.voltage_v, steep.voltage(radial=120, graded=True)) < SLOW_MV
+
+
 def test_the_bundled_lg_m50_is_pybamms_chen2020(peer):
     import pybamm
 

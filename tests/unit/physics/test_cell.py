@@ -195,6 +195,17 @@ def test_what_a_file_declares_beyond_the_model_was_passed_over_in_silence(conten
     assert own.endswith("(User-defined): Swelling.")
 
 
+def test_a_relation_that_does_not_hold_where_surfaces_and_salt_come_was_replaced_in_silence(content):
+    parts = content["Parameterisation"]
+    parts["Negative electrode"]["Diffusivity [m2.s-1]"] = "4e-14 * (0.95 - x)"
+    parts["Electrolyte"]["Conductivity [S.m-1]"] = "2e-3 * x * (1 - 6e-4 * x)"
+    parts["Positive electrode"]["OCP [V]"] = {"x": [0.1, 0.95], "y": [4.4, 3.0]}
+    solid, table, salt = Cell.from_bpx(content).unread
+    assert "of the negative electrode is no positive number at stoichiometries of 0.95 to 1:" in solid
+    assert "of the positive electrode is a table from 0.1 to 0.95" in table
+    assert "conductivity of the electrolyte is no positive number at 1668 to 2000 mol/m3" in salt
+
+
 def test_a_placeholder_for_an_open_circuit_potential_is_refused(content):
     content["Parameterisation"]["Negative electrode"]["OCP [V]"] = 0
     with pytest.raises(CellError, match="OCP \\[V\\] is 0 at all stoichiometries"):
