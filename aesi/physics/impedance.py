@@ -9,8 +9,9 @@ double layer beside both where one is in:
     x_u = -(lump/(jw) + sum gains/(jw + rates)) y_u,      phi_u = U' x_u + R_u y_u,      i_r = sum_u y_u + jw C phi_r
 
 All regions of an electrode see one potential, as in time; the porous electrode is in `dfn.linear`. Leaves out what has
-no linear answer at rest: hysteresis (a small sine turns within it), plating, and the heat of a current, which is of
-second order.
+no linear answer at rest: hysteresis (a small sine turns within it), plating, and the heat of losses, which is of second
+order. That of entropy is of first, T (dU/dT)**2 / (jw C + G) of a cell that warms itself, and is left out too: 0.03
+mohm at 0.1 mV/K and 0.1 W/K, below the thermal time constant.
 
 Source: Meddings et al., J. Power Sources 480 (2020) 228742, doi:10.1016/j.jpowsour.2020.228742, for the practice.
 """

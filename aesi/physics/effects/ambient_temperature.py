@@ -12,7 +12,7 @@ from aesi.errors import CellError
 from aesi.parameters import Parameter
 from aesi.physics.cell import Cell
 from aesi.physics.effect import Effect
-from aesi.physics.model import EspmModel
+from aesi.physics.model import EspmModel, activation_energies
 
 PARAMETERS = {
     "shift_k": Parameter(
@@ -32,7 +32,7 @@ def shift_cell(model: EspmModel, *, shift_k: float) -> EspmModel:
     cell = model.cell
     if shift_k and not depends_on_temperature(cell):
         raise CellError(
-            f"{cell.name} declares no activation energy, so a temperature has no effect; add them."
+            f"{cell.name} declares no activation energy, so that no rate depends on temperature; add them."
         )
     return model.with_cell(
         initial_temperature_k=cell.initial_temperature_k + shift_k,
@@ -42,9 +42,7 @@ def shift_cell(model: EspmModel, *, shift_k: float) -> EspmModel:
 
 def depends_on_temperature(cell: Cell) -> bool:
     """True where at least one activation energy is declared."""
-    n, p, e = cell.negative, cell.positive, cell.electrolyte
-    energies = (n.diffusivity_ea_j_mol, n.rate_ea_j_mol, p.diffusivity_ea_j_mol, p.rate_ea_j_mol)
-    return any(energies) or bool(e.conductivity_ea_j_mol) or bool(e.diffusivity_ea_j_mol)
+    return bool(activation_energies(cell).any())
 
 
 EFFECT = Effect(

@@ -2,8 +2,8 @@
 
     V = V_cell - I R_f,   R_f = a Q + b sqrt(t)     Q = integral |I| dt since the start, I > 0 on discharge
 
-Leaves out the charge that growth consumes (see lithium_inventory_loss) and its dependence on temperature and
-voltage. Holds for growth that is slow against the record, limited by diffusion (b) or cracking (a).
+Leaves out the charge that growth consumes (see lithium_inventory_loss), its dependence on temperature and voltage, and
+the heat of its drop. Holds for growth that is slow against the record, limited by diffusion (b) or cracking (a).
 
 Source: sqrt(t): Ploehn, Ramadass & White, J. Electrochem. Soc. 151 (2004) A456, doi:10.1149/1.1644601;
 throughput: Smith et al., Appl. Energy 2012, NREL/CP-5400-53817.

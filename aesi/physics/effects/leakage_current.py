@@ -2,8 +2,9 @@
 
     I_reaction = I + I_leak        I_leak > 0 discharges the cell
 
-Leaves out its dependence on voltage and temperature. It is counted in the ohmic drop of the leads, which it does not
-flow through: an error of I_leak R. Holds over a record, where it is nearly constant.
+Leaves out its dependence on voltage and temperature, and its heat (I_leak V, beside self_heating). It is counted in the
+ohmic drop of the leads, which it does not flow through: an error of I_leak R. Holds over a record, where it is
+nearly constant.
 
 Source: Roth & Doughty, J. Power Sources 128 (2004) 308, doi:10.1016/j.jpowsour.2003.09.068, for
 self-discharge rates.

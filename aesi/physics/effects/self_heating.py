@@ -6,8 +6,9 @@
 Where the temperature of the case was measured that is used, with what the winding is warmer by where the cell file
 tells how it conducts (`aesi.physics.model.of_record`), and this balance is not needed.
 
-Leaves out other gradients within the cell, heat of mixing and the casing's own heat capacity. Holds for cells whose
-Biot number is small. Needs density, specific heat and volume in the cell file.
+Leaves out other gradients within the cell, heat of mixing, the casing's own heat capacity, and the heat of effects in
+series with the cell (film_growth, ocv_hysteresis) and of a leakage_current. Holds for cells whose Biot number is small.
+Needs density, specific heat and volume in the cell file.
 
 Source: Bernardi, Pawlikowski & Newman, J. Electrochem. Soc. 132 (1985) 5, doi:10.1149/1.2113792.
 """

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from aesi.constants import FARADAY_C_MOL, GAS_CONSTANT_J_MOL_K
-from aesi.errors import ParameterError
+from aesi.errors import CellError, ParameterError
 from aesi.physics import Cell, EspmModel, Record, Trace, simulate
+from aesi.physics.cell.relations import Constant
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.effects.particle_size_distribution import lognormal_bins
 from aesi.physics.simulation import model_with
@@ -163,6 +164,23 @@ def test_half_the_rate_constant_doubles_a_small_kinetic_drop():
         drop += THERMAL_V * density / (e.area_per_volume_1_m * e.thickness_m * j0)
     assert plain - half == pytest.approx(drop, rel=1e-4)
     assert plain < rest
+
+
+def test_a_cell_whose_films_alone_have_an_energy_was_refused_another_temperature():
+    still = {"diffusivity_ea_j_mol": 0.0, "rate_ea_j_mol": 0.0}
+    cell = CELL.with_negative(**still, film_ea_j_mol=5e4).with_positive(**still)
+    cell = cell.with_electrolyte(conductivity_ea_j_mol=0.0, diffusivity_ea_j_mol=0.0)
+    cold = [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)]
+    bare, filmed = (
+        simulate(cell.with_negative(film_ohm_m2=Constant(ohm)), [0.0], [30.0], SOC0, cold).voltage_v[0]
+        for ohm in (0.0, 1e-3)
+    )
+    n = cell.negative
+    surface = n.area_per_volume_1_m * n.thickness_m * cell.total_area_m2
+    colder = np.exp(5e4 / GAS_CONSTANT_J_MOL_K * (1.0 / 278.15 - 1.0 / 298.15))
+    assert bare - filmed == pytest.approx(30.0 * 1e-3 / surface * colder)
+    with pytest.raises(CellError, match="declares no activation energy"):
+        simulate(cell.with_negative(film_ea_j_mol=0.0), [0.0], [30.0], SOC0, cold)
 
 
 def test_an_asymmetric_reaction_at_a_large_current_follows_tafels_slope():
