@@ -26,7 +26,7 @@ from aesi.physics.arguments import check_cell, check_choice, check_soc, check_te
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
 from aesi.physics.effect import ActiveEffect, Record, Trace, check_contribution, check_row_of
-from aesi.physics.espm.plain import run_plain
+from aesi.physics.espm.plain import run_plain, shifted_ocp
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
 from aesi.records.checked import check_row, check_times, numbers
@@ -92,7 +92,7 @@ def simulate(
         if effect.effect.on_record is not None:
             record = effect.act(effect.effect.on_record, record)
     if soc0 is None:
-        soc0 = _soc_from_rest(changed, active, rest_voltage_v)
+        soc0 = _soc_from_rest(changed, active, record.temperature_k, rest_voltage_v)
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
     if profiles or len(time) > MOST_ROWS:
@@ -270,8 +270,10 @@ def _kelvin(temperature_degc: Numbers | None, time: Array) -> Array | None:
     return np.ascontiguousarray(np.broadcast_to(kelvin, time.shape))
 
 
-def _soc_from_rest(model: EspmModel, effects: Sequence[ActiveEffect], rest_voltage_v: float | None) -> float:
-    """State of charge from the rest voltage, freed of what instrument faults add to it."""
+def _soc_from_rest(
+    model: EspmModel, effects: Sequence[ActiveEffect], kelvin: Array | None, rest_voltage_v: float | None
+) -> float:
+    """State of charge from the rest voltage at the first temperature, freed of what instrument faults add to it."""
     if rest_voltage_v is None:
         raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
     true = np.array([rest_voltage_v])
@@ -280,7 +282,10 @@ def _soc_from_rest(model: EspmModel, effects: Sequence[ActiveEffect], rest_volta
         if active.effect.on_reading is not None:
             trace = Trace(model, one, one, np.array([rest_voltage_v]), {})
             true = true - (active.effect.on_reading(trace, **active.parameters) - rest_voltage_v)
-    return initial_soc(model.cell, float(true[0]))
+    cell = model.cell
+    rise = (cell.initial_temperature_k if kelvin is None else float(kelvin[0])) - cell.reference_temperature_k
+    cell = cell.with_negative(ocp=shifted_ocp(cell.negative, rise))
+    return initial_soc(cell.with_positive(ocp=shifted_ocp(cell.positive, rise)), float(true[0]))
 
 
 def _series(cell: Cell, rows: Array) -> dict[str, Array]:

@@ -1,7 +1,7 @@
 """Compiled Newton direction of the reaction at all places; see `reaction_kernels` for the equations."""
 
 from aesi.physics.dfn.local_kernels import salt_logarithm
-from aesi.physics.espm.interface_kernels import bounded_exp
+from aesi.physics.espm.interface_kernels import stripped
 from aesi.physics.espm.kernels import compiled
 
 UPDATE_TOLERANCE_V = 5e-5
@@ -10,19 +10,19 @@ UPDATE_TOLERANCE_V = 5e-5
 
 
 @compiled
-def add_side_currents(e, t, n, thermal, psi, given, salt, plated, plating):  # type: ignore[no-untyped-def]
+def add_side_currents(e, t, n, thermal, psi, given, salt):  # type: ignore[no-untyped-def]
     """Add double layers and plating of each place to `given`, which holds the units, and to the conductance."""
     half = psi.shape[0] // 2
     for r in range(psi.shape[0]):
         given[r] += t.layer_c[r] * psi[r] - t.layer_old[r]
         n.conductance[r] += t.layer_c[r]
         if e.plating[0] > 0.0 and r < half:
-            strength = e.plating[0] * e.node_share[r]
-            up = strength * plated[r] * bounded_exp((1.0 - e.plating[1]) * psi[r] / thermal)
-            down = strength * e.plating[2] * max(salt[r], 0.0) * bounded_exp(-e.plating[1] * psi[r] / thermal)
-            plating[r] = up - down
-            given[r] += up - down
-            n.conductance[r] += ((1.0 - e.plating[1]) * up + e.plating[1] * down) / thermal
+            metal, slope, _ = stripped(
+                e.plating[0] * e.node_share[r], e.plating[1], t.metal_before[r], t.metal_filled[r],
+                e.plating[2] * max(salt[r], 0.0), psi[r], thermal,
+            )  # fmt: skip
+            given[r] += metal
+            n.conductance[r] += slope
 
 
 @compiled

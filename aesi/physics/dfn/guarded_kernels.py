@@ -21,7 +21,7 @@ SMALLEST_SHARE = 1.0 / 256.0
 
 
 @compiled
-def solve_guarded(p, e, t, n, spread, total, t_k, thermal, y, theta, psi, given, salt, plated, plating):  # type: ignore[no-untyped-def]
+def solve_guarded(p, e, t, n, spread, total, t_k, thermal, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
     """As `solve_reaction`, from the potentials and currents that it was given (`n.psi_in`, `n.y_in`)."""
     half = psi.shape[0] // 2
     phi_n, phi_p, share, before, worst = 0.0, 0.0, 1.0, math.inf, math.inf
@@ -29,7 +29,7 @@ def solve_guarded(p, e, t, n, spread, total, t_k, thermal, y, theta, psi, given,
     begin(p, e, n, total, y, psi, given)
     for step in range(MOST_STEPS):
         local_currents(p, e, t, n, spread, thermal, t_k - e.reference_k, y, theta, psi, given, salt)
-        excess(p, e, t, n, thermal, y, psi, given, salt, plated, plating)
+        excess(p, e, t, n, thermal, y, psi, given, salt)
         merit = apart(e, t, n, chi, thermal, total, psi, given, salt)
         if step > 0 and not merit < before and share > SMALLEST_SHARE:
             share *= 0.5
@@ -136,14 +136,14 @@ def local_current(e, side, exchange, film, reach, give, s, thermal, rise, psi, y
 
 
 @compiled
-def excess(p, e, t, n, thermal, y, psi, given, salt, plated, plating):  # type: ignore[no-untyped-def]
+def excess(p, e, t, n, thermal, y, psi, given, salt):  # type: ignore[no-untyped-def]
     """n.slack (places,) A/m2: what units, double layers and plating give at their potentials beyond `given`."""
     for r in range(psi.shape[0]):
         n.slack[r] = 0.0
     for u in range(y.shape[0]):
         n.slack[p.place[u]] += y[u]
     if e.has_layers or e.plating[0] > 0.0:
-        add_side_currents(e, t, n, thermal, psi, n.slack, salt, plated, plating)
+        add_side_currents(e, t, n, thermal, psi, n.slack, salt)
     for r in range(psi.shape[0]):
         n.slack[r] -= given[r]
 

@@ -98,7 +98,7 @@ class DfnState(NamedTuple):
     z : (units, modes).  mean : (units,).  y : (units,) A/m2.  trend : (units,) A/(m2 s), how y leaves its share of
     the current.  theta : (units,) surfaces.  force : (units, modes + 1).  q, forcing : (salt modes,).  c : (nodes,)
     mol/m3.  given : (places,) A/m2.  psi : (places,) V.  salt : (places,) over rest.  layer : (places,) A/m2 into
-    double layers.  plated : (places,) mol/m3.  plating : (places,) A/m2.
+    double layers.  plated : (places,) mol/m3.
     """
 
     z: Array
@@ -115,7 +115,6 @@ class DfnState(NamedTuple):
     salt: Array
     layer: Array
     plated: Array
-    plating: Array
 
 
 class DfnTrial(NamedTuple):
@@ -125,6 +124,7 @@ class DfnTrial(NamedTuple):
     q, c, kappa : at the end.  salt_before : (places,) over rest, a step ago.  forcing_before : the same.
     ohm : (places, points of an electrode) ohm m2.
     layer_c A/(V m2), layer_old A/m2, skew, lag A/m2 : (places,) double layers.
+    metal_before mol/m3, metal_filled mol/m3 per A/m2 : (places,) plated lithium, see `interface_kernels.stripped`.
     y_back, psi_start : (units,), (places,) as they were before the step.
     total, before, change : (2,) A/m2, currents of both electrodes at the end of a step, at its start, and what is
     between.  faster : (3,) factors of diffusion, negative, positive, salt.
@@ -156,6 +156,8 @@ class DfnTrial(NamedTuple):
     layer_old: Array
     skew: Array
     lag: Array
+    metal_before: Array
+    metal_filled: Array
     no_spread: Array
     z_end: Array
     rates: Array

@@ -25,13 +25,13 @@ EASY_STEPS = 6
 
 
 @compiled
-def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt, plated, plating):  # type: ignore[no-untyped-def]
+def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt):  # type: ignore[no-untyped-def]
     """Currents y of all units (A per m2 of cell); returns the collectors' potentials and the number of steps, negative
     where none solves the equations.
 
     p, e, t, n : Particles, Electrodes, DfnTrial and NewtonScratch, see `layout`.  spread : (places, places) m2/A.
     total : (2,) current of each electrode, delithiation positive.  t_k : K.
-    y, psi : start values in, solution out.  theta, given (Y), salt (over rest), plating (places,) : out.
+    y, psi : start values in, solution out.  theta, given (Y), salt (over rest) : out.
     """
     places, half = psi.shape[0], psi.shape[0] // 2
     phi_n, phi_p = 0.0, 0.0
@@ -48,7 +48,7 @@ def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt, p
         )
         if e.has_layers or e.plating[0] > 0.0:
             sum_units(p, y, given)
-            add_side_currents(e, t, n, thermal, psi, given, salt, plated, plating)
+            add_side_currents(e, t, n, thermal, psi, given, salt)
         phi_n, phi_p = newton_direction(p, t, n, spread, chi, total, psi, given, salt, half)
         worst = 0.0
         for r in range(places):
@@ -63,7 +63,7 @@ def solve_reaction(p, e, t, n, spread, total, t_k, y, theta, psi, given, salt, p
             for r in range(places):
                 salt[r] += n.d_salt[r]
             return phi_n, phi_p, step + 1
-    return solve_guarded(p, e, t, n, spread, total, t_k, thermal, y, theta, psi, given, salt, plated, plating)
+    return solve_guarded(p, e, t, n, spread, total, t_k, thermal, y, theta, psi, given, salt)
 
 
 @njit(inline="always", fastmath=FASTMATH)

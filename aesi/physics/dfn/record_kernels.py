@@ -7,7 +7,7 @@ from numba import njit
 from aesi.physics.dfn.diffusion_kernels import renew, salt_forcing
 from aesi.physics.dfn.local_kernels import equilibrium, row_lookup
 from aesi.physics.dfn.output_kernels import left_range, record, record_profile
-from aesi.physics.dfn.stepping_kernels import advance, hold_layers, settle, take_back
+from aesi.physics.dfn.stepping_kernels import advance, hold_layers, hold_metal, settle, take_back
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, slot_of
 from aesi.physics.espm.transport_kernels import (
     all_inside,
@@ -88,6 +88,8 @@ def run_porous(  # type: ignore[no-untyped-def]
                 )  # fmt: skip
             if e.has_layers:
                 hold_layers(e, state, t, newton, dt)
+            if e.plating[0] > 0.0:
+                hold_metal(e, state, t, dt, start_k)
             last_try = length <= SHORTEST or fault_at >= 0
             phi_n, phi_p, steps = advance(
                 p, s, e, state, t, newton, weights, slot, dt, last_dt, t_k, last_try
@@ -102,8 +104,6 @@ def run_porous(  # type: ignore[no-untyped-def]
             length = min(2.0 * length, 1.0)
             if steps < 0 and fault_at < 0:
                 fault_at, fault = k, 4
-            if e.plating[0] > 0.0:
-                plate(dt, half, e, state)
             if e.heat[0] > 0.0:
                 power = 0.0
                 if steps > 0 and fault_at < 0 and all_inside(state.theta):
@@ -146,14 +146,6 @@ def jump(last, current, p, s, e, state, t, newton, half, t_k):  # type: ignore[n
             state.layer[r] += taken
     else:
         settle(p, s, e, state, t, newton, t.change, t.total, t_k)
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def plate(dt, half, e, state):  # type: ignore[no-untyped-def]
-    """Plated lithium after a step."""
-    for r in range(half):
-        gone = e.plating_to_c * state.plating[r] * dt / e.node_share[r]
-        state.plated[r] = max(state.plated[r] - gone, 0.0)
 
 
 @compiled

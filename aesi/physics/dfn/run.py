@@ -109,12 +109,13 @@ def _memory(p: Particles, s: Stack, e: Electrodes) -> tuple[DfnState, DfnTrial, 
     state = DfnState(
         z=of(units, modes), mean=of(units), y=of(units), trend=of(units), theta=of(units), force=of(units, modes + 1),
         q=of(salt_modes), forcing=of(salt_modes), c=of(nodes), given=of(places), psi=of(places), salt=np.ones(places),
-        layer=of(places), plated=of(places), plating=of(places),
+        layer=of(places), plated=of(places),
     )  # fmt: skip
     trial = DfnTrial(
         calm_z=of(units, modes), calm_mean=of(units), calm_q=of(salt_modes), calm_salt=of(places),
         reach=of(units), give=of(units), y_start=of(units), given_start=of(places),
         psi_start=of(places), y_back=of(units), skew=of(places), lag=of(places),
+        metal_before=of(places), metal_filled=of(places),
         force=of(units, modes + 1), force_end=of(modes + 1), forcing=of(salt_modes), forcing_before=of(salt_modes),
         salt_before=np.ones(places), q=of(salt_modes), c=of(nodes), salt=of(places), nodes=of(p.at.shape[0]),
         kappa=of(places), ohm=of(places, half), layer_c=of(places), layer_old=of(places),

@@ -14,8 +14,8 @@ from aesi.physics.dfn.diffusion_kernels import (
     salt_at_places,
     salt_forcing,
 )
-from aesi.physics.dfn.reaction_kernels import solve_reaction
-from aesi.physics.espm.interface_kernels import end_weight
+from aesi.physics.dfn.reaction_kernels import GAS_OVER_FARADAY, solve_reaction
+from aesi.physics.espm.interface_kernels import bounded_exp, end_weight, stripped
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup
 from aesi.physics.espm.transport_kernels import solid_forcing
 
@@ -50,7 +50,7 @@ def find_reaction(p, s, e, state, t, newton, spread, total, t_k):  # type: ignor
     drops(t.kappa, s.path, e.before, e.after, e.solid, t.ohm)
     return solve_reaction(
         p, e, t, newton, spread, total, t_k,
-        state.y, state.theta, state.psi, state.given, state.salt, state.plated, state.plating,
+        state.y, state.theta, state.psi, state.given, state.salt,
     )  # fmt: skip
 
 
@@ -69,6 +69,7 @@ def settle(p, s, e, state, t, newton, change, total, t_k):  # type: ignore[no-un
     for r in range(2 * half):
         t.salt[r] = t.calm_salt[r]
         t.layer_c[r], t.layer_old[r] = 0.0, 0.0
+        t.metal_before[r], t.metal_filled[r] = state.plated[r], 0.0
     return find_reaction(p, s, e, state, t, newton, t.no_spread, total, t_k)
 
 
@@ -91,6 +92,19 @@ def hold_layers(e, state, t, newton, dt):  # type: ignore[no-untyped-def]
             t.lag[r] = t.skew[r] * state.layer[r] * (1.0 - math.exp(-constants))
             t.layer_c[r] = e.capacity[r] / (dt * weight)
             t.layer_old[r] = t.layer_c[r] * state.psi[r] + (1.0 - weight) / weight * state.layer[r]
+
+
+@compiled
+def hold_metal(e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
+    """Plated lithium over a step, exact for metal that strips as it does at the start of the step, t_k (K)."""
+    thermal, alpha = GAS_OVER_FARADAY * t_k, e.plating[1]
+    for r in range(state.plated.shape[0] // 2):
+        strength, filled = e.plating[0] * e.node_share[r], e.plating_to_c * dt / e.node_share[r]
+        salt = e.plating[2] * max(state.salt[r], 0.0)
+        current = stripped(strength, alpha, state.plated[r], 0.0, salt, state.psi[r], thermal)[0]
+        weight = end_weight(filled * strength * bounded_exp((1.0 - alpha) * state.psi[r] / thermal))
+        t.metal_before[r] = state.plated[r] - (1.0 - weight) * filled * current
+        t.metal_filled[r] = weight * filled
 
 
 @compiled
@@ -127,6 +141,10 @@ def advance(  # type: ignore[no-untyped-def]
             break
     if steps > 0 or last_try:
         commit(p, s, e, state, t, dt, w, t.change, varies)
+        if e.plating[0] > 0.0:
+            commit_metal(p, e, state, t, dt, t_k)
+        if e.has_layers:
+            commit_layers(p, e, state, t, dt)
     return phi_n, phi_p, steps
 
 
@@ -193,8 +211,26 @@ def commit(p, s, e, state, t, dt, w, change, varies):  # type: ignore[no-untyped
         state.forcing[j] = t.forcing[j]
     for i in range(state.c.shape[0]):
         state.c[i] = t.c[i]
-    if e.has_layers:
-        commit_layers(p, e, state, t, dt)
+
+
+@compiled
+def commit_metal(p, e, state, t, dt, t_k):  # type: ignore[no-untyped-def]
+    """Plated lithium at the end of the step, before `commit_layers`; particles get to the last digit the rest."""
+    for r in range(state.plated.shape[0] // 2):
+        metal = stripped(
+            e.plating[0] * e.node_share[r], e.plating[1], t.metal_before[r], t.metal_filled[r],
+            e.plating[2] * max(state.salt[r], 0.0), state.psi[r], GAS_OVER_FARADAY * t_k,
+        )[2]  # fmt: skip
+        layers = state.layer[r] + t.layer_c[r] * state.psi[r] - t.layer_old[r]
+        gave = (state.plated[r] - metal) * e.node_share[r] / (e.plating_to_c * dt)
+        rest = t.given_start[r] + state.given[r] - layers - 2.0 * gave
+        for u in range(p.place.shape[0]):
+            if p.place[u] == r:
+                rest -= t.y_back[u] + state.y[u]
+        for u in range(p.place.shape[0]):
+            if p.place[u] == r:
+                state.mean[u] -= 1.5 * p.scale[u] * dt * p.share[u] / e.node_share[r] * rest
+        state.plated[r] = metal
 
 
 @compiled

@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numba import njit
 
-from aesi.physics.espm.interface_kernels import bounded_exp, end_weight, overpotential, relaxed
+from aesi.physics.espm.interface_kernels import end_weight, overpotential, relaxed, stripped
 from aesi.physics.espm.kernels import (
     BEYOND_RANGE_V,
     FASTMATH,
@@ -41,7 +41,7 @@ def solve_electrode(lo, hi, side, total, at, particles, surfaces, memory):  # ty
     """Currents y[lo:hi] of the units of one electrode; returns Phi.
 
     total : A/m2 of cell, positive for delithiation.  at : a `StepEnd`.  particles, surfaces, memory : see `layout`;
-    memory.delta and memory.layer are old in, new out.
+    memory.delta, memory.layer and memory.plated are old in, new out.
     """
     memory.new_layer.fill(0.0)
     if hi - lo == 1:
@@ -52,6 +52,8 @@ def solve_electrode(lo, hi, side, total, at, particles, surfaces, memory):  # ty
     for r in range(regions):
         memory.delta[side * regions + r] = memory.new_delta[r]
         memory.layer[side * regions + r] = memory.new_layer[r]
+        if side == 0 and surfaces.plating[0] > 0.0:
+            memory.plated[r] = memory.new_plated[r]
     return phi
 
 
@@ -155,7 +157,7 @@ def evaluate_electrode(lo, hi, side, total, begins, at, particles, surfaces, mem
                 r, side, memory.potential[i], memory.slope[i], begins, at, surfaces, memory
             )
             if side == 0 and surfaces.plating[0] > 0.0:
-                metal, d_metal = metal_current(r, memory.potential[i], at.thermal, surfaces, memory)
+                metal, d_metal = metal_current(r, memory.potential[i], at, surfaces, memory)
                 extra += metal
                 d_extra += d_metal
             memory.total[first + r] += extra
@@ -203,13 +205,19 @@ def layer_current(r, side, potential, slope, begins, at, surfaces, memory):  # t
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def metal_current(r, potential, thermal, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Current (A/m2) that lithium metal of region r gives, and its slope in the potential."""
-    rate, alpha = surfaces.plating[0], surfaces.plating[1]
-    up = rate * memory.plated[r] * bounded_exp((1.0 - alpha) * potential / thermal)
-    down = rate * memory.region_salt[r] * bounded_exp(-alpha * potential / thermal)
-    memory.plating[r] = up - down
-    return up - down, ((1.0 - alpha) * up + alpha * down) / thermal
+def metal_current(r, potential, at, surfaces, memory):  # type: ignore[no-untyped-def]
+    """Current (A/m2) that lithium metal of region r gives over the step, and its slope in the potential."""
+    filled = surfaces.plating_to_c * at.dt
+    metal, slope, memory.new_plated[r] = stripped(
+        surfaces.plating[0],
+        surfaces.plating[1],
+        memory.plated[r],
+        filled,
+        memory.region_salt[r],
+        potential,
+        at.thermal,
+    )
+    return metal, slope
 
 
 @njit(inline="always", fastmath=FASTMATH)

@@ -101,10 +101,6 @@ def run_general(  # type: ignore[no-untyped-def]
             if k > 0:
                 take_deviations(j1, dt, slot, particles, memory, modes)
             last_j = j1
-            if surfaces.plating[0] > 0.0:
-                for r in range(memory.plated.shape[0]):
-                    gone = surfaces.plating_to_c * memory.plating[r] * dt
-                    memory.plated[r] = max(memory.plated[r] - gone, 0.0)
             voltage = phi_p - phi_n - j1 * cell.separator / memory.kappa[memory.kappa.shape[0] - 1]
             voltage -= i1 * cell.contact
             if heat[0] > 0.0:

@@ -46,6 +46,21 @@ def overpotential(y, exchange, occupancy, g1, g2, g3, log_salt, alpha, thermal):
 
 
 @njit(inline="always", fastmath=FASTMATH)
+def stripped(strength, alpha, before, filled, salt, potential, thermal):  # type: ignore[no-untyped-def]
+    """Current of a metal that strips (plates where negative) at the end of a step, its slope in the potential, and the
+    metal there: before - filled current, which stays positive whatever the step.
+
+    strength : current per metal and per salt.  before : metal, without what the current at the end does.  filled :
+    metal per current.
+    """
+    up = strength * bounded_exp((1.0 - alpha) * potential / thermal)
+    down = strength * salt * bounded_exp(-alpha * potential / thermal)
+    metal = (before + filled * down) / (1.0 + filled * up)
+    slope = ((1.0 - alpha) * up * metal + alpha * down) / (thermal * (1.0 + filled * up))
+    return up * metal - down, slope, metal
+
+
+@njit(inline="always", fastmath=FASTMATH)
 def end_weight(z):  # type: ignore[no-untyped-def]
     """Weight of the end of a step of z time constants, exact for a relaxing exponential: 1/2 at 0, 1 at infinity."""
     if z < 1e-3:

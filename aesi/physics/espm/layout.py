@@ -124,9 +124,10 @@ class Memory(NamedTuple):
     one unit of deviating current takes from it.  ohm : (regions, regions) ohm m2.
     salt, log_salt, region_salt : at Gauss points over rest; by region its mean logarithm and mean, mol/m3.
     delta, layer : (2 regions,) V and A/m2 of the double layers.  total : (2 regions,) A/m2.
-    plated, plating : (regions,) mol/m3 and A/m2.
+    plated : (regions,) mol/m3.
     kappa : (2 regions + 1,) S/m, the separator's last.  deviation : (2 regions,) A/m2 beyond its share of the current.
-    potential, slope, gain, matrix : scratch, by unit of one electrode.  new_delta, new_layer, fitted : by its regions.
+    potential, slope, gain, matrix : scratch, by unit of one electrode.  new_delta, new_layer, new_plated, fitted : by
+    its regions.
     """
 
     y: Array
@@ -141,7 +142,7 @@ class Memory(NamedTuple):
     layer: Array
     total: Array
     plated: Array
-    plating: Array
+    new_plated: Array
     kappa: Array
     deviation: Array
     potential: Array

@@ -12,7 +12,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.cell.parts import NO_ENTROPY
-from aesi.physics.cell.relations import Expression, LookupTable
+from aesi.physics.cell.relations import Constant, Expression, LookupTable
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import solver as _solver
 
@@ -197,6 +197,14 @@ def test_the_state_of_charge_comes_from_the_rest_voltage(lg_m50):
     voltage = float(lg_m50.rest_voltage_v(0.73)[0])
     run = simulate(lg_m50, np.arange(3.0), np.zeros(3), rest_voltage_v=voltage)
     assert run.series["soc"][0] == pytest.approx(0.73, abs=2e-4)
+
+
+@pytest.mark.parametrize("degc", [-10.0, [-10.0, -9.0, -8.0]])
+def test_a_cold_cell_starts_from_the_rest_voltage_that_was_measured_in_the_cold(lg_m50, degc):
+    # It began 17 mV below: its state of charge was read from the potentials at the reference temperature.
+    entropic = lg_m50.with_positive(entropic=Constant(5e-4))
+    run = simulate(entropic, np.arange(3.0), np.zeros(3), rest_voltage_v=3.8, temperature_degc=degc)
+    assert run.voltage_v[0] == pytest.approx(3.8, abs=1e-4)
 
 
 def test_a_voltmeters_offset_is_taken_off_the_rest_voltage(lg_m50):

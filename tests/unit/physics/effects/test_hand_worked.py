@@ -278,6 +278,25 @@ def test_plated_lithium_at_rest_comes_to_nernsts_equilibrium_and_a_fast_charge_g
     assert fast.series["plated_mol_m3"][-1] > equilibrium
 
 
+@pytest.mark.parametrize("rate_m_s", [1e-9, 1e-7])
+@pytest.mark.parametrize("model", ["espm", "dfn"])
+def test_lithium_came_from_nowhere_where_metal_stripped_faster_than_a_step(model, rate_m_s):
+    # Plates on a charge in the cold and strips on the discharge after it; rows of 10 s, as loggers write.
+    time = np.arange(0.0, 1210.0, 10.0)
+    current = np.where(time < 400.0, -60.0, np.where(time < 800.0, 60.0, 0.0))
+    plating = [CATALOGUE["lithium_plating"].activate(rate_m_s=rate_m_s)]
+    cold = simulate(CELL, time, current, 0.9, plating, -5.0, model=model)
+    n = CELL.negative
+    coulombs_m3 = FARADAY_C_MOL * n.thickness_m * CELL.total_area_m2  # of the electrode, per mol/m3
+    theta = n.theta_min + cold.series["soc"] * (n.theta_max - n.theta_min)
+    plated = coulombs_m3 * cold.series["plated_mol_m3"]
+    held = coulombs_m3 * n.active_fraction * n.c_max_mol_m3 * theta + plated
+    passed = np.concatenate([[0.0], np.cumsum(0.5 * (current[1:] + current[:-1]) * np.diff(time))])
+    assert plated.max() > 1e4
+    assert plated.min() >= 0.0
+    assert held - held[0] == pytest.approx(-passed, abs=1e-4)  # of 30 and 220 C that were made or lost
+
+
 def test_a_share_of_the_differences_between_regions_is_no_physics():
     with pytest.raises(ParameterError, match="strength"):
         CATALOGUE["reaction_nonuniformity"].activate(strength=0.5)
