@@ -166,9 +166,12 @@ def discover(
         check_same_cell(problem, record, run)
     spent = _Spent(progress)
 
-    def search(one: InverseProblem, fits: Archive, most: int) -> Answer:
-        look = gathered_beside if one.has_good else gathered
-        return look(one, most, fits, Thresholds(), spent)
+    def search(
+        problem: InverseProblem, archive: Archive, most: int, shallower: Answer | None = None
+    ) -> Answer:
+        if problem.has_good:
+            return gathered_beside(problem, most, archive, Thresholds(), spent)
+        return gathered(problem, most, archive, Thresholds(), spent, shallower)
 
     def archive_of(one: InverseProblem, other_model: Archive | None) -> Archive:
         return Archive(archive, context_of(one), other_model)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -62,6 +62,7 @@ class _Searches:
     """How a case is searched, and what was searched so far.
 
     paths : by trust in the declared parameters, each searched where it is first asked for.
+    shallower : the same with fewer effects.
     """
 
     max_effects: int
@@ -69,6 +70,7 @@ class _Searches:
     thresholds: Thresholds
     report: Report
     paths: dict[Trust, Path] = field(default_factory=dict)
+    shallower: Mapping[Trust, Path] = field(default_factory=dict)
 
     def at(self, problem: InverseProblem, trust: Trust) -> Path:
         """The search at one trust.  Raises DataError where the model cannot be simulated on the records."""
@@ -76,7 +78,8 @@ class _Searches:
             most = min(self.max_effects, MOST_EFFECTS.get(trust, self.max_effects))
             allowed_v = np.inf if trust in MOST_EFFECTS else tolerance_v(problem, self.thresholds)
             trusted = replace(problem, trust=trust)
-            self.paths[trust] = searched(trusted, most, self.archive, self.report, allowed_v)
+            begun = self.shallower.get(trust)
+            self.paths[trust] = searched(trusted, most, self.archive, self.report, allowed_v, begun)
         return self.paths[trust]
 
 
@@ -100,13 +103,20 @@ class Answer:
 
 
 def gathered(
-    problem: InverseProblem, max_effects: int, archive: Archive, thresholds: Thresholds, report: Report
+    problem: InverseProblem,
+    max_effects: int,
+    archive: Archive,
+    thresholds: Thresholds,
+    report: Report,
+    shallower: Answer | None = None,
 ) -> Answer:
     """Search and judge; what carries over is checked where the answer is settled.
 
+    shallower : of the same searches with fewer effects.
     Raises DataError where the model cannot be simulated on the records.
     """
-    searches = _Searches(max_effects, archive, thresholds, report)
+    begun = {} if shallower is None else shallower.paths
+    searches = _Searches(max_effects, archive, thresholds, report, shallower=begun)
     path, verdict = _best_explanation(problem, searches)
     return Answer(path, verdict, searches.paths, partial(_settled, problem, path, searches))
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
@@ -22,8 +23,16 @@ from aesi.tracer.decide.verdict import Thresholds, across_models, structured_v, 
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.path import Path
 
-Search = Callable[[InverseProblem, Archive, int], Answer]
-"""All that is searched and judged with one model of the cell, with at most so many names."""
+
+class Search(Protocol):
+    """All that is searched and judged with one model of the cell, with at most so many names; `shallower` is what the
+    same with fewer names answered."""
+
+    def __call__(
+        self, problem: InverseProblem, archive: Archive, most: int, shallower: Answer | None = None
+    ) -> Answer: ...
+
+
 FIRST_LOOK = 1
 """Names that the single particle is tried with before the porous electrode, where the declared cell asks for that one:
 what it approximates, no names explain, and looking for two and three of them takes most of the time. They are looked
@@ -72,7 +81,7 @@ def with_model(
     explained = _explains(by_single, declared)
     if most < max_effects and (not explained or by_single.verdict.word == "found"):
         most = max_effects
-        by_single = search(single, archive, most)
+        by_single = search(single, archive, most, by_single)
         explained = _explains(by_single, declared)
     reduction = _larger(declared, by_single.paths["tight"]) if explained else declared
     if not _notable(reduction):
@@ -83,7 +92,7 @@ def with_model(
     by_full = search(full, archive_of(full, archive), most_names(by_single, max_effects))
     unknown = "unknown" in (by_single.verdict.word, by_full.verdict.word)
     if most < max_effects and unknown and by_full.verdict.word != "none":
-        by_single = search(single, archive, max_effects)
+        by_single = search(single, archive, max_effects, by_single)
     if believed((by_full.path, by_full.verdict), (by_single.path, by_single.verdict)):
         why = ", which explains the data with fewer or more usual effects"
         return _chosen(_of_both(by_single, by_full), "espm", reduction, why)

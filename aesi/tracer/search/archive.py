@@ -19,10 +19,13 @@ from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.typing import Array
 from aesi.physics.effect import Effect
 from aesi.tracer.case.problem import InverseProblem
+from aesi.tracer.likelihood.fit import FittedHypothesis
 
 
 class Archive:
     """Coordinates by name of a fit, appended one JSON line each; lines of another case are passed over.
+
+    fits : of this search, by the same name, with all that was simulated at the coordinates.
 
     other_model : the archive of the same case with the other model of the cell.
     """
@@ -31,6 +34,7 @@ class Archive:
         self.path, self.context, self.other_model = path, context, other_model
         self._lock = threading.Lock()
         self._kept: dict[str, Array] = {}
+        self.fits: dict[str, FittedHypothesis] = {}
         if path is not None and path.exists():
             for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
                 try:

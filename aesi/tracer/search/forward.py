@@ -45,10 +45,12 @@ def searched(
     archive: Archive,
     report: Report = lambda problem, one, gain: None,
     allowed_v: float = np.inf,
+    shallower: Path | None = None,
 ) -> Path:
     """Grow from the bare model until nothing more is admitted, at most `max_effects` effects.
 
     allowed_v : V beyond noise that a right one may leave; where all effects together leave far more, none is fitted.
+    shallower : the same search with fewer effects, whose first step is taken over.
     Raises DataError where the bare model cannot be simulated on the records.
     """
     blocks = blocks_of(problem)
@@ -57,22 +59,28 @@ def searched(
         raise DataError(
             f"the model of {problem.cell.name} cannot be simulated on {problem.records[0].name}; check the cell file."
         )
-    steps: list[Step] = []
-    notes: list[str] = []
-    parents, chosen = [base], base
-    first = growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects else []
+    if shallower is not None and shallower.beyond_reach_v is not None:
+        return shallower
+    begun = () if shallower is None else shallower.steps[:1]
+    first = growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and not begun else []
     # Fewer effects than that are fitted in the time that looking would spare.
     if len(first) > FINALISTS and np.isfinite(allowed_v):
         least_v, first = within_reach(problem, base, first, REACH * allowed_v, archive)
         if least_v > REACH * allowed_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
     first, slopes = promising_first(first, archive)
+    steps: list[Step] = []
+    notes: list[str] = [] if shallower is None else list(shallower.notes)
+    parents, chosen = [base], base
     for _ in range(max_effects):
-        step, refused = _step(problem, blocks, parents, slopes, archive, report, first)
+        if begun and not steps:
+            (step,) = begun
+        else:
+            step, refused = _step(problem, blocks, parents, slopes, archive, report, first)
+            notes += refused
         first = []
         if not steps:
             slopes |= {g.hypothesis[-1]: g.slopes_v for g in step.grown}
-        notes += refused
         steps.append(step)
         if step.admitted is None:
             break
