@@ -160,17 +160,20 @@ def _placed(
             hold_sentence(record.name, model.hold, asked.hold is not None),
             temperature_sentence(model.cell, record, model.effects),
             *without_energies(model.cell, [record.temperature_degc], model.effects),
-            *_with_effects(record, model.effects),
+            *_with_effects(record, model),
         ]
     )
     return _Placed(model, record, start)
 
 
-def _with_effects(record: Measurement, effects: Sequence[ActiveEffect]) -> list[str]:
-    """A sentence on the effects that act, with their values, which may be defaults."""
-    if record.temperature_degc is not None:
-        effects = [one for one in effects if one.effect.infers != "temperature"]
-    return [f"{record.name}: with {', '.join(map(repr, effects))}."] if effects else []
+def _with_effects(record: Measurement, model: HybridModel) -> list[str]:
+    """A sentence on the effects that act, or that the cell holds, with their values, which may be defaults."""
+    acting = [
+        one for one in model.effects if record.temperature_degc is None or one.effect.infers != "temperature"
+    ]
+    said = [f"with {', '.join(map(repr, acting))}"] if acting else []
+    said += [f"by a cell whose values hold {', '.join(model.held)}"] if model.held else []
+    return [f"{record.name}: {'; '.join(said)}."] if said else []
 
 
 def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> list[str]:

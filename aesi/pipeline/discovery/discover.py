@@ -173,7 +173,14 @@ def found_model(found: Discovery) -> HybridModel:
     if not inside.same_window(found.cell):
         inside = folded(found.cell, ())
     left = inside.left if inside.held else found.model_effects
-    return HybridModel(inside.cell, left, soc0=found.soc0, hold=found.hold, model=found.choice.model)
+    return HybridModel(
+        inside.cell,
+        left,
+        soc0=found.soc0,
+        hold=found.hold,
+        model=found.choice.model,
+        held=tuple(map(repr, inside.held)),
+    )
 
 
 def discovery_content(found: Discovery, asked: Sequence[str] = ()) -> dict[str, Any]:

@@ -39,6 +39,7 @@ class HybridModel:
 
     model : of the physics, "espm" or "dfn".
     dt_s : s, the step of the correction and of the bands; records sampled otherwise are brought to it and back.
+    held : effects that values of the cell hold, in words; `effects` are those that act beside it.
     """
 
     cell: Cell
@@ -50,9 +51,11 @@ class HybridModel:
     hold: Hold = "linear"
     soc0: float | None = None
     model: ModelName = "espm"
+    held: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        parts = [f"cell {self.cell.name!r}", *(repr(effect) for effect in self.effects)]
+        cell = f"cell {self.cell.name!r}" + (f" changed by {', '.join(self.held)}" if self.held else "")
+        parts = [cell, *(repr(effect) for effect in self.effects)]
         parts += [repr(part) for part in (self.correction, self.intervals, self.bands) if part is not None]
         return f"HybridModel({', '.join(parts)})"
 
@@ -122,9 +125,8 @@ class HybridModel:
             part = getattr(self, name)
             if part is not None:
                 parts[name] = part.to_dict()
-        write_model(
-            folder, {"dt_s": self.dt_s, "hold": self.hold, "soc0": self.soc0, "model": self.model}, parts
-        )
+        own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model")}
+        write_model(folder, own | {"held": list(self.held)}, parts)
         return folder
 
     @staticmethod
@@ -144,6 +146,7 @@ class HybridModel:
                 hold=head["hold"],
                 soc0=head["soc0"],
                 model=head.get("model", "espm"),
+                held=tuple(head.get("held", ())),
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"{folder} is not a whole model: {error}; save it again.") from None

@@ -11,6 +11,7 @@ from small_experiment import SOC0, experiment, fitted, write_record
 import aesi
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE, activated
+from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.hybrid import HybridModel
@@ -320,6 +321,17 @@ def test_effects_and_their_defaults_were_simulated_without_a_word(model, record,
         say_notes=said.extend,
     )
     assert any(note.endswith(": with series_resistance(resistance_ohm=0.001).") for note in said)
+
+
+def test_what_a_discovery_had_written_into_the_cell_was_simulated_without_a_word(model, record, tmp_path):
+    effects = (CATALOGUE["series_resistance"].activate(resistance_ohm=2e-3),)
+    inside = folded(model.cell, effects)
+    found = HybridModel(inside.cell, inside.left, held=tuple(map(repr, inside.held)))
+    said: list[str] = []
+    simulate_file(found.save(tmp_path / "found"), record, tmp_path / "o.csv", say_notes=said.extend)
+    words = ": by a cell whose values hold series_resistance(resistance_ohm=0.002)."
+    assert any(note.endswith(words) for note in said)
+    assert "changed by series_resistance(resistance_ohm=0.002)" in repr(HybridModel.load(tmp_path / "found"))
 
 
 def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
