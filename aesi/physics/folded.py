@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 from aesi.physics.cell import Cell
@@ -27,16 +27,18 @@ class Folded:
         )
 
 
-def folded(cell: Cell, effects: Iterable[ActiveEffect]) -> Folded:
+def folded(
+    cell: Cell, effects: Iterable[ActiveEffect], stays: Callable[[ActiveEffect], bool] = lambda active: False
+) -> Folded:
     """The cell with every effect in it that acts on nothing but the cell's own parameters.
 
     An effect on the record, on the reading, on the voltage, or on what a cell file does not declare (layers, particle
-    sizes, a heat balance) is left.
+    sizes, a heat balance) is left, and so is one that `stays`.
     """
     held: list[ActiveEffect] = []
     left: list[ActiveEffect] = []
     for active in effects:
-        changed = _on_cell_alone(cell, active)
+        changed = None if stays(active) else _on_cell_alone(cell, active)
         if changed is None:
             left.append(active)
         else:

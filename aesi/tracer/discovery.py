@@ -80,7 +80,8 @@ class Discovery:
     Three models are told of: as declared, recalibrated (own parameters refitted, no effect), and after (what is
     written: what was found, or what carries over best where nothing explains the data).
 
-    cell, model_effects : the model after: a cell with all that a cell file can hold, and the effects that it cannot.
+    cell, held, model_effects : the model after: a cell with all that a cell file can hold, the effects that its values
+    hold, and those that they cannot.
     soc0, hold : of the first record: its state of charge at the first row, as fitted, in the windows of `cell`, and how
     its current runs between rows.
     written : the effects of the model after by id, with their parameters; not those of the verdict where these do
@@ -113,6 +114,7 @@ class Discovery:
     notes: tuple[str, ...] = ()
     contradicted: bool = False
     warnings: tuple[str, ...] = ()
+    held: tuple[ActiveEffect, ...] = ()
     written: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     own: Mapping[State, tuple[OwnParameter, ...]] = field(default_factory=dict)
     tried: tuple[str, ...] = ()
@@ -241,7 +243,7 @@ def _told(
     declared = ModelState(problem)
     states: States = {"before": declared, "recalibrated": evidence.recalibrated, "after": evidence.after}
     files = outcomes(records, states, tested, rng)
-    cell, model_effects, soc0 = evidence.after.settled()
+    inside, soc0 = evidence.after.settled()
     left = _structure_of(records, evidence.after)
 
     def test_error(one: Explanation) -> float | None:
@@ -251,14 +253,15 @@ def _told(
             return None
 
     return Discovery(
-        cell=cell,
+        cell=inside.cell,
         verdict=verdict,
         candidates=ranking(evidence.path, verdict, test_error),
         files=files,
         noise_floor_v=float(np.sqrt(np.mean([r.noise_full_v**2 for r in records]))),
         before=_structure_of(records, declared),
         after=left,
-        model_effects=model_effects,
+        model_effects=inside.left,
+        held=inside.held,
         soc0=soc0,
         hold=records[0].hold,
         effects=problem.effects,

@@ -179,7 +179,7 @@ def found_model(found: Discovery) -> HybridModel:
         soc0=found.soc0,
         hold=found.hold,
         model=found.choice.model,
-        held=tuple(map(repr, inside.held)),
+        held=tuple(map(repr, (*found.held, *inside.held))),
     )
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.physics.balance import same_rest
-from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
-from aesi.physics.model import EspmModel
-from aesi.physics.simulation import model_with
+from aesi.physics.folded import Folded, folded
 from aesi.records import Run
 from aesi.tracer.case.free_parameter import STATE_OF_CHARGE
 from aesi.tracer.case.problem import InverseProblem, ValuesByOwner, share_of
@@ -75,25 +73,12 @@ class ModelState:
         full = [known[str(i)] for i, r in enumerate(self.problem.records) if r.start.basis == "full charge"]
         return sum(full) / len(full) if full else otherwise
 
-    def settled(self) -> tuple[Cell, tuple[ActiveEffect, ...], float]:
-        """The cell with all that a cell file can hold, the effects that it cannot, and the state of charge at the first
-        sample in the windows of that cell."""
-        declared = self.problem.cell
-        cell, beside = declared, []
-        for active in self.effects():
-            changed = _cell_of(cell, active) if active not in self.problem.fixed else None
-            if changed is None:
-                beside.append(active)
-            else:
-                cell = changed
+    def settled(self) -> tuple[Folded, float]:
+        """The cell with all in it that a cell file can hold, but for what infers a measurement that may come, and the
+        state of charge at the first sample in the windows of that cell."""
+        declared, fixed = self.problem.cell, self.problem.fixed
+        inside = folded(
+            declared, self.effects(), lambda active: active in fixed or active.effect.infers is not None
+        )
         soc0 = self.problem.records[0].soc0 if self.values is None else self.values[STATE_OF_CHARGE]["0"]
-        return cell, tuple(beside), same_rest(declared, cell, soc0)
-
-
-def _cell_of(cell: Cell, active: ActiveEffect) -> Cell | None:
-    """The cell that says by itself what the effect does, or None where the effect does more than change a cell."""
-    effect = active.effect
-    if effect.on_model is None or effect.infers or effect.on_record or effect.on_voltage or effect.on_reading:
-        return None
-    changed = model_with(cell, (active,))
-    return changed.cell if replace(changed, cell=cell) == EspmModel(cell) else None
+        return inside, same_rest(declared, inside.cell, soc0)

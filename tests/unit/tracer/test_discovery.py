@@ -8,7 +8,7 @@ import pytest
 from aesi.errors import DataError, SimulationError
 from aesi.physics import simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.discovery.discover import discovery_content
+from aesi.pipeline.discovery.discover import discovery_content, found_model
 from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.case.checks import FOREIGN_CELL_V, check_same_cell
@@ -28,6 +28,9 @@ def test_an_ohmic_drop_is_found_with_its_size(cell, few, make):
     assert test.errors("after").rmse_v < 1.1e-3 < test.errors("before").rmse_v
     added = found.cell.contact_resistance_ohm - cell.contact_resistance_ohm
     assert added == pytest.approx(2e-4, rel=0.05)  # what a cell file can hold is written into the cell
+    assert "series_resistance" in {active.id for active in found.held}
+    assert any(words.startswith("series_resistance(") for words in found_model(found).held)
+    assert "series_resistance(" in found.cell.description
 
 
 def test_a_cell_as_declared_lacks_nothing(cell, few, make):
