@@ -81,7 +81,8 @@ def promising_first(
         key=lambda one: -one[0],
     )
     kept = [growth for _, growth in ranked[:PROMISING]]
-    return kept, {growth.effect: slopes[growth.effect] for _, growth in ranked[PROMISING:]}
+    rest = {growth.effect for _, growth in ranked[PROMISING:]}
+    return kept, {name: own for name, own in slopes.items() if name in rest}
 
 
 def _first_slopes(growths: Mapping[str, EffectGrowth]) -> dict[str, Array]:

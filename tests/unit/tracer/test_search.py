@@ -12,11 +12,11 @@ from aesi.tracer.case.free_parameter import STATE_OF_CHARGE, of_effect
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.growth import EffectGrowth, Parent
 from aesi.tracer.likelihood.model_error import PRIORS, Size
-from aesi.tracer.search import reach
+from aesi.tracer.search import grown, reach
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import MOVED_SDS, as_declared, base_of, fitted_hypothesis
 from aesi.tracer.search.forward import FINALISTS, admissible, needed, searched
-from aesi.tracer.search.grown import PROMISING, growths_on, most_promising
+from aesi.tracer.search.grown import PROMISING, growths_on, most_promising, promising_first
 from aesi.tracer.search.plausible import ALIKE_NATS, most_plausible
 from aesi.tracer.search.reach import REACH, least_left_v
 
@@ -215,3 +215,25 @@ def test_what_all_effects_leave_is_told_beyond_the_noise():
         for marks in ([], [7.0 * odd[:, None]], [odd[:, None], even[:, None]])
     ]
     assert left_v == pytest.approx([np.sqrt(24.0) * 1e-3, np.sqrt(8.0) * 1e-3, 0.0], abs=1e-9)
+
+
+def test_with_the_other_model_what_says_most_with_either_is_grown(monkeypatch):
+    names = [f"effect {k}" for k in range(PROMISING + 4)]
+    said = {name: 10.0 - k for k, name in enumerate(names)}
+    promised = dict.fromkeys(names, 0.0) | {names[-1]: 50.0}  # by this model alone
+    simulated = set(names) - {names[-2]}
+    monkeypatch.setattr(grown, "_key", lambda parent, name, what: name)
+    monkeypatch.setattr(
+        grown,
+        "_first_slopes",
+        lambda growths: {n: np.array([[promised[n]]]) for n in growths if n in simulated},
+    )
+    monkeypatch.setattr(grown, "promise", lambda parent, slopes_v: slopes_v[0, 0])
+    parent = SimpleNamespace(fit=SimpleNamespace(score=SimpleNamespace(total=0.0)))
+    growths = [SimpleNamespace(parent=parent, effect=name) for name in names]
+    kept, slopes = promising_first(growths, SimpleNamespace(near=lambda name, size: np.array([said[name]])))
+    # What cannot be simulated is grown, too, so that it is told of.
+    assert {g.effect for g in kept} == {*names[: PROMISING - 2], *names[-2:]}
+    assert set(slopes) == set(names[PROMISING - 2 : -2])
+    alone, none = promising_first(growths, SimpleNamespace(near=lambda name, size: None))
+    assert (alone, none) == (growths, {})
