@@ -96,11 +96,6 @@ class Answer:
     paths: dict[Trust, Path]
     settled: Callable[[Verdict], Evidence]
 
-    @property
-    def evidence(self) -> Evidence:
-        """With the model that is written."""
-        return self.settled(self.verdict)
-
 
 def gathered(
     problem: InverseProblem,

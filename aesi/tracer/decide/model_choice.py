@@ -110,7 +110,7 @@ def _chosen(
     """What was searched with a model, and the choice of that one."""
     differ = "" if reduction is None else f"; {reduction.sentence}"
     words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
-    return answer.evidence, ModelChoice(name, words, reduction)
+    return answer.settled(answer.verdict), ModelChoice(name, words, reduction)
 
 
 def _notable(reduction: Reduction | None) -> bool:
