@@ -40,8 +40,9 @@ from aesi.records import Measurement
 
 EVALUATIONS = 100
 """At most: the descents to both files of the Panasonic NCR18650PF and to an LG 18650HG2 end before, by GAIN."""
-GAIN = 1e-4
-"""Of the cost: a step that gains less than this share of it is the last."""
+GAIN = 1e-5
+"""Of the cost: a step that gains less than this share of it is the last. With ten times as much the first descent to an
+LG 18650HG2 ends a deviation of the priors away, at 344.7 instead of 340.1."""
 NOTED_ZERO = 0.02
 """Of a record's typical current."""
 NOTED_AGE = 0.01

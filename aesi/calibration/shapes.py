@@ -146,16 +146,18 @@ class Shapes:
     @property
     def size(self) -> int:
         """Working coordinates of all: knots, and the level of the positive potential."""
-        entropic = 0 if self.entropic is None else ENTROPY_KNOTS
-        return self.positive.knots + self.negative.knots + 1 + entropic
+        return self.closed + (0 if self.entropic is None else ENTROPY_KNOTS)
 
-    def columns(self, z: Array, theta_n: Array, theta_p: Array, rise_k: Array) -> Array:
-        """(n, size) V per working unit: what the voltage gains, at surface stoichiometries and above the reference."""
+    @property
+    def closed(self) -> int:
+        """Working coordinates whose slopes have a closed form, the first ones: those of the potentials."""
+        return self.positive.knots + self.negative.knots + 1
+
+    def columns(self, z: Array, theta_n: Array, theta_p: Array) -> Array:
+        """(n, closed) V per working unit: what the voltage gains, at surface stoichiometries."""
         of_p, of_n, _, _ = self._split(z)
         level = np.full((len(theta_p), 1), LEVEL_SD_V)
         parts = [self.positive.columns(of_p, theta_p), -self.negative.columns(of_n, theta_n), level]
-        if self.entropic is not None:
-            parts.append(rise_k[:, None] * self.entropic.columns(theta_p))
         return np.concatenate(parts, axis=1)
 
     def on(self, cell: Cell, z: Array) -> Cell:

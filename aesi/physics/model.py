@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from aesi.numerics.modes.galerkin import SURFACE_SLOPE
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.cell.parts import NO_FILM, UNITY
@@ -75,8 +74,7 @@ class EspmModel:
 
     regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
     heat : None for a temperature that is given or constant; see `of_record`.
-    solid_order, surface_slope : even Legendre polynomials a particle, and the slope of their coordinate at its surface
-    (`SphereModes`).  electrolyte_order : polynomial degree a layer.
+    solid_order : even Legendre polynomials a particle.  electrolyte_order : polynomial degree a layer.
     electrode_points : of a porous electrode, where reaction and salt are resolved.
     substep_s : longest step of whatever is not stepped exactly.  most_substeps : of them between two samples.
     """
@@ -87,7 +85,6 @@ class EspmModel:
     regions: int = 1
     heat: HeatBalance | None = None
     solid_order: int = DEFAULT_SOLID_ORDER
-    surface_slope: float = SURFACE_SLOPE
     electrolyte_order: int = DEFAULT_ELECTROLYTE_ORDER
     electrode_points: int = DEFAULT_ELECTRODE_POINTS
     substep_s: float = DEFAULT_SUBSTEP_S

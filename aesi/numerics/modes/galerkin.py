@@ -52,11 +52,11 @@ class SphereModes:
 
 
 @lru_cache(maxsize=32)
-def sphere_modes(order: int, surface_slope: float = SURFACE_SLOPE) -> SphereModes:
-    """Modes of the projection on P_0, P_2, ..., P_{2 (order - 1)} of a coordinate of this slope at the surface."""
+def sphere_modes(order: int) -> SphereModes:
+    """Modes of the projection on P_0, P_2, ..., P_{2 (order - 1)} of a coordinate drawn out at the surface."""
     x, w = legendre.leggauss(4 * order + QUADRATURE_POINTS)
     x, w = 0.5 * (x + 1.0), 0.5 * w  # [0, 1]
-    r, r_slope = _radius(x, surface_slope)
+    r, r_slope = _radius(x)
     basis = np.eye(2 * order - 1)[::2]
     value = np.array([legendre.legval(x, c) for c in basis])
     slope = np.array([legendre.legval(x, legendre.legder(c)) for c in basis])
@@ -72,15 +72,15 @@ def sphere_modes(order: int, surface_slope: float = SURFACE_SLOPE) -> SphereMode
     return SphereModes(
         lam=_locked(lam),
         gain=_locked(at_surface**2),
-        r=_locked(_radius(nodes, surface_slope)[0]),
+        r=_locked(_radius(nodes)[0]),
         at=_locked(at),
         project=_locked(np.linalg.inv(at)),
     )
 
 
-def _radius(x: Array, surface_slope: float) -> tuple[Array, Array]:
+def _radius(x: Array) -> tuple[Array, Array]:
     """Radius at the coordinate x of the polynomials, and its slope there; see `SphereModes`."""
-    bend = 0.5 * (1.0 - surface_slope)
+    bend = 0.5 * (1.0 - SURFACE_SLOPE)
     return x * (1.0 + bend * (1.0 - x**2)), 1.0 + bend * (1.0 - 3.0 * x**2)
 
 

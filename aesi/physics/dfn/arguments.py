@@ -31,7 +31,7 @@ def porous_arguments(model: EspmModel) -> tuple[Particles, Stack, Electrodes]:
 
 def _particles(model: EspmModel) -> Particles:
     """Units place by place, size by size."""
-    sphere, layer = sphere_modes(model.solid_order, model.surface_slope), gauss_layer(model.electrode_points)
+    sphere, layer = sphere_modes(model.solid_order), gauss_layer(model.electrode_points)
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
     place, kind, scale, share, volume, exchange, reactive = [], [], [], [], [], [], []
     sides: list[int] = []

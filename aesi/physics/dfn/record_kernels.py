@@ -24,6 +24,8 @@ potentials, and where one rises with lithium, the end of a long step has several
 FIRST_LENGTH = 0.25
 """Of a step, where double layers meet a current that has turned: whole steps of 1 s between edges of 0.1 s were 0.52 mV
 RMS off under pulses to 3C, a quarter of one first leaves 0.05."""
+TEMPERATURE_STEP_K = 0.01
+"""Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
 ROUND_OFF = 1e-9
 """Of a step: less than this before the sample is no step any more."""
 
@@ -76,7 +78,9 @@ def run_porous(  # type: ignore[no-untyped-def]
                 t_k = heated(start_k, watts, dt, e.heat, around_k)
             elif drive.given:
                 t_k = around_k
-            t_weights = renew_factors(t_k, t_weights, e.energies, e.reference_k, t.faster, weights.keys)
+            t_weights = renew_factors(
+                t_k, t_weights, TEMPERATURE_STEP_K, e.energies, e.reference_k, t.faster, weights.keys
+            )
             if t_k != t_rates:
                 t_rates = t_k
                 set_rates(e, t, t_k)
@@ -183,8 +187,11 @@ def voltage_of(s, e, state, t, phi_n, phi_p, density):  # type: ignore[no-untype
 
 @compiled
 def heat_power(p, e, state, half, current, voltage, t_k):  # type: ignore[no-untyped-def]
-    """Heat released (W): what the reaction gives, with its entropy, less what leaves as electric power."""
+    """Heat released (W): what the reaction gives, with its entropy, less what double layers store and what leaves as
+    electric power."""
     power = -current * voltage
+    for r in range(state.layer.shape[0]):
+        power -= e.area * state.layer[r] * state.psi[r]
     for u in range(p.place.shape[0]):
         side = 0 if p.place[u] < half else 1
         slope = row_lookup(e.entropic, side, state.theta[u])

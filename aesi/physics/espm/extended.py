@@ -118,7 +118,7 @@ def _salt(model: EspmModel) -> Salt:
 def particle_units(model: EspmModel) -> Units:
     """Particles, region by region from each collector, size by size."""
     solids = [solid_diffusion(x.diffusivity) for x in (model.cell.negative, model.cell.positive)]
-    sphere = sphere_modes(model.solid_order, model.surface_slope)
+    sphere = sphere_modes(model.solid_order)
     units, rates, gains, lump, share, volume, exchange = [], [], [], [], [], [], []
     reactive = []
     sides = ((model.cell.negative, model.negative), (model.cell.positive, model.positive))

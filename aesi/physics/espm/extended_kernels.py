@@ -18,7 +18,6 @@ from aesi.physics.espm.transport_kernels import (
     all_inside,
     arrhenius,
     diffuse,
-    follow_diffusivity,
     heated,
     mean_heat,
     observe_salt,
@@ -63,16 +62,10 @@ def run_general(  # type: ignore[no-untyped-def]
             j1 = i1 / area
             if k > 0:
                 t_weights = renew_factors(
-                    t_k, t_weights, cell.energies, cell.reference_k, modes.faster, modes.keys
+                    t_k, t_weights, 0.0, cell.energies, cell.reference_k, modes.faster, modes.keys
                 )
-                for u in range(modes.near.shape[0]):
-                    modes.near[u] = follow_diffusivity(modes.largest[u], modes.near[u], modes.keys)
                 slot, missing = slot_of(dt, modes.keys)
-                if missing:
-                    renew_weights(
-                        dt, modes.faster, modes.near, particles.place, particles.rates, electrolyte.rates,
-                        modes.w[slot], modes.w_e[slot],
-                    )  # fmt: skip
+                renew_weights(dt, missing, particles, electrolyte.rates, slot, modes)
                 diffuse(i0 / area, j1, dt, last_step, slot, particles, electrolyte, memory, modes, dissolved)
                 last_step = dt
             predict(memory, modes)
@@ -211,8 +204,10 @@ def take_deviations(density, dt, slot, particles, memory, modes):  # type: ignor
 
 @njit(inline="always", fastmath=FASTMATH)
 def reaction_heat(t_k, cell, particles, surfaces, memory):  # type: ignore[no-untyped-def]
-    """Power (W) that the reactions give, with their entropy."""
+    """Power (W) that the reactions give, with their entropy, less what double layers store."""
     power = 0.0
+    for r in range(memory.layer.shape[0]):
+        power -= cell.area * memory.layer[r] * memory.delta[r]
     for u in range(memory.y.shape[0]):
         side = particles.place[u, 0]
         slope = lookup(surfaces.entropic[side], memory.theta[u])

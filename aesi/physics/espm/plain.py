@@ -97,7 +97,7 @@ def plain_arguments(model: EspmModel) -> tuple[PlainSolid, PlainSalt, PlainCell]
     cell = model.cell
     n, p, e = cell.negative, cell.positive, cell.electrolyte
     temperature, reference = cell.initial_temperature_k, cell.reference_temperature_k
-    sphere, stack = sphere_modes(model.solid_order, model.surface_slope), stack_of(model)
+    sphere, stack = sphere_modes(model.solid_order), stack_of(model)
     rates = np.array([sphere.lam[1:] * _solid_rate(x, temperature, reference) for x in (n, p)])
     scale = np.array([stoichiometry_per_coulomb(cell, x) for x in (n, p)])
     diffusion = electrolyte_diffusion(e.diffusivity, e.c0_mol_m3)

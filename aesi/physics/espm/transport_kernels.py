@@ -6,13 +6,13 @@ from numba import njit
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K
 from aesi.physics.espm.kernels import FASTMATH, compiled, lookup, step_weights, wet
-from aesi.physics.espm.tables import CORRECTED_MARGIN
 
-TEMPERATURE_STEP_K = 0.01
-"""Rates of diffusion are renewed where the temperature has moved by this much (0.04 % of a rate at 30 kJ/mol)."""
-FOLLOWED = 2.0
-"""Times the least diffusivity that may be stepped exactly, that the one that is may be: about half of the largest in a
-particle to all of it, where the explicit rest cannot grow and is small."""
+EXACT_SHARE = 0.78
+"""Of the largest diffusivity in a particle, what is stepped exactly: between `CORRECTED_MARGIN`, above which the
+explicit rest cannot grow, and all of it. Of pulses to 1.4C at 10 degC the files of an LG 18650HG2 and of a Panasonic
+NCR18650PF are 0.08 and 0.11 mV RMS off steps of 1/32 s with it, with 0.6 0.07 and 0.09, with 1 0.10 and 0.14. It
+follows the profile at every step: where it moved by jumps a voltage did, too, by up to 0.4 mV, and a fit stopped there.
+"""
 DIFFUSIONS = (0, 1, 4)
 """Where the activation energies of diffusion stand: negative, positive electrode, electrolyte."""
 
@@ -23,19 +23,24 @@ def arrhenius(energy, temperature, reference):  # type: ignore[no-untyped-def]
     return math.exp(energy / GAS_CONSTANT_J_MOL_K * (1.0 / reference - 1.0 / temperature))
 
 
-@compiled
-def renew_weights(dt, faster, near, units, rates, e_rates, w, w_e):  # type: ignore[no-untyped-def]
-    """Decay and input weights of all modes for a step; w : (units, 3, modes), w_e : (3, modes).
-
-    faster : factors of temperature on the diffusion of the negative, the positive electrode and the electrolyte.
-    near : (units,) diffusivity that is stepped exactly, over that of the rates.
-    """
-    for u in range(rates.shape[0]):
-        factor = faster[units[u, 0]] * near[u]
-        for j in range(rates.shape[1]):
-            w[u, 0, j], w[u, 1, j], w[u, 2, j] = step_weights(rates[u, j] * factor, dt)
-    for j in range(e_rates.shape[0]):
-        w_e[0, j], w_e[1, j], w_e[2, j] = step_weights(e_rates[j] * faster[2], dt)
+@njit(inline="always", fastmath=FASTMATH)
+def renew_weights(dt, missing, particles, e_rates, slot, modes):  # type: ignore[no-untyped-def]
+    """Decay and input weights of all modes for a step of dt s, where they stand in `slot`: of particles whose
+    diffusivity is followed anew, of all others if they are `missing` there."""
+    for u in range(modes.near.shape[0]):
+        side = particles.place[u, 0]
+        followed = particles.strength[side] > 0.0
+        if followed:
+            modes.near[u] = EXACT_SHARE * modes.largest[u]
+        if followed or missing:
+            factor = modes.faster[side] * modes.near[u]
+            for j in range(particles.rates.shape[1]):
+                w0, w1, w2 = step_weights(particles.rates[u, j] * factor, dt)
+                modes.w[slot, u, 0, j], modes.w[slot, u, 1, j], modes.w[slot, u, 2, j] = w0, w1, w2
+    if missing:
+        for j in range(e_rates.shape[0]):
+            w0, w1, w2 = step_weights(e_rates[j] * modes.faster[2], dt)
+            modes.w_e[slot, 0, j], modes.w_e[slot, 1, j], modes.w_e[slot, 2, j] = w0, w1, w2
 
 
 @njit(inline="always", fastmath=FASTMATH)
@@ -194,29 +199,18 @@ def heated(t_k, watts, dt, heat, around_k):  # type: ignore[no-untyped-def]
 
 
 @njit(inline="always", fastmath=FASTMATH)
-def renew_factors(t_k, t_weights, energies, reference_k, faster, keys):  # type: ignore[no-untyped-def]
-    """Factors of temperature on diffusion, where it has moved since `t_weights`; returns that of which they are now.
+def renew_factors(t_k, t_weights, within_k, energies, reference_k, faster, keys):  # type: ignore[no-untyped-def]
+    """Factors of temperature on diffusion, where it has moved by more than `within_k` since `t_weights`; returns that
+    of which they are now.
 
     energies : (8,) J/mol.  faster : (3,) is set.  keys : (slots,) of the weights that are kept, which are then void.
     """
-    if abs(t_k - t_weights) <= TEMPERATURE_STEP_K:
+    if abs(t_k - t_weights) <= within_k:
         return t_weights
     keys.fill(-1)
     for i in range(3):
         faster[i] = arrhenius(energies[DIFFUSIONS[i]], t_k, reference_k)
     return t_k
-
-
-@njit(inline="always", fastmath=FASTMATH)
-def follow_diffusivity(largest, near, keys):  # type: ignore[no-untyped-def]
-    """The diffusivity to be stepped exactly where a profile has at most `largest`, both over that of the rates; it is
-    `near` until it is too far off.  keys : (slots,) of the weights that are kept, which are void where it moves.
-    """
-    wanted = CORRECTED_MARGIN * largest
-    if wanted <= near <= FOLLOWED * wanted:
-        return near
-    keys.fill(-1)
-    return math.sqrt(FOLLOWED) * wanted
 
 
 @compiled

@@ -53,6 +53,26 @@ def test_self_heating_is_thermal_lumped(peer, plain_v):
     assert run.series["temperature_k"] == pytest.approx(theirs, abs=0.02)
 
 
+def test_a_double_layer_gives_back_what_it_stored_and_heated_the_cell_by_it(peer):
+    coefficient, capacity = 5.0, 20.0
+    update = {
+        f"{side} electrode double-layer capacity [F.m-2]": capacity for side in ("Negative", "Positive")
+    }
+    solution = peer.solve(
+        options={"thermal": "lumped", "surface form": "differential"},
+        update={**update, "Total heat transfer coefficient [W.m-2.K-1]": coefficient},
+    )
+    theirs = solution["Volume-averaged cell temperature [K]"](peer.time)
+    effects = [
+        CATALOGUE["self_heating"].activate(heat_transfer_w_k=coefficient * peer.cell.surface_area_m2),
+        CATALOGUE["double_layer"].activate(negative_f_m2=capacity, positive_f_m2=capacity),
+    ]
+    assert theirs.max() - theirs[0] > 0.5
+    for model in ("espm", "dfn"):
+        run = simulate(peer.cell, peer.time, peer.current, peer.soc0, effects, model=model)
+        assert run.series["temperature_k"] == pytest.approx(theirs, abs=0.02)
+
+
 def test_ambient_temperature_is_another_temperature_of_the_peer(peer, plain_v):
     cold = {"Ambient temperature [K]": 283.15, "Initial temperature [K]": 283.15}
     agrees(ours(peer, "ambient_temperature", shift_k=-15.0), peer.voltage(update=cold) - plain_v, 0.002)
