@@ -31,7 +31,7 @@ from aesi.tracer.case.free_parameter import (
 from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.case.trust import AGEING, MEASURED_CELL, Trust, own_sd, start_sd
 
-SHARE_SD = 0.024
+SHARE_SD = 0.027
 """Of the logarithm of a record's capacity over the file's: root mean square of the shares that the two shipped files
 over temperatures give the twelve records that they were calibrated on, within weeks of each other
 (`Cell.capacity_shares`)."""

@@ -61,8 +61,8 @@ def searched(
         )
     if shallower is not None and shallower.beyond_reach_v is not None:
         return shallower
-    begun = () if shallower is None else shallower.steps[:1]
-    first = growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and not begun else []
+    taken_over = () if shallower is None else shallower.steps[:1]
+    first = growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and not taken_over else []
     # Fewer effects than that are fitted in the time that looking would spare.
     if len(first) > FINALISTS and np.isfinite(allowed_v):
         least_v, first = within_reach(problem, base, first, REACH * allowed_v, archive)
@@ -73,8 +73,8 @@ def searched(
     notes: list[str] = [] if shallower is None else list(shallower.notes)
     parents, chosen = [base], base
     for _ in range(max_effects):
-        if begun and not steps:
-            (step,) = begun
+        if taken_over and not steps:
+            (step,) = taken_over
         else:
             step, refused = _step(problem, blocks, parents, slopes, archive, report, first)
             notes += refused
