@@ -161,6 +161,7 @@ def _placed(
             temperature_sentence(model.cell, record, model.effects),
             *without_energies(model.cell, [record.temperature_degc], model.effects),
             *_with_effects(record, model),
+            *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]
     )
     return _Placed(model, record, start)

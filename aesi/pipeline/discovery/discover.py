@@ -180,6 +180,7 @@ def found_model(found: Discovery) -> HybridModel:
         hold=found.hold,
         model=found.choice.model,
         held=tuple(map(repr, (*found.held, *inside.held))),
+        finding=" ".join(found.warnings),
     )
 
 

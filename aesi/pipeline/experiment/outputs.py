@@ -84,13 +84,14 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
     shown = published_by(result.loaded.model)
     rows = [finite({**row, "name": shown(row["name"])}) for row in result.evaluation.rows]
     view = run_view(result, rows)
+    finding = run_finding(view)
     summary = {
         "schema": SCHEMA,
         "experiment": result.config.name,
         "mlflow_run_id": result.run_id,
         "candidates": len(result.candidates) + result.failed,
         "chosen": shown(result.best),
-        "finding": run_finding(view),
+        "finding": finding,
         "seed": result.config.seed,
         "cell": result.loaded.cell_name,
         "data": result.loaded.config.data.kind,
@@ -98,7 +99,7 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "notes": list(notes(result)),
         "models": rows,
     }
-    hybrid(result).save(folder / "model")
+    replace(hybrid(result), finding=finding).save(folder / "model")
     for format in ("md", "tex"):
         write_whole(folder / f"tables.{format}", tables.render(rows, format))
     write_run_report(folder / "report.html", view)

@@ -40,6 +40,7 @@ class HybridModel:
     model : of the physics, "espm" or "dfn".
     dt_s : s, the step of the correction and of the bands; records sampled otherwise are brought to it and back.
     held : effects that values of the cell hold, in words; `effects` are those that act beside it.
+    finding : what it was found to be worth on records that chose nothing, in words; '' where that is not known.
     """
 
     cell: Cell
@@ -52,6 +53,7 @@ class HybridModel:
     soc0: float | None = None
     model: ModelName = "espm"
     held: tuple[str, ...] = ()
+    finding: str = ""
 
     def __repr__(self) -> str:
         cell = f"cell {self.cell.name!r}" + (f" changed by {', '.join(self.held)}" if self.held else "")
@@ -125,7 +127,7 @@ class HybridModel:
             part = getattr(self, name)
             if part is not None:
                 parts[name] = part.to_dict()
-        own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model")}
+        own = {name: getattr(self, name) for name in ("dt_s", "hold", "soc0", "model", "finding")}
         write_model(folder, own | {"held": list(self.held)}, parts)
         return folder
 
@@ -147,6 +149,7 @@ class HybridModel:
                 soc0=head["soc0"],
                 model=head.get("model", "espm"),
                 held=tuple(head.get("held", ())),
+                finding=head.get("finding", ""),
             )
         except (KeyError, TypeError) as error:
             raise InputError(f"{folder} is not a whole model: {error}; save it again.") from None

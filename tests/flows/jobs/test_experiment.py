@@ -164,6 +164,7 @@ def test_predict_in_both_regimes(call, finished, current, tmp_path):
         "predict", "--model", model, "--current", current, "--out", tmp_path / "p.csv", "--soc0", 0.6
     )
     assert code == 0, err
+    assert json.loads((model.parent / "summary.json").read_text())["finding"] in err
     free = pd.read_csv(tmp_path / "p.csv")
     assert {"time_s", "current_a", "voltage_v", "lower_v", "upper_v"} <= set(free)
     code, _, err = call(

@@ -334,6 +334,14 @@ def test_what_a_discovery_had_written_into_the_cell_was_simulated_without_a_word
     assert "changed by series_resistance(resistance_ohm=0.002)" in repr(HybridModel.load(tmp_path / "found"))
 
 
+def test_what_a_model_was_found_to_be_worth_was_told_by_its_report_alone(model, record, tmp_path):
+    found = replace(model, finding="it does not help; use the ESPM alone.")
+    for use in (predict_file, simulate_file):
+        said: list[str] = []
+        use(found.save(tmp_path / "model"), record, tmp_path / "o.csv", say_notes=said.extend)
+        assert "when this model was made: it does not help; use the ESPM alone." in said
+
+
 def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
     voltage = np.full(len(data), 3.9)
     for above, said in ((1e-12, False), (0.01, True)):
