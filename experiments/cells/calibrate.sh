@@ -30,12 +30,16 @@ hg2() {
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" "$p/40degC_c20_ocv.csv" \
         "$p/0degC_c20_ocv.csv" "$p/n10degC_cap_1c.csv" \
+        --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --date 25degC_mixed1=2018-10-29 \
+        --date 40degC_c20_ocv=2018-11-03 --date 0degC_c20_ocv=2018-11-27 --date n10degC_cap_1c=2018-12-07 \
+        --as-of 2018-10-29 \
         --out "$out/lg_18650hg2.bpx.json"
 }
 hg2_25degc() {
     p=$data/lg_18650hg2
     aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated at 25 degC alone" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" \
+        --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --date 25degC_mixed1=2018-10-29 \
         --out "$out/lg_18650hg2_25degc.bpx.json"
 }
 case $which in
