@@ -12,7 +12,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.physics import Cell, impedance, simulate
 from aesi.physics.cell.parts import NO_ENTROPY
-from aesi.physics.cell.relations import Constant, Expression, LookupTable
+from aesi.physics.cell.relations import Constant, Expression, LookupTable, scaled
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import solver as _solver
 
@@ -280,6 +280,20 @@ def test_a_steep_diffusivity_is_followed_in_steps_of_a_second(nmc, load, slope, 
         for effects in ([steep], [steep, fine.activate(refinement=4.0)])
     )
     assert 1e3 * np.sqrt(np.mean((coarse_v - fine_v) ** 2)) < 0.1
+
+
+def test_a_voltage_is_smooth_in_a_steep_diffusivity():
+    time_s = np.arange(0.0, 1500.0)
+    current_a = 5.0 * (0.6 + np.sign(np.sin(time_s / 60.0)))
+
+    def voltage_v(factor):
+        steep = scaled(Expression("1e-13 * exp(-6 * x)"), factor)
+        return simulate(
+            LG_M50.with_negative(diffusivity=steep), time_s, current_a, 0.9, (), 25.0, on_depletion="clip"
+        ).voltage_v
+
+    steps_v = np.diff([voltage_v(factor) for factor in np.linspace(1.0, 1.01, 101)], axis=0)
+    assert np.abs(steps_v).max() < 1e-5
 
 
 @pytest.mark.parametrize("model", ["espm", "dfn"])
