@@ -39,7 +39,7 @@ from aesi.physics.depletion import ran_out
 from aesi.records import Measurement
 
 EVALUATIONS = 100
-"""At most: the descents to both files of the Panasonic NCR18650PF and to an LG 18650HG2 end before, by GAIN."""
+"""At most: the descents to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end before."""
 GAIN = 1e-5
 """Of the cost: a step that gains less than this share of it is the last. With ten times as much the first descent to an
 LG 18650HG2 ends a deviation of the priors away, at 344.7 instead of 340.1."""

@@ -48,8 +48,8 @@ TELL_SILICON = 2
 STEP = 1e-3
 """Of finite differences, in deviations of the prior. Where a discharge ends, the voltage bends within less: with 0.02
 for what is global and 0.2 for what a record has of its own, slopes erred by up to 16 and 34 % there, descents to an LG
-18650HG2 stopped at 353.5 and 354.7 of what they are to minimise instead of 340.1, and a heat by 0.05 mV moved its file
-by 5 mV at 0 degC."""
+18650HG2 stopped at 353.5 and 354.7 of what they are to minimise instead of 340.1, and a change of the heat that moves a
+voltage by 0.05 mV moved its file by 5 mV at 0 degC."""
 
 
 @dataclass(frozen=True)
