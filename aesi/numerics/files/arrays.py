@@ -11,7 +11,7 @@ import numpy as np
 
 from aesi.numerics.typing import AnyArray
 
-DAMAGED = (EOFError, NotImplementedError, RuntimeError, zipfile.BadZipFile, zlib.error)
+DAMAGED = (EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
 """What zipfile raises for bytes that were changed: in the stream, in a checksum, in what they say of compression."""
 
 
