@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from aesi.calibration.ageing import Ageing
 from aesi.calibration.heat import with_heat
 from aesi.calibration.model import FitState, Model
-from aesi.calibration.parameters import free_parameters, with_interfaces
+from aesi.calibration.parameters import free_parameters, with_interfaces, with_priors
 from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
@@ -144,7 +144,7 @@ def problem(
     model = Model(
         start,
         ready,
-        free_parameters(start, span, conditions.same_cell, measured),
+        with_priors(free_parameters(start, span, conditions.same_cell, measured), conditions.priors),
         Shapes.over(start, span),
         zero,
         ageing,

@@ -6,13 +6,15 @@ is a standard normal deviate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from aesi.calibration.records.conditions import Prior
 from aesi.calibration.shapes import SPAN_K
+from aesi.errors import InputError
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.parts import NO_FILM
 from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation, scaled
@@ -185,6 +187,33 @@ def free_parameters(
             Free("positive.film_energy", FILM_ENERGY, FILM_ENERGY_SD, "J/mol", FILM_ENERGIES, low=0.0),
         ]  # fmt: skip
     return tuple(out)
+
+
+def with_priors(free: Sequence[Free], priors: Mapping[str, Prior]) -> tuple[Free, ...]:
+    """The parameters with what is known of some from elsewhere in place of their own priors.
+
+    Raises InputError for a name that is none of them, and for a value that none of them has.
+    """
+    by_name = {one.name: one for one in free}
+    for name, prior in priors.items():
+        if name not in by_name:
+            raise InputError(
+                f"the prior of {name}: there is no such parameter in this fit; it has {', '.join(by_name)}."
+            )
+        by_name[name] = _told(by_name[name], prior)
+    return tuple(by_name.values())
+
+
+def _told(one: Free, prior: Prior) -> Free:
+    possible = prior.value > 0.0 if one.factor else one.low <= prior.value <= one.high
+    if not possible or not 0.0 < prior.sd < np.inf:
+        between = "above 0" if one.factor else f"from {one.low:g} to {one.high:g}"
+        of_log = " (of its logarithm)" if one.factor else ""
+        raise InputError(
+            f"the prior of {one.name}: {prior.value:g} with a standard deviation of {prior.sd:g} is none; the value "
+            f"({one.unit}) is {between}, the deviation{of_log} above 0."
+        )
+    return replace(one, start=prior.value, sd=prior.sd, source=f"given: {prior.value:g} +/- {prior.sd:g}")
 
 
 def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:

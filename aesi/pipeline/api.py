@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.calibration import Calibration, Conditions
+from aesi.calibration import Calibration, Conditions, Prior
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, examined, read
@@ -111,6 +111,7 @@ def calibrate(
     temperatures_degc: Mapping[str, float] | None = None,
     dates: Mapping[str, date] | None = None,
     as_of: date | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
     hold: Hold | None = None,
     model: ModelName | None = None,
 ) -> Calibration:
@@ -119,6 +120,8 @@ def calibrate(
     cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
     temperatures_degc : of records without a temperature column, by name.  dates : days of the records, by name; those
     of other days may be of another age.  as_of : day of the file's state; None takes the last with a load.
+    priors : (value, standard deviation) of parameters that are known from elsewhere, by their names in the report; of a
+    factor, times the start file's value, and the deviation of its natural logarithm.
     model : that is fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else
     "espm".
     Raises AesiError, one sentence, for what cannot be used.
@@ -126,13 +129,21 @@ def calibrate(
     check_soc(soc0)
     _check_by_name("temperatures_degc", temperatures_degc)
     _check_by_name("dates", dates)
+    _check_priors(priors)
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
     declared = given.cell
     measurements = _read_all(_listed(data), None, hold)
     check_records(measurements, temperatures_degc)
     check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
-    conditions = Conditions(soc0, temperatures_degc or {}, dates or {}, as_of, model or given.model)
+    conditions = Conditions(
+        soc0,
+        temperatures_degc or {},
+        dates or {},
+        as_of,
+        model or given.model,
+        priors={name: Prior(*prior) for name, prior in (priors or {}).items()},
+    )
     found = fit_cell(declared, measurements, conditions)
     return replace(found, notes=(*effects_left(given), *found.notes))
 
@@ -159,6 +170,17 @@ def _check_by_name(what: str, given: object) -> None:
     """Raises InputError for what is said of records without their names."""
     if given is not None and not isinstance(given, Mapping):
         raise InputError(f"{what} = {given!r} names no record; give a dict by the records' names.")
+
+
+def _check_priors(priors: object) -> None:
+    """Raises InputError for what is no (value, standard deviation) by parameter."""
+    form = "a dict of (value, standard deviation) by the parameters' names in the report"
+    if priors is not None and not isinstance(priors, Mapping):
+        raise InputError(f"priors = {priors!r} names no parameter; give {form}.")
+    for name, prior in (priors or {}).items():
+        pair = isinstance(prior, Sequence) and len(prior) == 2
+        if not pair or not all(isinstance(one, int | float | np.number) for one in prior):
+            raise InputError(f"priors[{name!r}] = {prior!r}; give {form}.")
 
 
 def _check_days(dates: Mapping[str, date], as_of: date | None) -> None:

@@ -94,6 +94,13 @@ def calibrate(
             help="YYYY-MM-DD, the day of the state that the file is in; without it the last with a load."
         ),
     ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--prior",
+            help="NAME=VALUE:SD, what is known of a parameter from elsewhere (names as in the report); repeatable.",
+        ),
+    ] = None,
     hold: options.HoldOption = None,
     until: Annotated[
         list[str] | None,
@@ -125,7 +132,8 @@ def calibrate(
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
 
-    request = Request(Conditions(soc0, temperatures, days, day, model), spectra, posterior, seed, title)
+    conditions = Conditions(soc0, temperatures, days, day, model, priors=options.priors(prior))
+    request = Request(conditions, spectra, posterior, seed, title)
     records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)
 

@@ -14,6 +14,7 @@ import typer
 from aesi.errors import CellError, InputError
 
 if TYPE_CHECKING:
+    from aesi.calibration import Prior
     from aesi.data.reading import Reading
     from aesi.physics import ActiveEffect
     from aesi.records import Hold, Measurement, Spectrum
@@ -242,6 +243,23 @@ def by_file(option: str, pairs: list[str] | None, paths: list[Path]) -> dict[str
 def dates(pairs: list[str] | None, paths: list[Path]) -> dict[str, date]:
     """`--date FILE=YYYY-MM-DD` pairs as days by record of the files `paths`."""
     return _by_file("--date", pairs, paths, date.fromisoformat, "YYYY-MM-DD")
+
+
+def priors(pairs: list[str] | None) -> dict[str, Prior]:
+    """`--prior NAME=VALUE:SD` as what is known of parameters, by name."""
+    from aesi.calibration import Prior
+
+    out: dict[str, Prior] = {}
+    for pair in pairs or []:
+        name, _, told = pair.partition("=")
+        try:
+            value, sd = map(_finite, told.split(":"))
+        except ValueError:
+            raise InputError(f"--prior {pair}: has to read NAME=VALUE:SD.") from None
+        if name in out:
+            raise InputError(f"--prior is there twice for {name}; give it once.")
+        out[name] = Prior(value, sd)
+    return out
 
 
 def day(option: str, text: str | None) -> date | None:

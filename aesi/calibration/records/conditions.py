@@ -5,8 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import date
+from typing import NamedTuple
 
 from aesi.physics.simulation import ModelName
+
+
+class Prior(NamedTuple):
+    """What is known of a parameter from elsewhere: its value, and the standard deviation of that.
+
+    Of a factor, the value is times the start file's, and the deviation that of its natural logarithm.
+    """
+
+    value: float
+    sd: float
 
 
 @dataclass(frozen=True)
@@ -21,6 +32,7 @@ class Conditions:
     same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
     charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
     of a full discharge.
+    priors : by parameter as the report names it, in place of those that every cell has.
     """
 
     soc0: float | None = None
@@ -29,3 +41,4 @@ class Conditions:
     as_of: date | None = None
     physics: ModelName | None = None
     same_cell: bool = False
+    priors: Mapping[str, Prior] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 import aesi
 from aesi.errors import InputError
 from flows import cli
-from flows.commands.options import dates, day
+from flows.commands.options import dates, day, priors
 
 LG_M50 = str(Path(__file__).resolve().parents[3] / "experiments" / "cells" / "lg_m50_chen2020.bpx.json")
 SIMULATE = ("simulate", "--cell", LG_M50, "--current", "i.csv", "--out", "o.csv")
@@ -315,6 +315,15 @@ def test_days_of_records_are_read_by_record():
     assert day("--as-of", "2017-03-11") == date(2017, 3, 11)
     with pytest.raises(InputError, match="has to read YYYY-MM-DD"):
         day("--as-of", "yesterday")
+
+
+def test_what_is_known_of_parameters_is_read_by_name():
+    assert priors(["contact.resistance=0.0134:0.001"]) == {"contact.resistance": (0.0134, 0.001)}
+    for text in ("contact.resistance=0.0134", "0.0134:0.001", "contact.resistance=a:b", "a=1:inf"):
+        with pytest.raises(InputError, match=f"--prior {text}: has to read NAME=VALUE:SD"):
+            priors([text])
+    with pytest.raises(InputError, match="--prior is there twice for a; give it once"):
+        priors(["a=1:1", "a=2:1"])
 
 
 def test_a_bug_is_exit_code_1_without_a_traceback(call, monkeypatch):

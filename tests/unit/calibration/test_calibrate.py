@@ -1,5 +1,6 @@
 """Calibration over temperatures: recovery, the temperature as an input, intervals, what stays open."""
 
+import re
 import warnings
 from dataclasses import replace
 from datetime import date
@@ -11,7 +12,7 @@ from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.posterior import sampled
-from aesi.calibration.records.conditions import Conditions
+from aesi.calibration.records.conditions import Conditions, Prior
 from aesi.calibration.start import size_assumed
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
@@ -99,6 +100,44 @@ def test_the_temperature_column_alone_changes_the_answer(start, records, found):
     other = calibrate(start, warmer, evaluations=8)
     here, there = (c.parameters["negative.rate"].value for c in (found, other))
     assert abs(np.log(here / there)) > 0.1
+
+
+def test_what_is_known_of_a_parameter_from_elsewhere_takes_the_place_of_its_prior(start, records, found):
+    known = {"contact.resistance": Prior(0.011, 1e-5), "negative.rate": Prior(2.0, 1e-3)}
+    told = calibrate(start, records, Conditions(priors=known), evaluations=8).parameters
+    assert told["contact.resistance"].value == pytest.approx(0.011, abs=4e-5)
+    assert told["negative.rate"].value == pytest.approx(2.0, rel=4e-3)
+    assert told["contact.resistance"].source == "given: 0.011 +/- 1e-05"
+    assert told["positive.rate"].source == found.parameters["positive.rate"].source
+    free = found.parameters["contact.resistance"]
+    assert free.high - free.low > 10 * (told["contact.resistance"].high - told["contact.resistance"].low)
+
+
+@pytest.mark.parametrize(
+    ("name", "prior", "sentence"),
+    [
+        (
+            "contacts",
+            (0.01, 1e-3),
+            "the prior of contacts: there is no such parameter in this fit; it has negative.c",
+        ),
+        (
+            "contact.resistance",
+            (-0.01, 1e-3),
+            "-0.01 with a standard deviation of 0.001 is none; the value (ohm) is from 0",
+        ),
+        ("contact.resistance", (0.01, 0.0), "the deviation above 0."),
+        (
+            "negative.rate",
+            (0.0, 0.1),
+            "the value (factor) is above 0, the deviation (of its logarithm) above 0",
+        ),
+        ("negative.full_stoichiometry", (0.97, 0.01), "the value (1) is from -inf to 0.95"),
+    ],
+)
+def test_a_prior_that_no_parameter_can_have_is_told(start, records, name, prior, sentence):
+    with pytest.raises(InputError, match=re.escape(sentence)):
+        problem(start, records, Conditions(priors={name: Prior(*prior)}))
 
 
 def test_a_record_without_the_column_takes_the_temperature_that_is_given_for_it(start, records, found):
