@@ -38,8 +38,8 @@ STEP_S = 10.0
 class LeftOut:
     """What one model leaves on data that it has not seen, V RMS; infinite where it could not be simulated.
 
-    by_record : (k,) each record where the others put the model.  by_range : (p,) those in turn, by range of charge, as
-    far as where they begin is known.
+    by_record : (k,) each record, all rows as measured, where the others put the model.  by_range : (p,) of what fits
+    see of those in turn, by range of charge, as far as where they begin is known.
     """
 
     by_record: tuple[float, ...]
@@ -66,9 +66,9 @@ def left_out_errors(problem: InverseProblem, blocks: Blocks, one: FittedHypothes
     by_record, by_range = [], []
     for k, fold in enumerate(folds):
         out = np.isin(blocks.of_row, fold)
-        residual = _left_out_residual(problem, blocks, one, k, fold)
-        by_record.append(rms(residual))
-        told = tells[out] * residual
+        whole, seen = _left_out_residuals(problem, blocks, one, k, fold)
+        by_record.append(rms(whole))
+        told = tells[out] * seen
         by_range += [rms(told[charge[out]]) for charge in charges if charge[out].any()]
     return LeftOut(tuple(by_record), tuple(by_range))
 
@@ -85,22 +85,29 @@ def _tells(problem: InverseProblem) -> Array:
     return np.asarray(MEASURED_V**2 / (MEASURED_V**2 + problem.start_slope_v**2))
 
 
-def _left_out_residual(
+def _left_out_residuals(
     problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None, k: int, fold: Sequence[int]
-) -> Array:
-    """(n_out,) V of the rows of a fold, which are of record k; infinite where the model fails."""
-    many = len(problem.records) > 1
+) -> tuple[Array, Array]:
+    """V of the rows of a fold, which are of record k: all as measured, and (n_out,) those that fits see; infinite where
+    the model fails.
+
+    What fits see are means over seconds, in which an instrument's lag is gone that a step of the current shows.
+    """
     out = np.isin(blocks.of_row[problem.slices[k]], fold)
     record = problem.records[k]
+    if one is None:
+        state, index = ModelState(problem), k
+    else:
+        state = ModelState(problem, values_without(problem, blocks, one, fold), one.hypothesis)
+        index = None if len(problem.records) > 1 else k
     try:
-        if one is None:
-            run = ModelState(problem).simulated(record, k, thin=True)
-        else:
-            state = ModelState(problem, values_without(problem, blocks, one, fold), one.hypothesis)
-            run = state.simulated(record, None if many else k, thin=True)
+        whole, seen = (state.simulated(record, index, thin) for thin in (False, True))
     except AesiError:
-        return np.full(np.count_nonzero(out), np.inf)
-    return (record.thin.voltage_v - run.voltage_v)[: record.n_fit][out]
+        return np.full(1, np.inf), np.full(np.count_nonzero(out), np.inf)
+    begins_s = record.thin.time_s[: record.n_fit][out][0]
+    rows = slice(int(np.searchsorted(record.data.time_s, begins_s)), record.n_fit_whole)
+    left_v = (record.data.voltage_v - whole.voltage_v)[rows]
+    return left_v, (record.thin.voltage_v - seen.voltage_v)[: record.n_fit][out]
 
 
 def range_fault(state: ModelState, rates_c: Sequence[float] = (*ORDINARY_C, *FAST_C)) -> str | None:
