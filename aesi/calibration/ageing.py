@@ -10,6 +10,10 @@ day are in one state. Its working coordinate z is a normal deviate of the same p
 with P the normal distribution. Of a record without a date ln share is s z, with s from the file. The file is in the
 state of the last day on which a dated record has a load, as the cell was last seen, or of another that is given.
 
+Of silicon, slow records tell what it has lost (`aesi.calibration.silicon`), each by its own coordinate; it is that of its
+day, too, so that between two of them, or one of them and the day of the file's state, where nothing is lost, the
+logarithm of the share runs evenly with the days, and before the first and after the last it stays.
+
 Leaves out that cells age by use more than by days, what a rest gives back, and that their resistance grows.
 """
 
@@ -51,10 +55,12 @@ class Ageing:
     """Prior of the records' shares, of standard normal deviates z (records,).
 
     chain : (records, records) signs, which of the losses each record is away from the file.  sd : (records,) of each.
+    silicon : (records, records) weights of the records' own logarithms of their silicon in that which a record has.
     losses : (records,) is it a loss, (1)?  day : of the file's state; None where no record has a date.
     """
 
     chain: Array
+    silicon: Array
     sd: Array
     losses: BoolArray
     day: date | None
@@ -89,7 +95,7 @@ class Ageing:
                 nearer = abs(since[there[k - 1]]) if k else 0
                 sd[i] = LOSS_SD * np.sqrt(abs(since[i]) - nearer)
                 chain[i, there[: k + 1]] = -way
-        return cls(chain, sd, losses, day)
+        return cls(chain, _silicon(records, since, losses), sd, losses, day)
 
     @property
     def dated(self) -> bool:
@@ -122,6 +128,19 @@ class Ageing:
         if self.day is None:
             return ()
         return (f"the file is in the state of {self.day}.",)
+
+
+def _silicon(records: Sequence[Prepared], since: Array, dated: BoolArray) -> Array:
+    """`Ageing.silicon`.  since : (records,) days from the file's state."""
+    slow = np.array([r.slow for r in records], dtype=bool)
+    own = np.diag(slow.astype(float))
+    tell = sorted(np.flatnonzero(slow & dated & (since != 0)), key=lambda i: since[i])
+    at = np.array([*(since[i] for i in tell if since[i] < 0), 0, *(since[i] for i in tell if since[i] > 0)])
+    known = np.zeros((len(at), len(records)))
+    known[np.flatnonzero(at != 0), tell] = 1.0
+    for i in np.flatnonzero(~slow & dated):
+        own[i] = [np.interp(since[i], at, column) for column in known.T]
+    return own
 
 
 def _day(given: date | None) -> date | None:

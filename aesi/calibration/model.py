@@ -90,6 +90,11 @@ class WorkingVector:
         return self.own(record)[1]
 
     @property
+    def silicons(self) -> list[int]:
+        """Of all records' silicon."""
+        return [self.own(i)[2] for i in range(self.records)] if self.silicon else []
+
+    @property
     def ages(self) -> list[int]:
         """Of all records' active material."""
         return [self.age(i) for i in range(self.records)]
@@ -141,9 +146,9 @@ class Model:
 
     def silicon(self, index: int, x: Array) -> float:
         """Share of its silicon that the cell of a record has: slow ones tell it."""
-        if not self.layout.silicon or not self.records[index].slow:
+        if not self.layout.silicon:
             return 1.0
-        return float(np.exp(SILICON_SD * x[self.layout.own(index)[2]]))
+        return float(np.exp(SILICON_SD * (self.ageing.silicon[index] @ x[self.layout.silicons])))
 
     def aged(self, cell: Cell, material: float, silicon: float) -> Cell:
         """The cell with shares of its active material and of its silicon left."""
@@ -238,11 +243,16 @@ class Model:
             blocks[i][:, closed] = self.shapes.columns(
                 x[self.layout.shapes], stretched(runs[i][1], self.edge, self.silicon(i, x)), runs[i][2]
             )
-            for j in (j for j in self.layout.own(i) if j != self.layout.age(i)):
-                there = x.copy()
-                there[j] += STEP
-                blocks[i][:, j] = (self.run(i, cell, there)[0] - runs[i][0]) / STEP
+            there = x.copy()
+            there[self.layout.soc(i)] += STEP
+            blocks[i][:, self.layout.soc(i)] = (self.run(i, cell, there)[0] - runs[i][0]) / STEP
             # Records of one course of ageing are moved by one another's coordinates, too.
+            if self.layout.silicon and self.ageing.silicon[i].any():
+                weights = self.ageing.silicon[i]
+                there = x.copy()
+                there[self.layout.silicons] += STEP * weights / (weights @ weights)
+                by_silicon = (self.run(i, cell, there)[0] - runs[i][0]) / STEP
+                blocks[i][:, self.layout.silicons] = by_silicon[:, None] * weights
             h = STEP * (SLOW_SD if record.slow else LOADED_SD)
             by_share = (self.run(i, cell, x, float(np.exp(h)))[0] - runs[i][0]) / h
             slopes = self.ageing.slopes(i, x[self.layout.ages])

@@ -87,6 +87,18 @@ def test_records_without_a_date_differ_from_the_file_alone():
     assert ageing.sentences == ()
 
 
+def test_what_a_slow_record_tells_of_silicon_is_of_its_day_and_of_those_between():
+    days = {"first": 1, "file": 5, "between": 9, "slow": 13, "last": 20}
+    dates = {name: date(2018, 11, day) for name, day in days.items()}
+    names = ["last", "slow", "file", "first", "between", "undated"]
+    weights = of(names, dates, slow=["first", "slow"], as_of=dates["file"]).silicon
+    lost = dict(zip(names, weights @ np.array([9.0, -0.4, 9.0, 0.1, 9.0, 9.0]), strict=True))
+    expected = {"first": 0.1, "file": 0.0, "between": -0.2, "slow": -0.4, "last": -0.4, "undated": 0.0}
+    assert lost == pytest.approx(expected, abs=1e-12)
+    without = of(names, {}, slow=["first", "slow"]).silicon
+    assert without == pytest.approx(np.diag([0.0, 1.0, 0.0, 1.0, 0.0, 0.0]))
+
+
 def test_a_record_of_years_before_the_file_s_state_ended_the_fit(start, records):
     dates = {"at_25": date(2015, 3, 11), "at_0": DAYS["june"]}
     model = problem(start, records, Conditions(dates=dates))[0]

@@ -1,6 +1,7 @@
 """Lost silicon: the end of the negative potential, and its share of two C/20 discharges."""
 
 from dataclasses import replace
+from datetime import date
 
 import numpy as np
 import pytest
@@ -58,8 +59,14 @@ def test_one_slow_discharge_does_not_tell_silicon(start, records):
     assert not problem(start, records[:1], Conditions())[0].layout.silicon
 
 
-def test_slopes_are_those_of_differences_with_silicon_too(start, records):
-    model = problem(start, records, Conditions())[0]
+DAYS = {"new": date(2018, 10, 26), "loaded": date(2018, 11, 11), "old": date(2018, 11, 27)}
+
+
+@pytest.mark.parametrize("conditions", [Conditions(), Conditions(dates=DAYS, as_of=DAYS["new"])])
+def test_slopes_are_those_of_differences_with_silicon_too(start, records, conditions):
+    time, current = np.arange(0.0, 3400.0, 10.0), np.full(340, start_ah(start))
+    voltage = simulate(start, time, current, 1.0, on_depletion="clip").voltage_v
+    model = problem(start, [*records, Measurement(time, current, voltage, None, "loaded")], conditions)[0]
     x = 0.3 * np.random.default_rng(3).standard_normal(model.layout.size)
     x = np.clip(x, model.low + 0.1, model.high - 0.1)
     slopes = model.jacobian(x)
@@ -72,3 +79,7 @@ def test_slopes_are_those_of_differences_with_silicon_too(start, records):
         expected = (model.residual(up) - model.residual(down)) / (2.0 * h)
         scale = np.abs(expected).max()
         assert np.median(np.abs(slopes[:, j] - expected)) < 0.02 * scale
+    of_loaded = slice(sum(len(r.rows) for r in model.records[:2]), sum(len(r.rows) for r in model.records))
+    moves = np.abs(slopes[of_loaded, own[2]])
+    assert (moves.max() > 0.0) == model.ageing.dated
+    assert slopes[of_loaded, own[2]] == pytest.approx(expected[of_loaded], abs=0.02 * max(moves.max(), 1e-12))
