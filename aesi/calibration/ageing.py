@@ -10,9 +10,9 @@ day are in one state. Its working coordinate z is a normal deviate of the same p
 with P the normal distribution. Of a record without a date ln share is s z, with s from the file. The file is in the
 state of the last day on which a dated record has a load, as the cell was last seen, or of another that is given.
 
-Of silicon, slow records tell what it has lost (`aesi.calibration.silicon`), each by its own coordinate; it is that of its
-day, too, so that between two of them, or one of them and the day of the file's state, where nothing is lost, the
-logarithm of the share runs evenly with the days, and before the first and after the last it stays.
+Slow records tell what silicon has lost (`aesi.calibration.silicon`), each by a coordinate of its own, relative to the
+file. It is what the cell had on that day: between two such days, the file's among them, the logarithm of the share runs
+evenly with the days, before the first and after the last it stays, and so it is in records with a load.
 
 Leaves out that cells age by use more than by days, what a rest gives back, and that their resistance grows.
 """

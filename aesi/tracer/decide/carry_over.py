@@ -95,11 +95,9 @@ def _left_out_residuals(
     """
     out = np.isin(blocks.of_row[problem.slices[k]], fold)
     record = problem.records[k]
-    if one is None:
-        state, index = ModelState(problem), k
-    else:
+    state, index = ModelState(problem), None if one is not None and len(problem.records) > 1 else k
+    if one is not None:
         state = ModelState(problem, values_without(problem, blocks, one, fold), one.hypothesis)
-        index = None if len(problem.records) > 1 else k
     try:
         whole, seen = (state.simulated(record, index, thin) for thin in (False, True))
     except AesiError:
