@@ -239,29 +239,37 @@ class Model:
             for i, record in enumerate(self.records):
                 if j != self.layout.zero or record.slow:
                     blocks[i][:, j] = (self.run(i, changed, there)[0] - runs[i][0]) / h
-        for i, record in enumerate(self.records):
-            blocks[i][:, closed] = self.shapes.columns(
-                x[self.layout.shapes], stretched(runs[i][1], self.edge, self.silicon(i, x)), runs[i][2]
-            )
-            there = x.copy()
-            there[self.layout.soc(i)] += STEP
-            blocks[i][:, self.layout.soc(i)] = (self.run(i, cell, there)[0] - runs[i][0]) / STEP
-            # Records of one course of ageing are moved by one another's coordinates, too.
-            if self.layout.silicon and self.ageing.silicon[i].any():
-                weights = self.ageing.silicon[i]
-                there = x.copy()
-                there[self.layout.silicons] += STEP * weights / (weights @ weights)
-                by_silicon = (self.run(i, cell, there)[0] - runs[i][0]) / STEP
-                blocks[i][:, self.layout.silicons] = by_silicon[:, None] * weights
-            h = STEP * (SLOW_SD if record.slow else LOADED_SD)
-            by_share = (self.run(i, cell, x, float(np.exp(h)))[0] - runs[i][0]) / h
-            slopes = self.ageing.slopes(i, x[self.layout.ages])
-            blocks[i][:, self.layout.ages] = by_share[:, None] * slopes
+        for i, (block, run) in enumerate(zip(blocks, runs, strict=True)):
+            surface_n = stretched(run[1], self.edge, self.silicon(i, x))
+            block[:, closed] = self.shapes.columns(x[self.layout.shapes], surface_n, run[2])
+            self._set_own_slopes(i, cell, x, run[0], block)
         parts = []
         for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
             lenient = w * leniency(record.rows.voltage_v - run[0])
             parts.append(-lenient[:, None] * block)
         return np.vstack([*parts, np.eye(self.layout.size)])
+
+    def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:
+        """Set the slopes of a record's voltage over what records have of their own: records of one course of ageing
+        are moved by one another's coordinates, too.
+
+        voltage_v : (rows,) at x.  block : (rows, n).
+        """
+        layout, weights = self.layout, self.ageing.silicon[index]
+
+        def slope(there: Array, more: float = 1.0, step: float = STEP) -> Array:
+            return (self.run(index, cell, there, more)[0] - voltage_v) / step
+
+        there = x.copy()
+        there[layout.soc(index)] += STEP
+        block[:, layout.soc(index)] = slope(there)
+        if layout.silicon and weights.any():
+            there = x.copy()
+            there[layout.silicons] += STEP * weights / (weights @ weights)
+            block[:, layout.silicons] = slope(there)[:, None] * weights
+        step = STEP * (SLOW_SD if self.records[index].slow else LOADED_SD)
+        by_share = slope(x, float(np.exp(step)), step)
+        block[:, layout.ages] = by_share[:, None] * self.ageing.slopes(index, x[layout.ages])
 
 
 def saturated(error_v: Array) -> Array:
