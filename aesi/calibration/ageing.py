@@ -133,11 +133,11 @@ class Ageing:
 def _silicon(records: Sequence[Prepared], since: Array, dated: BoolArray) -> Array:
     """`Ageing.silicon`.  since : (records,) days from the file's state."""
     slow = np.array([r.slow for r in records], dtype=bool)
-    own = np.diag(slow.astype(float))
-    tell = sorted(np.flatnonzero(slow & dated & (since != 0)), key=lambda i: since[i])
-    at = np.array([*(since[i] for i in tell if since[i] < 0), 0, *(since[i] for i in tell if since[i] > 0)])
-    known = np.zeros((len(at), len(records)))
-    known[np.flatnonzero(at != 0), tell] = 1.0
+    own = np.diag((slow & ~(dated & (since == 0))).astype(float))
+    tell = slow & dated & (since != 0)
+    at = np.unique(np.append(since[tell], 0))
+    known = (tell & (since == at[:, None])).astype(float)
+    known /= np.maximum(known.sum(axis=1, keepdims=True), 1.0)  # the mean of those of one day
     for i in np.flatnonzero(~slow & dated):
         own[i] = [np.interp(since[i], at, column) for column in known.T]
     return own

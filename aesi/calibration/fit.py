@@ -49,6 +49,8 @@ NOTED_AGE = 0.01
 """Of the active material: what a record's differs by and is told."""
 NOTED_SILICON = 0.05
 """The same of silicon, a sixth of what such a cell gives."""
+NOTED_DEVIATIONS = 2.0
+"""Of a prior that was given: where a fit ends further from it, its records contradict it. A convention."""
 OF_ROWS_LEFT_OUT = (
     "the state of charge that was given is that of its first row, which is not fitted; it starts where its "
     "voltage says."
@@ -189,8 +191,14 @@ def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tup
 
 
 def _told(model: Model, x: Array) -> tuple[str, ...]:
-    """Sentences on what a record's cycler and its age were found to be."""
+    """Sentences on priors that the records contradict, and on what a record's cycler and its age were found to be."""
     out = []
+    for free, z in zip(model.free, x, strict=False):
+        if free.given and abs(z) > NOTED_DEVIATIONS:
+            out.append(
+                f"{free.name} ends at {free.value(float(z)):.4g} {free.unit}, {abs(z):.1f} standard deviations "
+                f"{'above' if z > 0.0 else 'below'} what was given ({free.start:g}): the records say otherwise."
+            )
     zero_a = model.zero.at(float(x[model.layout.zero]))
     for i, record in enumerate(model.records):
         typical = float(np.median(np.abs(record.rows.current_a[record.flows > 0.0])))
@@ -205,8 +213,9 @@ def _told(model: Model, x: Array) -> tuple[str, ...]:
                 f"{record.name}: fits with {100 * material:+.1f} % of active material; its cell may be of another age."
             )
         if abs(silicon - 1.0) > NOTED_SILICON:
+            how = "fits with" if record.slow else "has, by the slow records before and after it,"
             out.append(
-                f"{record.name}: fits with {100 * silicon:.0f} % of the silicon in the negative electrode."
+                f"{record.name}: {how} {100 * silicon:.0f} % of the silicon in the negative electrode."
             )
     return tuple(out)
 

@@ -145,7 +145,7 @@ class Model:
         return self.ageing.share(index, x[self.layout.ages])
 
     def silicon(self, index: int, x: Array) -> float:
-        """Share of its silicon that the cell of a record has: slow ones tell it."""
+        """Share of its silicon that the cell of a record has, over the file's: slow ones tell it, see `Ageing`."""
         if not self.layout.silicon:
             return 1.0
         return float(np.exp(SILICON_SD * (self.ageing.silicon[index] @ x[self.layout.silicons])))

@@ -14,13 +14,14 @@ from scipy.interpolate import CubicSpline
 
 from aesi.calibration.records.conditions import Prior
 from aesi.calibration.shapes import SPAN_K
-from aesi.errors import InputError
+from aesi.errors import InputError, did_you_mean
 from aesi.physics.cell import Cell, Electrode
 from aesi.physics.cell.parts import NO_FILM
 from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation, scaled
 
 LIMIT_SD = 4.0
 """No parameter goes further than this many of its prior's deviations."""
+OF_LOGARITHM = " of its natural logarithm"
 PLACES = tuple(0.5 - 0.5 * np.cos(np.pi * np.linspace(0.0, 1.0, 7)))
 """Knots of a diffusivity's and of a rate's course, shares of an electrode's window: dense at both ends, where either
 falls off. Pulse tests come at ten states of charge or more."""
@@ -30,7 +31,10 @@ COURSE_POINTS = 65
 
 @dataclass(frozen=True)
 class Free:
-    """One free scalar: start (a factor starts at 1), prior deviation (of the logarithm for a factor), unit, source."""
+    """One free scalar: start (what is times the start file's starts at 1), prior deviation, unit, source.
+
+    factor : the deviation is of the natural logarithm.  given : the prior is what a user knows of it from elsewhere.
+    """
 
     name: str
     start: float
@@ -40,6 +44,7 @@ class Free:
     factor: bool = False
     low: float = -np.inf
     high: float = np.inf
+    given: bool = False
 
     def value(self, z: float) -> float:
         """The value at a working coordinate."""
@@ -142,20 +147,21 @@ def free_parameters(
     of the case.
     """
     ohm = CONTACT_V / cell.nominal_capacity_ah
+    most_ohm = (cell.upper_voltage_v - cell.lower_voltage_v) / cell.nominal_capacity_ah
     full = AGED_FULL_SD if same_cell else FULL_SD
     n_full, p_full = cell.negative.theta_max, cell.positive.theta_min
     out = [
         Free("negative.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
         Free("positive.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
-        Free("negative.full_stoichiometry", n_full, full["negative"], "1", HALF_CELLS, high=FULLEST),
-        Free("positive.full_stoichiometry", p_full, full["positive"], "1", HALF_CELLS, low=1.0 - FULLEST),
+        Free("negative.full_stoichiometry", n_full, full["negative"], "1", HALF_CELLS, low=0.0, high=FULLEST),
+        Free("positive.full_stoichiometry", p_full, full["positive"], "1", HALF_CELLS, low=1.0 - FULLEST, high=1.0),
         Free("negative.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("positive.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("negative.rate", 1.0, RATE_SD, "factor", RATES, True),
         Free("positive.rate", 1.0, RATE_SD, "factor", RATES, True),
         Free("electrolyte.conductivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
         Free("electrolyte.diffusivity", 1.0, SALT_SD, "factor", TORTUOSITY, True),
-        Free("contact.resistance", cell.contact_resistance_ohm, ohm, "ohm", CONTACTS, low=0.0),
+        Free("contact.resistance", cell.contact_resistance_ohm, ohm, "ohm", CONTACTS, low=0.0, high=most_ohm),
         *(
             Free(course(side, what, k), 1.0, sd, "factor", source, True)
             for side in ("negative", "positive")
@@ -198,22 +204,24 @@ def with_priors(free: Sequence[Free], priors: Mapping[str, Prior]) -> tuple[Free
     for name, prior in priors.items():
         if name not in by_name:
             raise InputError(
-                f"the prior of {name}: there is no such parameter in this fit; it has {', '.join(by_name)}."
+                f"the prior of {name}: there is no such parameter in this fit, whose names are those of its report "
+                f"(activation energies where records span more than {SPAN_K:g} K){did_you_mean(name, by_name)}"
             )
-        by_name[name] = _told(by_name[name], prior)
+        by_name[name] = _with_prior(by_name[name], prior)
     return tuple(by_name.values())
 
 
-def _told(one: Free, prior: Prior) -> Free:
-    possible = prior.value > 0.0 if one.factor else one.low <= prior.value <= one.high
-    if not possible or not 0.0 < prior.sd < np.inf:
-        between = "above 0" if one.factor else f"from {one.low:g} to {one.high:g}"
-        of_log = " (of its logarithm)" if one.factor else ""
+def _with_prior(one: Free, prior: Prior) -> Free:
+    above = 0.0 < prior.value < np.inf
+    if not (above if one.factor else one.low <= prior.value <= one.high) or not 0.0 < prior.sd < np.inf:
+        most = "" if np.isinf(one.high) else f" to {one.high:.4g}"
+        between = "above 0" if one.factor else f"from {one.low:.4g}{most}"
         raise InputError(
-            f"the prior of {one.name}: {prior.value:g} with a standard deviation of {prior.sd:g} is none; the value "
-            f"({one.unit}) is {between}, the deviation{of_log} above 0."
+            f"the prior of {one.name}: {prior.value:g} with a standard deviation of {prior.sd:g} is not possible; the "
+            f"value, in {one.unit}, is {between}, the deviation{OF_LOGARITHM if one.factor else ''} above 0."
         )
-    return replace(one, start=prior.value, sd=prior.sd, source=f"given: {prior.value:g} +/- {prior.sd:g}")
+    told = f"given: {prior.value:g}, standard deviation{OF_LOGARITHM if one.factor else ''} {prior.sd:g}"
+    return replace(one, start=prior.value, sd=prior.sd, source=told, given=True)
 
 
 def moved(cell: Cell, values: Mapping[str, float], ages: bool = False) -> Cell:

@@ -120,8 +120,9 @@ def calibrate(
     cell, data, soc0, hold : as for `discover`; the records may be of any temperatures together.
     temperatures_degc : of records without a temperature column, by name.  dates : days of the records, by name; those
     of other days may be of another age.  as_of : day of the file's state; None takes the last with a load.
-    priors : (value, standard deviation) of parameters that are known from elsewhere, by their names in the report; of a
-    factor, times the start file's value, and the deviation of its natural logarithm.
+    priors : (value, standard deviation) of parameters that are known from elsewhere, by their names in the report and
+    in its units (of a factor, times the start file's); the deviation is that of the natural logarithm for factors,
+    double layers and the thermal conductivity.
     model : that is fitted, "espm" or "dfn"; None takes that of a saved model, or that the file was fitted with, else
     "espm".
     Raises AesiError, one sentence, for what cannot be used.
@@ -180,7 +181,7 @@ def _check_priors(priors: object) -> None:
     for name, prior in (priors or {}).items():
         pair = isinstance(prior, Sequence) and len(prior) == 2
         if not pair or not all(isinstance(one, int | float | np.number) for one in prior):
-            raise InputError(f"priors[{name!r}] = {prior!r}; give {form}.")
+            raise InputError(f"priors[{name!r}] = {prior!r} is no pair of numbers; give {form}.")
 
 
 def _check_days(dates: Mapping[str, date], as_of: date | None) -> None:

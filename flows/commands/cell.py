@@ -98,7 +98,7 @@ def calibrate(
         list[str] | None,
         typer.Option(
             "--prior",
-            help="NAME=VALUE:SD, what is known of a parameter from elsewhere (names as in the report); repeatable.",
+            help="NAME=VALUE:SD, what is known of a parameter from elsewhere, as the report names it; repeatable.",
         ),
     ] = None,
     hold: options.HoldOption = None,
@@ -126,13 +126,14 @@ def calibrate(
     temperatures = options.by_file("--temperature", temperature, data)
     days, day = options.dates(dates, data), options.day("--as-of", as_of)
     ends = options.by_file("--until", until, data)
-    spectra = options.spectra(impedance)
+    spectra, known = options.spectra(impedance), options.priors(prior)
     options.say_reading(data)
-    from aesi.calibration import Conditions
+    from aesi.calibration import Conditions, Prior
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
 
-    conditions = Conditions(soc0, temperatures, days, day, model, priors=options.priors(prior))
+    priors = {name: Prior(*told) for name, told in known.items()}
+    conditions = Conditions(soc0, temperatures, days, day, model, priors=priors)
     request = Request(conditions, spectra, posterior, seed, title)
     records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)

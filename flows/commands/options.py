@@ -14,7 +14,6 @@ import typer
 from aesi.errors import CellError, InputError
 
 if TYPE_CHECKING:
-    from aesi.calibration import Prior
     from aesi.data.reading import Reading
     from aesi.physics import ActiveEffect
     from aesi.records import Hold, Measurement, Spectrum
@@ -245,20 +244,18 @@ def dates(pairs: list[str] | None, paths: list[Path]) -> dict[str, date]:
     return _by_file("--date", pairs, paths, date.fromisoformat, "YYYY-MM-DD")
 
 
-def priors(pairs: list[str] | None) -> dict[str, Prior]:
-    """`--prior NAME=VALUE:SD` as what is known of parameters, by name."""
-    from aesi.calibration import Prior
-
-    out: dict[str, Prior] = {}
+def priors(pairs: list[str] | None) -> dict[str, tuple[float, float]]:
+    """`--prior NAME=VALUE:SD` as value and standard deviation by name."""
+    out: dict[str, tuple[float, float]] = {}
     for pair in pairs or []:
-        name, _, told = pair.partition("=")
+        name, _, told = (part.strip() for part in pair.partition("="))
         try:
             value, sd = map(_finite, told.split(":"))
         except ValueError:
             raise InputError(f"--prior {pair}: has to read NAME=VALUE:SD.") from None
         if name in out:
             raise InputError(f"--prior is there twice for {name}; give it once.")
-        out[name] = Prior(value, sd)
+        out[name] = value, sd
     return out
 
 

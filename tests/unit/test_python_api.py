@@ -316,7 +316,10 @@ def test_a_day_that_is_text_or_a_number_is_told(cell, record, days, sentence):
     [
         ({"temperatures_degc": 25.0}, "temperatures_degc = 25.0 names no record; give a dict"),
         ({"priors": [0.01, 0.001]}, r"priors = \[0.01, 0.001\] names no parameter; give a dict of"),
-        ({"priors": {"contact.resistance": 0.01}}, r"priors\['contact.resistance'\] = 0.01; give a dict of"),
+        (
+            {"priors": {"contact.resistance": 0.01}},
+            r"priors\['contact.resistance'\] = 0.01 is no pair of numbers; give a dict of",
+        ),
         ({"priors": {"contacts": (0.01, 0.001)}}, "the prior of contacts: there is no such parameter"),
         ({"dates": ["2019-05-31"]}, r"dates = \['2019-05-31'\] names no record; give a dict"),
         ({"temperatures_degc": {"drive": "room"}}, "the temperature of drive holds 'room', which is not a n"),

@@ -11,9 +11,9 @@ from aesi.physics.simulation import ModelName
 
 
 class Prior(NamedTuple):
-    """What is known of a parameter from elsewhere: its value, and the standard deviation of that.
-
-    Of a factor, the value is times the start file's, and the deviation that of its natural logarithm.
+    """What is known of a parameter from elsewhere, in the unit in which a report has it (of a factor, times the start
+    file's).  sd : standard deviation, in that unit; of the natural logarithm for factors, double layers and the thermal
+    conductivity.
     """
 
     value: float

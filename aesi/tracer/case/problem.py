@@ -32,9 +32,10 @@ from aesi.tracer.case.records import PreparedRecord
 from aesi.tracer.case.trust import AGEING, MEASURED_CELL, Trust, own_sd, start_sd
 
 SHARE_SD = 0.027
-"""Of the logarithm of a record's capacity over the file's: root mean square of the shares that the two shipped files
-over temperatures give the twelve records that they were calibrated on, within weeks of each other
-(`Cell.capacity_shares`); 0.030 by the present ones, in which records with a load have the silicon of their day."""
+"""Of the logarithm of a record's capacity over the file's: root mean square of the shares that two files over
+temperatures, as calibrated when it was chosen, gave the twelve records that they were calibrated on, within weeks of
+each other (`Cell.capacity_shares`). It is 0.030 by the present ones, in which records with a load have the silicon of
+their day."""
 INDEPENDENT_S, INDEPENDENT_CHARGE = 200.0, 0.05
 """How long, and over how much charge, the error of a model of a measured cell lasts: its integral correlation time is
 45 to 670 s on eight development records of `aesi bench real`, geometric mean 140 s about the mean and 260 s about

@@ -88,14 +88,15 @@ def _tells(problem: InverseProblem) -> Array:
 def _left_out_residuals(
     problem: InverseProblem, blocks: Blocks, one: FittedHypothesis | None, k: int, fold: Sequence[int]
 ) -> tuple[Array, Array]:
-    """V of the rows of a fold, which are of record k: all as measured, and (n_out,) those that fits see; infinite where
-    the model fails.
+    """V of the rows of a fold, which are of record k: (n_whole,) all as measured, and (n_out,) those that fits see;
+    where the model fails infinite, the first in one row.
 
     What fits see are means over seconds, in which an instrument's lag is gone that a step of the current shows.
     """
     out = np.isin(blocks.of_row[problem.slices[k]], fold)
     record = problem.records[k]
-    state, index = ModelState(problem), None if one is not None and len(problem.records) > 1 else k
+    index = None if len(problem.records) > 1 else k
+    state = ModelState(problem)
     if one is not None:
         state = ModelState(problem, values_without(problem, blocks, one, fold), one.hypothesis)
     try:

@@ -95,6 +95,10 @@ def test_what_a_slow_record_tells_of_silicon_is_of_its_day_and_of_those_between(
     lost = dict(zip(names, weights @ np.array([9.0, -0.4, 9.0, 0.1, 9.0, 9.0]), strict=True))
     expected = {"first": 0.1, "file": 0.0, "between": -0.2, "slow": -0.4, "last": -0.4, "undated": 0.0}
     assert lost == pytest.approx(expected, abs=1e-12)
+    same = {**dates, "undated": dates["slow"]}  # two slow records of one day, and one of the file's
+    alike = of(names, same, slow=["undated", "file", "slow"], as_of=dates["file"]).silicon
+    assert alike[names.index("last")] == pytest.approx([0.0, 0.5, 0.0, 0.0, 0.0, 0.5])
+    assert not alike[names.index("file")].any()
     without = of(names, {}, slow=["first", "slow"]).silicon
     assert without == pytest.approx(np.diag([0.0, 1.0, 0.0, 1.0, 0.0, 0.0]))
 

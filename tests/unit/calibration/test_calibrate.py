@@ -104,13 +104,28 @@ def test_the_temperature_column_alone_changes_the_answer(start, records, found):
 
 def test_what_is_known_of_a_parameter_from_elsewhere_takes_the_place_of_its_prior(start, records, found):
     known = {"contact.resistance": Prior(0.011, 1e-5), "negative.rate": Prior(2.0, 1e-3)}
-    told = calibrate(start, records, Conditions(priors=known), evaluations=8).parameters
+    fit = calibrate(start, records, Conditions(priors=known), evaluations=8)
+    told = fit.parameters
     assert told["contact.resistance"].value == pytest.approx(0.011, abs=4e-5)
     assert told["negative.rate"].value == pytest.approx(2.0, rel=4e-3)
-    assert told["contact.resistance"].source == "given: 0.011 +/- 1e-05"
+    assert told["contact.resistance"].source == "given: 0.011, standard deviation 1e-05"
     assert told["positive.rate"].source == found.parameters["positive.rate"].source
+    assert told["negative.rate"].source == "given: 2, standard deviation of its natural logarithm 0.001"
     free = found.parameters["contact.resistance"]
     assert free.high - free.low > 10 * (told["contact.resistance"].high - told["contact.resistance"].low)
+
+
+def test_a_prior_that_the_records_contradict_is_told(start, records, found):
+    far = calibrate(
+        start, records, Conditions(priors={"contact.resistance": Prior(0.1, 0.01)}), evaluations=8
+    )
+    value = far.parameters["contact.resistance"].value
+    assert value < 0.08
+    told = [note for note in far.notes if "what was given" in note]
+    assert len(told) == 1
+    assert f"contact.resistance ends at {value:.4g} ohm" in told[0]
+    assert "standard deviations below what was given (0.1): the records say otherwise" in told[0]
+    assert not any("what was given" in note for note in found.notes)
 
 
 @pytest.mark.parametrize(
@@ -119,20 +134,22 @@ def test_what_is_known_of_a_parameter_from_elsewhere_takes_the_place_of_its_prio
         (
             "contacts",
             (0.01, 1e-3),
-            "the prior of contacts: there is no such parameter in this fit; it has negative.c",
+            "the prior of contacts: there is no such parameter in this fit, whose names are those of its report",
         ),
         (
             "contact.resistance",
             (-0.01, 1e-3),
-            "-0.01 with a standard deviation of 0.001 is none; the value (ohm) is from 0",
+            "-0.01 with a standard deviation of 0.001 is not possible; the value, in ohm, is from 0",
         ),
         ("contact.resistance", (0.01, 0.0), "the deviation above 0."),
+        ("contact.resistance", (13.4, 0.5), "the value, in ohm, is from 0 to 0."),
+        ("negative.rate", (np.inf, 0.1), "the value, in factor, is above 0"),
         (
             "negative.rate",
             (0.0, 0.1),
-            "the value (factor) is above 0, the deviation (of its logarithm) above 0",
+            "the value, in factor, is above 0, the deviation of its natural logarithm above 0",
         ),
-        ("negative.full_stoichiometry", (0.97, 0.01), "the value (1) is from -inf to 0.95"),
+        ("negative.full_stoichiometry", (0.97, 0.01), "the value, in 1, is from 0 to 0.95"),
     ],
 )
 def test_a_prior_that_no_parameter_can_have_is_told(start, records, name, prior, sentence):
