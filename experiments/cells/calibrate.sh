@@ -28,7 +28,8 @@ panasonic_25degc() {
 # Spectra of two other LG 18650HG2 from 5 to 45 degC (Planden & Lukow 2021, Battery Testing Consortium,
 # github.com/Oxford-Brookes-HVES/BTC) cross the real axis at 13.4 mohm that do not change with temperature and 1.6 mohm at
 # 25 degC that do, with 17 kJ/mol (12 to 21: 12.6 to 13.7). Those cells are 20.2 mohm at 1 Hz and 25 degC, where this one
-# answers a step of its first drive with 17.6 within a second: 2.6 are of another holder, or another cell.
+# answers a step of its first drive with 17.6 within a second: 2.6 are counted as another holder's. Of the deviation 0.5
+# is of the fit, 0.5 of the energy, and 1.0 (a convention) of what of those 2.6 may be no holder's.
 hg2_contacts=contact.resistance=0.0108:0.0012
 hg2() {
     p=$data/lg_18650hg2
