@@ -284,6 +284,22 @@ def test_harm_counts_as_far_as_the_start_of_a_record_left_out_is_known(cell, few
     )  # begins where the rest of its record ends
 
 
+def test_models_are_held_against_each_other_on_all_rows_where_a_lag_shows(cell, few):
+    time = np.arange(0.0, 1800.0, 0.1)
+    rng = np.random.default_rng(0)
+    current = cell.nominal_capacity_ah * np.repeat(0.5 + 0.5 * rng.standard_normal(1800), 10)
+    voltage = simulate(cell, time, current, 0.9).voltage_v
+    late = np.append(voltage[:1], voltage[:-1]) + 1e-3 * rng.standard_normal(len(time))
+    records = [Measurement(time, current, late, name=name) for name in ("one", "two")]
+    problem = InverseProblem(cell, prepare_all(cell, records, 0.9, 0.0), few)
+    assert len(problem.records[0].thin) < 0.2 * len(time)  # means over seconds
+    whole = left_out_errors(problem, blocks_of(problem), None)
+    run = problem.run(problem.records[0].data, 0.9, (), problem.records[0].hold)
+    assert whole.by_record == pytest.approx([np.sqrt(np.mean((late - run.voltage_v) ** 2))] * 2)
+    seen_v = problem.measured - problem.predict({"soc0": {"0": 0.9, "1": 0.9}})
+    assert whole.by_record[0] > 1.5 * np.sqrt(np.mean(seen_v**2))
+
+
 def test_a_hypothesis_is_put_where_the_data_without_a_part_put_it(path):
     fold = path.blocks.folds["end"][0]
     values = values_without(path.problem, path.blocks, path.chosen, fold)
