@@ -195,7 +195,7 @@ def free_parameters(
     return tuple(out)
 
 
-def with_priors(free: Sequence[Free], priors: Mapping[str, Prior]) -> tuple[Free, ...]:
+def with_priors(free: Sequence[Free], priors: Mapping[str, tuple[float, float]]) -> tuple[Free, ...]:
     """The parameters with what is known of some from elsewhere in place of their own priors.
 
     Raises InputError for a name that is none of them, and for a value that none of them has.
@@ -207,7 +207,7 @@ def with_priors(free: Sequence[Free], priors: Mapping[str, Prior]) -> tuple[Free
                 f"the prior of {name}: there is no such parameter in this fit, whose names are those of its report "
                 f"(activation energies where records span more than {SPAN_K:g} K){did_you_mean(name, by_name)}"
             )
-        by_name[name] = _with_prior(by_name[name], prior)
+        by_name[name] = _with_prior(by_name[name], Prior(*prior))
     return tuple(by_name.values())
 
 

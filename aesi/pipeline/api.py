@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.calibration import Calibration, Conditions, Prior
+from aesi.calibration import Calibration, Conditions
 from aesi.calibration import calibrate as fit_cell
 from aesi.calibration.start import sized
 from aesi.data.read import Reading, examined, read
@@ -143,7 +143,7 @@ def calibrate(
         dates or {},
         as_of,
         model or given.model,
-        priors={name: Prior(*prior) for name, prior in (priors or {}).items()},
+        priors=priors or {},
     )
     found = fit_cell(declared, measurements, conditions)
     return replace(found, notes=(*effects_left(given), *found.notes))

@@ -126,13 +126,12 @@ def calibrate(
     temperatures = options.by_file("--temperature", temperature, data)
     days, day = options.dates(dates, data), options.day("--as-of", as_of)
     ends = options.by_file("--until", until, data)
-    spectra, known = options.spectra(impedance), options.priors(prior)
+    spectra, priors = options.spectra(impedance), options.priors(prior)
     options.say_reading(data)
-    from aesi.calibration import Conditions, Prior
+    from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request
     from flows.jobs.calibration import calibrate as flow
 
-    priors = {name: Prior(*told) for name, told in known.items()}
     conditions = Conditions(soc0, temperatures, days, day, model, priors=priors)
     request = Request(conditions, spectra, posterior, seed, title)
     records = options.measurements(data, reading, hold, ends)

@@ -32,7 +32,7 @@ class Conditions:
     same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
     charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
     of a full discharge.
-    priors : by parameter as the report names it, in place of those that every cell has.
+    priors : of parameters as the report names them, in place of those that every cell has; a `Prior` or its two values.
     """
 
     soc0: float | None = None
@@ -41,4 +41,4 @@ class Conditions:
     as_of: date | None = None
     physics: ModelName | None = None
     same_cell: bool = False
-    priors: Mapping[str, Prior] = field(default_factory=dict)
+    priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -97,9 +97,9 @@ def _left_out_residuals(
     record = problem.records[k]
     index = None if len(problem.records) > 1 else k
     state = ModelState(problem)
-    if one is not None:
-        state = ModelState(problem, values_without(problem, blocks, one, fold), one.hypothesis)
     try:
+        if one is not None:
+            state = ModelState(problem, values_without(problem, blocks, one, fold), one.hypothesis)
         whole, seen = (state.simulated(record, index, thin) for thin in (False, True))
     except AesiError:
         return np.full(1, np.inf), np.full(np.count_nonzero(out), np.inf)

@@ -38,8 +38,8 @@ FIRST_LOOK = 1
 what it approximates, no names explain, and looking for two and three of them takes most of the time. They are looked
 for where one explains the data, where none could, or where the porous electrode needs names, too: before that one is
 searched for them, since it could only be believed with as few. A lag and a contact at 10 Hz on a blind case took 119 s
-so and 233 s in the other order, a triple 37 and 112; of 23 blind cases all answer the same, with 0.6 to
-1.1 times the simulations."""
+so and 233 s in the other order, a triple 37 and 112; of 23 blind cases all answer the same, with 0.6 to 1.1 times the
+simulations."""
 ArchiveOf = Callable[[InverseProblem, Archive | None], Archive]
 """The archive of a problem with one model of the cell, which knows that of the same case with the other one."""
 
