@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import date
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -29,6 +29,7 @@ from scipy.special import ndtr, ndtri
 from aesi.calibration.records.prepared import Prepared
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, BoolArray
+from aesi.physics.cell.health import day_of
 
 SLOW_SD, LOADED_SD = 0.03, 0.002
 """Of the logarithm of the capacity of a record's cell over the file's, without dates. Slow records are there for the
@@ -75,7 +76,8 @@ class Ageing:
         check_dates([r.name for r in records], dates)
         if as_of is not None and not dates:
             raise DataError(f"--as-of {as_of}: no record has a date; give theirs, --date FILE=YYYY-MM-DD.")
-        days, as_of = [_day(dates.get(r.name)) for r in records], _day(as_of)
+        days = [day_of(dates[r.name]) if r.name in dates else None for r in records]
+        as_of = None if as_of is None else day_of(as_of)
         told = [d for d in days if d is not None]
         if as_of is not None and not min(told) <= as_of <= max(told):
             raise DataError(
@@ -141,11 +143,6 @@ def _silicon(records: Sequence[Prepared], since: Array, dated: BoolArray) -> Arr
     for i in np.flatnonzero(~slow & dated):
         own[i] = [np.interp(since[i], at, column) for column in known.T]
     return own
-
-
-def _day(given: date | None) -> date | None:
-    """A moment is a date to Python, and two of one day are less than a day apart, or minus one."""
-    return given.date() if isinstance(given, datetime) else given
 
 
 def _size(z: Array) -> Array:

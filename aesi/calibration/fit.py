@@ -35,6 +35,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
+from aesi.physics.cell.health import day_of
 from aesi.physics.depletion import ran_out
 from aesi.records import Measurement
 
@@ -86,9 +87,14 @@ def calibrate(
     scaled = jacobian * weights[:, None]
     covariance = np.linalg.inv(scaled.T @ scaled)
     left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
-    shares = capacities(model, x)
+    shares, days = capacities(model, x), conditions.dates
     return Calibration(
-        cell=replace(found, fitted_with=model.physics, capacity_shares=tuple(shares.items())),
+        cell=replace(
+            found,
+            fitted_with=model.physics,
+            capacity_shares=tuple(shares.items()),
+            tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
+        ),
         declared=cell,
         parameters=intervals(model, x, covariance),
         undetermined=undetermined(model, scaled),

@@ -21,6 +21,7 @@ from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.belongs import check_measured
+from aesi.physics.cell import Soh
 from aesi.pipeline.calibrate import check_records, effects_left
 from aesi.pipeline.discovery.cases import MOST_ROWS
 from aesi.pipeline.discovery.discover import Case, run_case
@@ -51,7 +52,7 @@ def discover(
     only: str | Sequence[str] = (),
     without: str | Sequence[str] = (),
     model: ModelName | None = None,
-    soh: float | None = None,
+    soh: Soh | None = None,
     good: Data = (),
     out: str | PathLike[str] | None = None,
     progress: Progress | None = None,
@@ -67,7 +68,7 @@ def discover(
     effect_files : Python files with effects of your own; they are run, so name only files that you trust.
     only, without : ids of effects that alone are tried, or that are not; what else they stand for is held.
     model : "espm" or "dfn" for every hypothesis; None takes the porous electrode where it differs notably.
-    soh : share of the cell file's capacity that the cell had then; None takes all of it.
+    soh : share of the cell file's capacity that the cell had then, or the day of the test; None takes all of it.
     good : measurements of the same cell that are known to be good: what is sought is what `data` have beside them.
     out : a folder for discovery.json, report.html and model/, and for fits, so that an interrupted search goes on.
 

@@ -13,6 +13,7 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics import Cell, ModelName, impedance
+from aesi.physics.cell import Soh
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import of_another_model, without_energies
@@ -47,7 +48,7 @@ def impedance_file(
     temperature_degc: float = 25.0,
     effects: Sequence[ActiveEffect] = (),
     model: ModelName | None = None,
-    soh: float | None = None,
+    soh: Soh | None = None,
     say_notes: SayNotes | None = None,
 ) -> ComplexArray:
     """Write frequency_hz, z_real_ohm, z_imag_ohm to `out`, and return the impedance (n,) ohm.
@@ -55,8 +56,8 @@ def impedance_file(
     cell : a BPX file, or a folder of a saved model, whose effects are taken.  effects : added to those.
     frequencies : LOW:HIGH:N in Hz, log-spaced, or a CSV with a column frequency_hz.
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
-    soh : share of the file's capacity that the cell had then; None takes all of it.  say_notes : is given a sentence
-    where the model has no double layer, and frequencies at which that shows.
+    soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
+    say_notes : is given a sentence where the model has no double layer, and frequencies at which that shows.
     """
     declared = declared_model(cell).with_soh(soh)
     hz = read_frequencies(frequencies)

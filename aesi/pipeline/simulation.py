@@ -20,6 +20,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
+from aesi.physics.cell import Soh
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.start.open_circuit import GIVEN_SD
 from aesi.pipeline.notes import of_another_model, temperature_sentence, without_energies
@@ -46,14 +47,14 @@ class ProfileRequest:
     `assumed_hold` says for a measurement, and for a prediction the saved model's.
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
-    soh : share of the file's capacity that the cell had then; None takes all of it.
+    soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
     """
 
     soc0: float | None = None
     hold: Hold | None = None
     reading: Reading | None = None
     self_heating: bool = False
-    soh: float | None = None
+    soh: Soh | None = None
 
 
 def simulate_file(

@@ -23,7 +23,7 @@ def batch(
     cell: Annotated[
         Path | None, typer.Option("--cell", help="BPX file of every cell that names none of its own.")
     ] = None,
-    soh: options.Soh = None,
+    soh: options.SohOption = None,
     holdout: Annotated[
         float,
         typer.Option(min=0.05, max=0.9, help="Last share of the data kept back, where no test is named."),
@@ -51,7 +51,14 @@ def batch(
     from flows.jobs.batch import batch as run
 
     rows = run(
-        source, out, cell, Settings(holdout, max_effects, seed, reading), workers, runner, address, soh
+        source,
+        out,
+        cell,
+        Settings(holdout, max_effects, seed, reading),
+        workers,
+        runner,
+        address,
+        options.state_of_health(soh),
     )
     if all(row["status"] == "failed" for row in rows):
         raise InputError(f"no cell of {source} could be used; {out / 'summary.csv'} says why.")

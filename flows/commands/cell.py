@@ -22,7 +22,7 @@ def simulate(
     current: Annotated[Path, typer.Option(help="CSV with time_s, current_a[, temperature_degc].")],
     out: Annotated[Path, typer.Option(help="CSV to write: time, current, voltage and states.")],
     soc0: options.Soc0 = None,
-    soh: options.Soh = None,
+    soh: options.SohOption = None,
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     hold: options.HoldOption = None,
@@ -33,7 +33,7 @@ def simulate(
     outputs.check_table(out, [cell, current])
     from aesi.pipeline.simulation import ProfileRequest, simulate_file
 
-    asked = ProfileRequest(soc0, hold, reading, self_heating, soh)
+    asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh))
     added = options.added_effects(effect, effect_file)
     run = simulate_file(cell, current, out, asked, added, model, options.say_notes)
     from aesi.over_time import extent
@@ -53,7 +53,7 @@ def predict(
         bool, typer.Option("--measured", help="Use the measured voltage: one step ahead, not free run.")
     ] = False,
     soc0: options.Soc0 = None,
-    soh: options.Soh = None,
+    soh: options.SohOption = None,
     hold: options.HoldOption = None,
     self_heating: options.SelfHeating = False,
 ) -> None:
@@ -61,7 +61,7 @@ def predict(
     outputs.check_table(out, [model, current])
     from aesi.pipeline.simulation import ProfileRequest, predict_file
 
-    asked = ProfileRequest(soc0, hold, reading, self_heating, soh)
+    asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh))
     rows = predict_file(model, current, out, asked, measured, options.say_notes)
     regime = "one step ahead" if measured else "free run"
     typer.echo(f"{out}: {rows:,} rows, {regime}", err=True)
@@ -151,7 +151,7 @@ def impedance(
     effect: options.Effects = None,
     effect_file: options.EffectFiles = None,
     model: options.ModelOption = None,
-    soh: options.Soh = None,
+    soh: options.SohOption = None,
 ) -> None:
     """The physics model in the frequency domain, at rest."""
     outputs.check_table(out, [cell, Path(frequencies)])
@@ -165,7 +165,7 @@ def impedance(
         temperature_degc,
         options.added_effects(effect, effect_file),
         model,
-        soh,
+        options.state_of_health(soh),
         options.say_notes,
     )
     typer.echo(
@@ -200,7 +200,7 @@ def discover(
         ),
     ] = None,
     soc0: options.Soc0 = None,
-    soh: options.Soh = None,
+    soh: options.SohOption = None,
     holdout: Annotated[
         float | None,
         typer.Option(
@@ -269,7 +269,7 @@ def discover(
         only=only or [],
         without=without or [],
         model=model,
-        soh=soh,
+        soh=options.state_of_health(soh),
     )
     options.say_notes(note for m in case.records for note in m.notes)
     flow(case, out, prefect)

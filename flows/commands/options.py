@@ -16,6 +16,7 @@ from aesi.errors import CellError, InputError
 if TYPE_CHECKING:
     from aesi.data.reading import Reading
     from aesi.physics import ActiveEffect
+    from aesi.physics.cell import Soh
     from aesi.records import Hold, Measurement, Spectrum
 
 Value = TypeVar("Value")
@@ -39,28 +40,36 @@ def share(option: str) -> Callable[[float | None], float | None]:
     return checked
 
 
-def _share_of_health(value: float | None) -> float | None:
+def _known_health(text: str | None) -> str | None:
     """Lets a state of health through.  Raises InputError, naming the option, for one that is none."""
-    if value is not None:
-        from aesi.physics.cell.parts import checked_soh
+    state_of_health(text)
+    return text
 
-        try:
-            checked_soh(value)
-        except CellError as error:
-            raise InputError(f"--soh {value:g}: {error}") from None
-    return value
+
+def state_of_health(text: str | None) -> Soh | None:
+    """`--soh SHARE` or `--soh YYYY-MM-DD`.  Raises InputError, naming the option, for what is neither."""
+    if text is None:
+        return None
+    from aesi.physics.cell.health import read_soh
+
+    try:
+        return read_soh(text)
+    except CellError as error:
+        raise InputError(f"--soh {text}: {error}") from None
 
 
 Soc0 = Annotated[
     float | None,
     typer.Option("--soc0", callback=share("--soc0"), help="State of charge at the first row, from 0 to 1."),
 ]
-Soh = Annotated[
-    float | None,
+SohOption = Annotated[
+    str | None,
     typer.Option(
         "--soh",
-        callback=_share_of_health,
-        help="State of health: share of the cell file's capacity that the cell had when this was measured.",
+        callback=_known_health,
+        metavar="<share|YYYY-MM-DD>",
+        help="State of health: share of the cell file's capacity that the cell had when this was measured, or the day "
+        "of that, where the file was calibrated with dates.",
     ),
 ]
 Effects = Annotated[

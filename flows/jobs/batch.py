@@ -23,6 +23,7 @@ from flows.evaluation.spread import in_processes, on_dask
 from flows.jobs.run_session import tracked_job
 
 if TYPE_CHECKING:
+    from aesi.physics.cell import Soh
     from flows.tracking.tracker import Tracker
 
 Runner = Literal["local", "dask"]
@@ -36,7 +37,7 @@ def batch(
     workers: int = 2,
     runner: Runner = "local",
     address: str | None = None,
-    soh: float | None = None,
+    soh: Soh | None = None,
 ) -> list[dict[str, Any]]:
     """Run the jobs of a folder or table; the rows of the summary, which is written anew after each.
 

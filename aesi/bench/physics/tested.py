@@ -1,12 +1,7 @@
 """When measured records were tested, and the state of health that a calibration gives their cell for that day.
 
-A cell that is tested for weeks ages on the way, so that a record is of the capacity of its day and not of the file's.
-The records of a calibration each have a share of the file's capacity (`Cell.capacity_shares`); between two of them it
-is taken to fall evenly with the days, before the first and after the last to stay,
-
-    soh(t) = soh_k + (soh_{k+1} - soh_k) (t - t_k)/(t_{k+1} - t_k)                                             (1)
-
-Leaves out that cells age by use more than by days, and whatever a record itself would say of its cell's capacity.
+It is what `Cell.soh_on` says; records of the days before the first and after the last that it knows are taken as of
+these.
 Dates of the Panasonic NCR18650PF are those in the names of its published files, of the LG 18650HG2 the first time stamp
 of its published files; of 25degC_la92, mixed1 to mixed3, 40degC_la92 and 0degC_mixed1 the day of the tests of the same
 series beside them. They belong to the data, as temperatures do, and nothing was fitted to choose them.
@@ -15,8 +10,6 @@ series beside them. They belong to the data, as temperatures do, and nothing was
 from __future__ import annotations
 
 from datetime import date
-
-import numpy as np
 
 from aesi.physics import Cell
 
@@ -60,14 +53,8 @@ TESTED = {
 
 def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
     """State of health (1) of the cell of a set on the day of a record; None where no day or no share is known."""
-    days = TESTED.get(data, {})
-    known = {name: share for name, share in cell.capacity_shares if name in days}
-    if record not in days or not known:
+    day = TESTED.get(data, {}).get(record)
+    known = [one for _, one in cell.tested_on]
+    if day is None or not known:
         return None
-    told = sorted((_ordinal(days[name]), share) for name, share in known.items())
-    at, shares = np.array(told).T
-    return float(np.interp(_ordinal(days[record]), at, shares))
-
-
-def _ordinal(day: str) -> int:
-    return date.fromisoformat(day).toordinal()
+    return cell.soh_on(min(max(date.fromisoformat(day), min(known)), max(known)))

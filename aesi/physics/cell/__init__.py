@@ -1,6 +1,17 @@
 """A cell as its BPX file declares it."""
 
 from aesi.physics.cell.cell import Cell, initial_soc
-from aesi.physics.cell.parts import CellParameters, Electrode, Electrolyte, Separator, checked_soh
+from aesi.physics.cell.health import Soh, checked_soh, read_soh
+from aesi.physics.cell.parts import CellParameters, Electrode, Electrolyte, Separator
 
-__all__ = ["Cell", "CellParameters", "Electrode", "Electrolyte", "Separator", "checked_soh", "initial_soc"]
+__all__ = [
+    "Cell",
+    "CellParameters",
+    "Electrode",
+    "Electrolyte",
+    "Separator",
+    "Soh",
+    "checked_soh",
+    "initial_soc",
+    "read_soh",
+]

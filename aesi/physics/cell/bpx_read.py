@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from datetime import date, datetime
 from os import PathLike
 from typing import Any
 
@@ -23,6 +24,7 @@ from aesi.physics.cell.parts import (
     HEAT_TRANSFER,
     NO_FILM,
     RATE_FACTORS,
+    TESTED_ON,
     THERMAL_CONDUCTIVITY,
     UNITY,
     CellParameters,
@@ -87,7 +89,8 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         thermal_conductivity_w_m_k=_own_number(user, THERMAL_CONDUCTIVITY, where) or None,
         heat_transfer_w_m2_k=_optional(thermal, HEAT_TRANSFER),
         contact_resistance_ohm=_own_number(user, CONTACT_RESISTANCE, where),
-        capacity_shares=_shares(user, where),
+        capacity_shares=_by_record(user, CAPACITY_SHARES, where),
+        tested_on=_tested_on(user, where),
         fitted_with=_fitted_with(user, where),
         name=str(header.get("Title") or "cell"),
         description=str(header.get("Description") or ""),
@@ -139,15 +142,27 @@ def _fitted_with(user: Fields, where: str) -> str:
     return "".join(marked)
 
 
-def _shares(user: Fields, where: str) -> tuple[tuple[str, float], ...]:
-    shares = user.get(CAPACITY_SHARES)
-    if shares is None:
+def _by_record(user: Fields, field: str, where: str) -> tuple[tuple[str, float], ...]:
+    numbers = user.get(field)
+    if numbers is None:
         return ()
-    if not isinstance(shares, Mapping):
+    if not isinstance(numbers, Mapping):
+        raise CellError(f"{where}: User-defined: {field} = {numbers!r} has to hold a number for each record.")
+    return tuple((str(name), _own_number(numbers, name, where)) for name in numbers)
+
+
+def _tested_on(user: Fields, where: str) -> tuple[tuple[str, date], ...]:
+    return tuple((name, _day(number, name, where)) for name, number in _by_record(user, TESTED_ON, where))
+
+
+def _day(number: float, name: str, where: str) -> date:
+    text = f"{number:.10g}"
+    try:
+        return datetime.strptime(text if len(text) == len("20181113") else "", "%Y%m%d").date()
+    except ValueError:
         raise CellError(
-            f"{where}: User-defined: {CAPACITY_SHARES} = {shares!r} has to hold a number for each record."
-        )
-    return tuple((str(name), _own_number(shares, name, where)) for name in shares)
+            f"{where}: User-defined: {TESTED_ON}: {name} = {text} is no day; 13 November 2018 is 20181113."
+        ) from None
 
 
 def _electrode(fields: Fields, user: Fields, side: str, where: str) -> Electrode:

@@ -16,6 +16,7 @@ from aesi.physics.cell.parts import (
     FILM_RESISTANCES,
     FITTED_WITH,
     RATE_FACTORS,
+    TESTED_ON,
     THERMAL_CONDUCTIVITY,
     CellParameters,
 )
@@ -24,6 +25,7 @@ from aesi.physics.cell.relations import LEAST_TRANSPORT, WORKING_SPAN, LookupTab
 OWN_FIELDS = {
     CONTACT_RESISTANCE,
     CAPACITY_SHARES,
+    TESTED_ON,
     THERMAL_CONDUCTIVITY,
     *(
         field

@@ -18,6 +18,7 @@ from aesi.physics.cell.parts import (
     FILM_RESISTANCES,
     HEAT_TRANSFER,
     RATE_FACTORS,
+    TESTED_ON,
     THERMAL_CONDUCTIVITY,
     CellParameters,
     Electrode,
@@ -95,7 +96,7 @@ def check_values(cell: CellParameters, where: str) -> None:
 
 
 def _check_own_fields(cell: CellParameters, what: str) -> None:
-    """Contacts, films and rate factors, and the capacities of records."""
+    """Contacts, films and rate factors, and the capacities and days of records."""
     # A cell whose contacts alone took it from one cut-off to the other at 1C would be of no use, whatever its size.
     # Those of the shipped files take 0.001 to 0.02 of that window, and 1.5 to 20 times it where they are in milliohms.
     drop_v = cell.contact_resistance_ohm * cell.nominal_capacity_ah
@@ -117,6 +118,12 @@ def _check_own_fields(cell: CellParameters, what: str) -> None:
             raise CellError(
                 f"{what}: {CAPACITY_SHARES}: {name} = {share:g} is no share of the file's capacity; 95 % is 0.95."
             )
+    without = [name for name, _ in cell.tested_on if name not in dict(cell.capacity_shares)]
+    if without:
+        raise CellError(
+            f"{what}: {TESTED_ON}: {without[0]} has no share of the capacity; give it one in {CAPACITY_SHARES!r}, or "
+            "take its day out."
+        )
 
 
 def _check_capacity(cell: CellParameters, where: str) -> None:

@@ -14,6 +14,7 @@ from aesi.physics.cell.parts import (
     HEAT_TRANSFER,
     NO_FILM,
     RATE_FACTORS,
+    TESTED_ON,
     THERMAL_CONDUCTIVITY,
     UNITY,
     CellParameters,
@@ -86,6 +87,7 @@ def _own_fields(cell: CellParameters) -> dict[str, Any]:
         THERMAL_CONDUCTIVITY: cell.thermal_conductivity_w_m_k,
         **{field: float(model == cell.fitted_with) for model, field in FITTED_WITH.items()},
         CAPACITY_SHARES: dict(cell.capacity_shares),
+        TESTED_ON: {name: int(f"{day:%Y%m%d}") for name, day in cell.tested_on},
     }
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
         if electrode.rate_factor != UNITY:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from datetime import date
 from typing import Any, Self, TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from aesi.constants import FARADAY_C_MOL, SECONDS_PER_HOUR
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
+from aesi.physics.cell.health import Soh, checked_soh, day_of, shares_by_day
 from aesi.physics.cell.relations import Constant, Relation
 
 Soc = TypeVar("Soc", float, Array)
@@ -29,6 +31,8 @@ HEAT_TRANSFER = "Heat transfer coefficient [W.m-2.K-1]"
 FITTED_WITH = {model: f"Fitted with {model}" for model in ("espm", "dfn")}
 """Fields of `fitted_with`, one of them 1: the standard takes numbers there, and reads words as formulas."""
 CAPACITY_SHARES = "Capacity share by record"
+TESTED_ON = "Day of test by record [YYYYMMDD]"
+"""The fields of `capacity_shares` and `tested_on` in the user-defined section; days as numbers, see `FITTED_WITH`."""
 FILM_RESISTANCES = {side: f"{side} electrode film resistance [Ohm.m2]" for side in ("Negative", "Positive")}
 FILM_ENERGIES = {
     side: f"{side} electrode film resistance activation energy [J.mol-1]" for side in ("Negative", "Positive")
@@ -121,11 +125,6 @@ class Balance:
         return self.ocp_p(theta_p) - self.ocp_n(theta_n)
 
 
-LEAST_SOH, MOST_SOH = 0.2, 1.5
-"""Cells are followed to half of their capacity, seldom further: less than a fifth is a slip of the point, and the model
-a shell. A file may be of an aged cell; beyond the other end it is of another. Conventions."""
-
-
 @dataclass(frozen=True)
 class CellParameters:
     """Everything a simulation needs to know about a cell; `aesi.Cell` adds how it is read and written.
@@ -136,6 +135,7 @@ class CellParameters:
     contact_resistance_ohm : in series with the whole cell; that of metal, the same at any temperature.
     fitted_with : "espm" or "dfn", the model that the parameters were fitted with, where they were.
     capacity_shares : (record, share of this capacity that the cell had then), of the records of that fit.
+    tested_on : (record, day of its test), of those that have one.
     unread : sentences on what the file declares and no simulation takes, as a hysteresis or a state of ageing.
     """
 
@@ -160,6 +160,7 @@ class CellParameters:
     contact_resistance_ohm: float = 0.0
     fitted_with: str = ""
     capacity_shares: tuple[tuple[str, float], ...] = ()
+    tested_on: tuple[tuple[str, date], ...] = ()
     name: str = "cell"
     description: str = ""
     references: str = ""
@@ -235,12 +236,32 @@ class CellParameters:
         """A copy with fields of the electrolyte replaced."""
         return replace(self, electrolyte=replace(self.electrolyte, **changes))
 
-    def with_soh(self, soh: float) -> Self:
-        """The cell at a state of health: this share of its capacity left, see `with_material`.
+    def with_soh(self, soh: Soh) -> Self:
+        """The cell at a state of health: this share of its capacity left, or that of a day, see `with_material`.
 
-        Raises CellError, as `checked_soh` does.
+        Raises CellError, as `checked_soh` and `soh_on` do.
         """
-        return self.with_material(checked_soh(soh))
+        checked = checked_soh(soh)
+        return self.with_material(self.soh_on(checked) if isinstance(checked, date) else checked)
+
+    def soh_on(self, day: date) -> float:
+        """Share of its file's capacity that the cell had on a day, by the records that it was fitted to (`health`).
+
+        Raises CellError where none of these has a date, and for a day before the first or after the last of them.
+        """
+        days, shares = shares_by_day(self.capacity_shares, dict(self.tested_on))
+        if not days:
+            raise CellError(
+                f"the state of health of {day}: the file of {self.name} knows no day of its cell; give the share of "
+                "its capacity that was left, or calibrate it with the dates of its records."
+            )
+        at = day_of(day)
+        if not days[0] <= at <= days[-1]:
+            raise CellError(
+                f"the state of health of {at}: the file of {self.name} knows its cell from {days[0]} to {days[-1]}; "
+                "give the share of its capacity that was left."
+            )
+        return float(np.interp(at.toordinal(), [known.toordinal() for known in days], shares))
 
     def with_material(self, share: float) -> Self:
         """The cell with this share of its active material and of the lithium in it, in both electrodes alike: the
@@ -249,16 +270,6 @@ class CellParameters:
         return self.with_negative(c_max_mol_m3=n.c_max_mol_m3 * share).with_positive(
             c_max_mol_m3=p.c_max_mol_m3 * share
         )
-
-
-def checked_soh(soh: float) -> float:
-    """The state of health, a share.  Raises CellError where it is outside [`LEAST_SOH`, `MOST_SOH`]."""
-    if not LEAST_SOH <= soh <= MOST_SOH:
-        raise CellError(
-            f"a state of health of {soh:g}: it is the share of the cell file's capacity that the cell had, from "
-            f"{LEAST_SOH:g} to {MOST_SOH:g}; 97 % is 0.97."
-        )
-    return soh
 
 
 def require_positive(what: str, values: Mapping[str, float]) -> None:

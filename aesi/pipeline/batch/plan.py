@@ -18,7 +18,7 @@ from typing import TextIO
 from aesi.data.reading import SUFFIXES
 from aesi.errors import CellError, InputError
 from aesi.numerics.files.contents import contents
-from aesi.physics.cell import checked_soh
+from aesi.physics.cell import Soh, checked_soh, read_soh
 
 CELL_FILES = ("*.bpx.json", "*.json")
 LAID_BESIDE = (".", "~$")
@@ -33,7 +33,8 @@ class Job:
     """One cell and its records.
 
     specimen, at : which physical cell a check-up is of, and when; empty and None where it is none.
-    soh : share of the cell file's capacity that the cell had in its discovery; None for all of it.
+    soh : share of the cell file's capacity that the cell had in its discovery, or the day of the test; None for all of
+    it.
     """
 
     name: str
@@ -43,7 +44,7 @@ class Job:
     soc0: float | None = None
     specimen: str = ""
     at: float | None = None
-    soh: float | None = None
+    soh: Soh | None = None
 
     def key(self, settings: str) -> str:
         """What identifies the job: the content of its files, what each is for, and the settings it is run with."""
@@ -55,7 +56,7 @@ class Job:
         return sha.hexdigest()[:16]
 
 
-def read_plan(source: Path, cell: Path | None = None, soh: float | None = None) -> tuple[Job, ...]:
+def read_plan(source: Path, cell: Path | None = None, soh: Soh | None = None) -> tuple[Job, ...]:
     """The jobs of a folder or a table.
 
     cell : the BPX file (or model folder) of every job that names none.  soh : of every job that names none.
@@ -199,10 +200,10 @@ def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | Non
             )
         return value
 
-    def health(column: str) -> float | None:
-        value = number(column)
+    def health(column: str) -> Soh | None:
+        text = (row.get(column) or "").strip()
         try:
-            return None if value is None else checked_soh(value)
+            return read_soh(text) if text else None
         except CellError as error:
             raise InputError(f"{table}, line {line}: {column}: {error}") from None
 

@@ -10,6 +10,7 @@ from aesi.data.reading import record_names
 from aesi.errors import ConfigError
 from aesi.physics import ModelName
 from aesi.physics.belongs import check_measured
+from aesi.physics.cell import Soh
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
@@ -37,7 +38,7 @@ def case_of_files(
     only: Sequence[str] = (),
     without: Sequence[str] = (),
     model: ModelName | None = None,
-    soh: float | None = None,
+    soh: Soh | None = None,
 ) -> Case:
     """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
 

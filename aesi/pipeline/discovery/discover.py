@@ -14,6 +14,7 @@ import numpy as np
 
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.numerics.files.whole import write_whole
+from aesi.physics.cell import Soh
 from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
@@ -47,7 +48,7 @@ class Case:
     model : "espm" or "dfn" for every hypothesis; None: that of a saved porous electrode, else what the data ask for.
     holdout : last share of each record that is kept back where there are no tests; None takes `HOLDOUT`.
     max_effects : most that are added; it is said where this is less than usual.
-    soh : share of the cell's capacity that it had then; None takes all of it.
+    soh : share of the cell's capacity that it had then, or the day of the test; None takes all of it.
     good : records of the same cell that are known to be good.
     """
 
@@ -62,7 +63,7 @@ class Case:
     only: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
     model: ModelName | None = None
-    soh: float | None = None
+    soh: Soh | None = None
     good: tuple[Measurement, ...] = ()
 
     def __post_init__(self) -> None:

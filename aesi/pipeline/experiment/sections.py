@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validat
 
 from aesi.data.reading import Reading
 from aesi.physics import ModelName
-from aesi.physics.cell import checked_soh
+from aesi.physics.cell import Soh, checked_soh
 from aesi.records import Hold
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -142,7 +142,7 @@ class CellConfig(Section):
     belongs to the data set.
 
     soc0 : state of charge at the first row; None finds it from the rest voltage.
-    soh : share of the file's capacity that the cell had when it was measured; None takes all of it.
+    soh : share of the file's capacity that the cell had when it was measured, or that day; None takes all of it.
     model : espm, one particle an electrode, or dfn, the porous electrode; None takes that of a saved model, or
     that the file was fitted with, else espm.
     effects : id -> parameters, effects added to the declared cell.  effect_files : Python files that hold effects of
@@ -153,7 +153,7 @@ class CellConfig(Section):
 
     bpx: str = "catalogue"
     soc0: Annotated[float, Field(ge=0, le=1)] | None = None
-    soh: Annotated[float, AfterValidator(checked_soh)] | None = None
+    soh: Annotated[Soh, AfterValidator(checked_soh)] | None = None
     model: ModelName | None = None
     effects: dict[str, dict[str, float]] = {}
     effect_files: tuple[str, ...] = ()

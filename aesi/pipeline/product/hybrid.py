@@ -18,6 +18,7 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_voltage
+from aesi.physics.cell import Soh
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
@@ -61,7 +62,7 @@ class HybridModel:
         parts += [repr(part) for part in (self.correction, self.intervals, self.bands) if part is not None]
         return f"HybridModel({', '.join(parts)})"
 
-    def with_soh(self, soh: float | None) -> Self:
+    def with_soh(self, soh: Soh | None) -> Self:
         """A copy with the cell at a state of health, see `Cell.with_soh`; as it is for None."""
         return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
 

@@ -76,6 +76,7 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         (["discover", "--max-effects", "x"], "--max-effects x: it has to be a valid integer.\n"),
         (["tables", "x", "--format", "xls"], "--format: 'xls' is not one of 'md', 'tex', 'csv'.\n"),
         ([*SIMULATE, "--soh", "95"], "--soh 95: a state of health of 95: it is the share"),
+        ([*SIMULATE, "--soh", "new"], "--soh new: a state of health of 'new': give the share"),
         ([*SIMULATE, "--soc0", "0.9", "--soc0", "0.8"], "--soc0 is there twice; give it once"),
         (["data", "convert", "a.csv", "--out", "b.csv", "--out", "c.csv"], "--out is there twice"),
         ([*SIMULATE, "--effect", "series_resistance:"], "'' has to read parameter=number"),
@@ -382,6 +383,24 @@ def test_a_state_of_health_makes_the_same_charge_a_larger_share(call, cell, curr
     code, _, err = call(*arguments, tmp_path / "c.csv", "--soh", 80)
     assert code == 2
     assert "a state of health of 80" in err
+
+
+def test_a_state_of_health_is_that_of_the_day_of_a_test(call, cell, current, tmp_path):
+    content = json.loads(cell.read_text())
+    content["Parameterisation"]["User-defined"] = {
+        "Capacity share by record": {"new": 1.0, "old": 0.8},
+        "Day of test by record [YYYYMMDD]": {"new": 20180101, "old": 20180131},
+    }
+    dated = tmp_path / "dated.json"
+    dated.write_text(json.dumps(content))
+    arguments = ("simulate", "--cell", dated, "--current", current, "--soc0", 0.6, "--out")
+    for name, soh in (("share", 0.9), ("day", "2018-01-16")):
+        code, _, err = call(*arguments, tmp_path / name, "--soh", soh)
+        assert code == 0, err
+    assert (tmp_path / "day").read_text() == (tmp_path / "share").read_text()
+    code, _, err = call(*arguments, tmp_path / "c.csv", "--soh", "2018-02-01")
+    assert code == 2
+    assert "knows its cell from 2018-01-01 to 2018-01-31" in err
 
 
 def test_without_a_voltage_the_start_has_to_be_given(call, cell, current, tmp_path):

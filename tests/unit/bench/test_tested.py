@@ -1,6 +1,7 @@
 """The state of health of a measured record's cell on its day, from the records of a calibration."""
 
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -16,9 +17,9 @@ NCR = "panasonic_ncr18650pf"
 @pytest.fixture(scope="module")
 def cell() -> Cell:
     bare = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
-    return replace(
-        bare, capacity_shares=(("25degC_hppc", 1.0), ("0degC_hppc", 0.97), ("n10degC_hppc", 0.952))
-    )
+    shares = (("25degC_hppc", 1.0), ("0degC_hppc", 0.97), ("n10degC_hppc", 0.952))
+    days = tuple((name, date.fromisoformat(TESTED[NCR][name])) for name, _ in shares)
+    return replace(bare, capacity_shares=shares, tested_on=days)
 
 
 def test_a_record_of_the_calibration_has_its_own_share(cell):
@@ -37,8 +38,15 @@ def test_before_the_first_and_after_the_last_it_stays(cell):
 
 def test_where_no_day_or_no_share_is_known_there_is_none(cell):
     assert soh_on_its_day(cell, NCR, "unknown") is None
-    assert soh_on_its_day(replace(cell, capacity_shares=()), NCR, "0degC_hppc") is None
+    assert soh_on_its_day(replace(cell, tested_on=()), NCR, "0degC_hppc") is None
 
 
 def test_every_record_of_a_dated_set_has_its_day():
     assert all(record.name in TESTED[record.data] for record in RECORDS if record.data in TESTED)
+
+
+@pytest.mark.parametrize("name", ["lg_18650hg2", NCR])
+def test_the_days_are_those_of_the_cell_files(name):
+    known = dict(Cell.from_bpx(CELLS / f"{name}.bpx.json").tested_on)
+    assert known
+    assert {record: TESTED[name][record] for record in known} == {k: f"{day}" for k, day in known.items()}

@@ -231,6 +231,8 @@ def test_the_declared_cell_was_judged_on_a_record_of_another_day_with_a_loss_tha
     days = {later.name: date(2024, 1, 1), earlier.name: date(2023, 1, 1)}
     dated = calibrate(start, records, Conditions(dates=days, as_of=date(2023, 1, 1)), evaluations=1)
     assert dated.errors[0].before_v == plain.errors[0].before_v
+    assert dict(dated.cell.tested_on) == days
+    assert plain.cell.tested_on == ()
 
 
 def test_a_cell_calibrated_in_python_did_not_say_which_model_it_was_fitted_with(found, start, records):

@@ -2,6 +2,8 @@
 
 import copy
 import json
+from dataclasses import replace
+from datetime import date, datetime
 from pathlib import Path
 
 import bpx
@@ -10,6 +12,7 @@ import pytest
 
 from aesi.errors import CellError, SimulationError
 from aesi.physics import Cell, initial_soc
+from aesi.physics.cell import read_soh
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
 
@@ -84,12 +87,14 @@ def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
         "Positive electrode double-layer capacity [F.m-2]": 0.3,
         "Fitted with dfn": 1.0,
         "Capacity share by record": {"march": 1.0, "july": 0.9},
+        "Day of test by record [YYYYMMDD]": {"july": 20170731},
     }
     cell = Cell.from_bpx(content)
     assert float(cell.negative.rate_factor(np.array([0.5]))[0]) == pytest.approx(1.25)
     assert cell.positive.double_layer_f_m2 == 0.3
     assert cell.fitted_with == "dfn"
     assert dict(cell.capacity_shares) == {"march": 1.0, "july": 0.9}
+    assert cell.tested_on == (("july", date(2017, 7, 31)),)
     assert Cell.from_bpx(cell.to_bpx()) == cell
 
 
@@ -480,6 +485,67 @@ def test_a_state_of_health_takes_capacity_and_leaves_the_rest_voltages(lg_m50):
     soc = np.linspace(0.0, 1.0, 5)
     assert np.array_equal(aged.rest_voltage_v(soc), lg_m50.rest_voltage_v(soc))
     assert lg_m50.with_soh(1.0) == lg_m50
+
+
+@pytest.fixture
+def dated(lg_m50):
+    shares = (("begin", 1.02), ("again", 1.0), ("cold", 0.97), ("undated", 0.5), ("end", 0.952))
+    days = (("begin", 11), ("again", 11), ("cold", 20), ("end", 30))
+    return replace(lg_m50, capacity_shares=shares, tested_on=tuple((k, date(2017, 3, d)) for k, d in days))
+
+
+def test_a_day_has_the_mean_share_of_its_records(dated):
+    assert dated.soh_on(date(2017, 3, 11)) == pytest.approx(1.01)
+
+
+def test_between_two_days_the_share_runs_evenly(dated, lg_m50):
+    expected = 0.97 - 0.018 * 4 / 10
+    assert dated.soh_on(date(2017, 3, 24)) == pytest.approx(expected)
+    assert dated.soh_on(datetime(2017, 3, 24, 23, 59)) == pytest.approx(expected)
+    assert dated.with_soh(date(2017, 3, 24)).capacity_ah == pytest.approx(expected * lg_m50.capacity_ah)
+
+
+@pytest.mark.parametrize("day", [date(2017, 3, 10), date(2017, 3, 31)])
+def test_what_the_file_does_not_know_of_a_day_is_not_made_up(dated, day):
+    with pytest.raises(CellError, match=r"knows its cell from 2017-03-11 to 2017-03-30; give the share"):
+        dated.with_soh(day)
+
+
+def test_a_file_without_days_says_so(lg_m50):
+    with pytest.raises(
+        CellError, match=r"2017-03-24: the file of .* knows no day of its cell; give the share"
+    ):
+        lg_m50.with_soh(date(2017, 3, 24))
+
+
+@pytest.mark.parametrize(("text", "soh"), [("0.97", 0.97), (" 1 ", 1.0), ("2018-11-13", date(2018, 11, 13))])
+def test_a_state_of_health_is_read_as_a_share_or_a_day(text, soh):
+    assert read_soh(text) == soh
+
+
+@pytest.mark.parametrize("text", ["", "0,97", "97 %", "2018-13-11", "13.11.2018"])
+def test_what_is_neither_a_share_nor_a_day_is_refused(text):
+    with pytest.raises(
+        CellError, match=r"give the share of the cell file's capacity .* or the day of the test"
+    ):
+        read_soh(text)
+
+
+@pytest.mark.parametrize(
+    ("days", "sentence"),
+    [
+        ({"july": 170731}, "july = 170731 is no day; 13 November 2018 is 20181113"),
+        ({"july": 20171331}, "july = 20171331 is no day"),
+        ({"august": 20170831}, "august has no share of the capacity; give it one in"),
+        (20170731, "has to hold a number for each record"),
+    ],
+)
+def test_days_that_are_none_are_named(content, days, sentence):
+    content["Parameterisation"]["User-defined"] = {
+        "Capacity share by record": {"july": 0.9},
+        "Day of test by record [YYYYMMDD]": days,
+    }
+    assert sentence in fault(content)
 
 
 @pytest.mark.parametrize("soh", [0.0, -0.1, 0.001, 97.0, float("nan")])

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from datetime import date
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -82,11 +83,11 @@ def test_a_trend_over_different_cell_files_was_taken_for_ageing(tmp_path):
 def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
     touched(tmp_path / "s.csv")
     table = tmp_path / "plan.csv"
-    table.write_text("name,data,soh\nold,s.csv,0.8\nnew,s.csv,\n")
-    old, new = read_plan(table, CELL, 0.95)
-    assert (old.soh, new.soh) == (0.8, 0.95)
+    table.write_text("name,data,soh\nold,s.csv,0.8\nnew,s.csv,\nof a day,s.csv,2018-11-13\n")
+    old, new, dated = read_plan(table, CELL, 0.95)
+    assert (old.soh, new.soh, dated.soh) == (0.8, 0.95, date(2018, 11, 13))
     assert old.key("") != read_plan(table, CELL, 0.95)[1].key("")
-    assert [job.soh for job in read_plan(table, CELL)] == [0.8, None]
+    assert [job.soh for job in read_plan(table, CELL)] == [0.8, None, date(2018, 11, 13)]
     with pytest.raises(InputError, match="a state of health of 95"):
         read_plan(table, CELL, 95.0)  # at once, not cell by cell
 
@@ -100,6 +101,7 @@ def test_a_state_of_health_is_a_cell_s_own_or_that_of_all(tmp_path):
         ("name,data\na,s.csv\na,s.csv\n", "named 'a'"),
         ("name,data,at\na,s.csv,old\n", "is no number"),
         ("name,data,soc0\na,s.csv,90\n", "line 2: soc0 = 90: a state of charge is a share"),
+        ("name,data,soh\na,s.csv,new\n", "line 2: soh: a state of health of 'new': give the share"),
         ("name,data,soh\na,s.csv,80\n", "line 2: soh: a state of health of 80: it is the share"),
         ("name,data,specimen,at\na,s.csv,one,\n", "line 2: a check-up has a specimen and an at"),
         ("name,data,at\na,s.csv,3\n", "line 2: a check-up has a specimen and an at"),

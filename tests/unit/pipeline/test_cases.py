@@ -1,5 +1,7 @@
 """Cases of the tracer from experiment files."""
 
+import json
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -148,3 +150,17 @@ def test_an_experiment_has_a_cell_at_its_state_of_health(tmp_path):
     record = write_record(tmp_path)
     whole, aged = (load(experiment(record, cell=c)).cell for c in (cell, cell | {"soh": 0.9}))
     assert aged.capacity_ah == pytest.approx(0.9 * whole.capacity_ah)
+
+
+def test_an_experiment_has_a_cell_of_the_day_of_its_test(tmp_path):
+    content = json.loads(BPX.read_text())
+    content["Parameterisation"]["User-defined"] = {
+        "Capacity share by record": {"new": 1.0, "old": 0.9},
+        "Day of test by record [YYYYMMDD]": {"new": 20180101, "old": 20180111},
+    }
+    dated = tmp_path / "dated.json"
+    dated.write_text(json.dumps(content))
+    cell = {"bpx": str(dated), "soc0": SOC0, "start": "declared"}
+    record = write_record(tmp_path)
+    whole, aged = (load(experiment(record, cell=c)).cell for c in (cell, cell | {"soh": date(2018, 1, 6)}))
+    assert aged.capacity_ah == pytest.approx(0.95 * whole.capacity_ah)

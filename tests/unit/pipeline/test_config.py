@@ -58,6 +58,7 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
         ({"library": {"p_c": [2, 1]}}, "[2, 1] is empty; give low <= high"),
         ({"search": {"timeout_s": float("nan")}}, "search.timeout_s"),
         ({"conformal": {"alpha": 1.5}}, "conformal.alpha = 1.5"),
+        ({"cell": {"soh": "new"}}, "cell.soh"),
         ({"cell": {"soh": 80}}, "a state of health of 80: it is the share of the cell file's capacity"),
         ({"data": {"kind": "catalogue", "train": ["a"], "test": ["b"]}}, "needs `set`"),
         ({"data": {"kind": "files"}}, "experiment: data: give `train` and `test`"),
