@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from aesi.numerics.typing import Array, IntArray
 
-CACHE_SLOTS = 64
-"""Lengths of a step whose weights are kept at a time."""
+CACHE_SLOTS = 61
+"""Lengths of a step whose weights are kept at a time, each where its nanoseconds leave this remainder: a prime, since
+whole milliseconds are all multiples of 64. With 64 a record whose steps alternate made its weights anew at each."""
 VOLTAGE_ROWS = 7
 """Rows of the output of every path: voltage, surface stoichiometries (n, p), salt at the collectors (n, p) and mean
 stoichiometries (n, p). Further states stand below."""
