@@ -39,7 +39,7 @@ measured to, by the zero of a cycler that whole cycles tell to 0.2 %: more is be
 With 3 % for all, a calibrated LG 18650HG2 as it is misses its fitted 1C discharge and drive by 119 and 4.9 mV, and the
 1C discharge of two days later, fitted to nothing, by 10.3; with these by 17.6, 8.7 and 14.1."""
 MOST_AGE = 0.3
-"""Of the same: no record is further from the file. A convention that nothing ends on. Descents scale
+"""Of the same: no record without a date is further from the file. A convention that nothing ends on. Descents scale
 their steps by bounds: with and without it they end elsewhere along what data at one temperature leave open."""
 LOSS_SD = 0.0075
 """Of (1), a day's: 4 % in a month, 7 % in three. The eight steps between the fitted records of an LG 18650HG2 and a
@@ -48,7 +48,7 @@ with 0.5 %). With steps of either sign the HG2 had gained 5 % in a 1C discharge 
 age took what the cold does, and as the file is simulated the discharge was missed by 264 mV, with losses by 9.3; by a
 fit without it, whose two C/20 at other temperatures then bend the energies less, by 92 mV instead of 1.6 V."""
 MOST_DEVIATIONS = 4.0
-"""A loss lies within this many deviations."""
+"""The working coordinate of a loss lies within this many deviations."""
 
 
 @dataclass(frozen=True, eq=False)

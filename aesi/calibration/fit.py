@@ -124,6 +124,10 @@ def problem(
     )
     for record in records:
         check_voltage(cell, record)
+        if not record.current_a.any():
+            raise DataError(
+                f"{record.name}: no current flows in it, so that it tells no parameter; leave it out."
+            )
     start, notes = (cell, ()) if conditions.same_cell else sized(cell, records)
     zero = zero_of(start, records)
     if not conditions.same_cell:

@@ -150,11 +150,12 @@ def free_parameters(
     most_ohm = (cell.upper_voltage_v - cell.lower_voltage_v) / cell.nominal_capacity_ah
     full = AGED_FULL_SD if same_cell else FULL_SD
     n_full, p_full = cell.negative.theta_max, cell.positive.theta_min
+    most, least = max(FULLEST, n_full), min(1.0 - FULLEST, p_full)  # what a file has is what a cell may have
     out = [
         Free("negative.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
         Free("positive.capacity", 1.0, 0.10, "factor", HALF_CELLS, True),
-        Free("negative.full_stoichiometry", n_full, full["negative"], "1", HALF_CELLS, low=0.0, high=FULLEST),
-        Free("positive.full_stoichiometry", p_full, full["positive"], "1", HALF_CELLS, low=1.0 - FULLEST, high=1.0),
+        Free("negative.full_stoichiometry", n_full, full["negative"], "1", HALF_CELLS, low=0.0, high=most),
+        Free("positive.full_stoichiometry", p_full, full["positive"], "1", HALF_CELLS, low=least, high=1.0),
         Free("negative.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("positive.diffusivity", 1.0, 1.2, "factor", RATES, True),
         Free("negative.rate", 1.0, RATE_SD, "factor", RATES, True),

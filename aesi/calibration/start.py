@@ -25,6 +25,9 @@ OPEN_SHARE = 1e-3
 """Of the largest current of a record: below this no current flows (the relay is open), whatever the cycler reads."""
 FULL_WINDOW_V = 0.15
 """A discharge is a full one if it starts within this of the upper limit and ends within twice this of the lower."""
+ALL_OF_IT = 0.95
+"""Of the charge that a record takes out of a cell at most: where less has left at the lowest voltage, that was a pulse,
+which in the cold reaches the lower limit at any state of charge. A convention."""
 LONG_CHARGE = 0.3
 """Of the capacity: a charge that changes the branch of the hysteresis, where there is one."""
 
@@ -132,5 +135,5 @@ def _full_discharge_ah(cell: Cell, data: Measurement) -> float | None:
     end = int(np.argmin(data.voltage_v))
     if data.voltage_v[end] > cell.lower_voltage_v + 2 * FULL_WINDOW_V:
         return None
-    steps = data.current_a[1 : end + 1] * np.diff(data.time_s[: end + 1])
-    return float(steps.sum()) / SECONDS_PER_HOUR
+    taken_ah = data.discharged_ah("backward")
+    return float(taken_ah[end]) if taken_ah[end] >= ALL_OF_IT * taken_ah.max() else None

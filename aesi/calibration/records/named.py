@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import count
 
 from aesi.errors import DataError
 from aesi.records import Measurement
@@ -25,10 +26,12 @@ def named_apart(
                 raise DataError(
                     f"{option} {name}=...: {counts[name]} records have this name; give each one of its own."
                 )
-    seen: Counter[str] = Counter()
+    taken = {name for name, many in counts.items() if many == 1}
     out = []
     for record in records:
-        seen[record.name] += 1
-        shared = counts[record.name] > 1
-        out.append(replace(record, name=f"{record.name} ({seen[record.name]})") if shared else record)
+        name = record.name
+        if counts[name] > 1:
+            name = next(free for k in count(1) if (free := f"{record.name} ({k})") not in taken)
+            taken.add(name)
+        out.append(record if name == record.name else replace(record, name=name))
     return tuple(out)

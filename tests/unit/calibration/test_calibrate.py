@@ -11,9 +11,10 @@ import pytest
 from aesi.calibration import calibrate
 from aesi.calibration.fit import problem
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
+from aesi.calibration.parameters import free_parameters
 from aesi.calibration.posterior import sampled
 from aesi.calibration.records.conditions import Conditions, Prior
-from aesi.calibration.start import size_assumed
+from aesi.calibration.start import size_assumed, sized
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
 from aesi.records import Measurement
@@ -269,3 +270,30 @@ def test_a_state_of_charge_given_of_a_record_that_begins_with_a_charge_was_taken
     assert fitted.start.basis == "rest"
     assert fitted.start.soc == pytest.approx(0.98, abs=0.01)  # 0.08 and 4.5 h at C/5
     assert any("given is that of its first row, which is not fitted" in note for note in notes)
+
+
+def test_a_pulse_that_touched_the_lower_limit_half_way_was_taken_for_a_full_discharge(start):
+    time = np.arange(0.0, 6000.0, 2.0)
+    pulse = (time >= 600.0) & (time < 620.0)
+    current = np.where(time < 600.0, 0.0, np.where(pulse, 4.0, 0.33) * start.nominal_capacity_ah)
+    voltage = np.where(pulse, 2.6, 3.9 - 4e-5 * time)
+    voltage[:300] = 4.2
+    cold = Measurement(time, current, voltage, name="cold", hold="backward")
+    assert sized(start, [cold])[0] == start
+    whole = replace(cold, voltage_v=np.where(pulse, 2.9, np.linspace(4.2, 2.55, len(time))))
+    assert sized(start, [whole])[0].capacity_ah == pytest.approx(whole.discharged_ah("backward")[-1])
+
+
+def test_a_file_that_is_fuller_than_most_cells_started_from_another_one(start):
+    positive = replace(start.positive, theta_min=0.004)
+    full = {p.name: p for p in free_parameters(replace(start, positive=positive), 0.0)}[
+        "positive.full_stoichiometry"
+    ]
+    assert full.value(0.0) == 0.004
+    assert full.value(1e-3) > 0.004
+
+
+def test_a_record_without_a_current_is_refused_by_its_name(start, records):
+    rest = replace(records[0], current_a=np.zeros(len(records[0])), name="rest")
+    with pytest.raises(DataError, match="rest: no current flows in it"):
+        calibrate(start, [records[0], rest])

@@ -33,3 +33,8 @@ def test_what_is_said_of_a_name_that_two_share_is_refused():
 def test_two_records_of_one_name_each_have_their_own_share_of_the_capacity(start, records):
     model, _ = problem(start, [replace(one, name="drive") for one in records], Conditions())
     assert len(capacities(model, np.zeros(model.layout.size))) == len(records)
+
+
+def test_a_number_that_another_record_has_in_its_name_is_not_given_twice():
+    given = [record(name) for name in ("p", "p", "p (1)")]
+    assert [one.name for one in named_apart(given, {})] == ["p (2)", "p (3)", "p (1)"]

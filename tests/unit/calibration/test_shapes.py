@@ -8,6 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aesi.calibration.shapes import Shapes
+from aesi.physics.cell.relations import Constant
+from aesi.physics.start.open_circuit import OpenCircuit
+from aesi.records import Measurement
 
 INNER = np.linspace(0.002, 0.998, 4001)
 
@@ -58,3 +61,23 @@ def test_a_potential_that_rises_in_the_start_file_falls_in_what_is_fitted(start)
     ocp = flat.on(cell, np.zeros(flat.size)).positive.ocp(INNER)
     assert (np.diff(wavy.ocp(INNER)) > 0.0).any()
     assert (np.diff(ocp) < 0.0).all()
+
+
+def test_a_corrected_entropy_is_what_its_knots_say_and_warms_the_voltage(start):
+    entropic = Shapes.over(start, span_k=20.0).entropic
+    z = np.array([1.0, 2.0, 0.5, 1.0, 3.0])
+    theta = np.linspace(entropic.low, entropic.high, 50)
+    added = entropic.added(Constant(0.0), z)
+    assert added(theta) == pytest.approx(entropic.columns(theta) @ z, abs=1e-5)
+    assert (added(theta) > 0.0).all()
+    cell = replace(start, positive=replace(start.positive, entropic=added))
+    warm, cold = (OpenCircuit(cell, at_rest(degc)).voltage_at(0.5) for degc in (45.0, 5.0))
+    assert warm - cold == pytest.approx(40.0 * float(added(np.array([middle(cell)]))[0]), rel=1e-3)
+
+
+def at_rest(degc):
+    return Measurement([0.0, 1.0], [0.0, 0.0], [3.7, 3.7], [degc, degc])
+
+
+def middle(cell):
+    return cell.stoichiometries(0.5)[1]
