@@ -173,7 +173,7 @@ class Problem:
             [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
         )
         block = _checked_block(options.block, spans)
-        cut = left_out_pieces(spans, options.fold, options.cuts)
+        cut = _checked_pieces(left_out_pieces(spans, options.fold, options.cuts), options.fold)
         soc = np.concatenate([record.soc[:-1] for record in train])
         temperature = temperatures(train)
         region = TrainedRegion.of(rows[:, 1:], soc, temperature)
@@ -272,6 +272,16 @@ class Problem:
         return np.asarray(
             self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
         )
+
+
+def _checked_pieces(cut: tuple[Span, ...], fold: int | None) -> tuple[Span, ...]:
+    """What is left out in turn.  Raises DataError for pieces so long that there is but one."""
+    if len(cut) < 2:
+        raise DataError(
+            f"pieces of {fold} rows to leave out in turn leave no other training row to fit; lower search.fold, or "
+            "leave it out."
+        )
+    return cut
 
 
 def _checked_block(asked: int | None, spans: Sequence[Span]) -> int:

@@ -290,3 +290,10 @@ def test_one_lucky_validation_drive_does_not_choose_alone(split):
     for loss, on_pieces, model in zip(found.valid_losses, left_out, found.ensembles, strict=True):
         free = mser(valid.error_v[1:], model.free_run(valid).error_v[1:])
         assert loss == pytest.approx(0.5 * (on_pieces + 1.0 - free / 100.0), abs=1e-3)
+
+
+def test_pieces_so_long_that_nothing_is_left_to_fit_are_refused(split):
+    longest = max(len(record.error_v) for record in split.train)
+    alone = Split(split.train[:1], split.valid, split.test)
+    with pytest.raises(DataError, match="leave no other training row to fit; lower search.fold"):
+        Problem.build(alone, Options(p_c=1, d=2, mixed=False, resamples=5, block=60, fold=longest))
