@@ -79,6 +79,8 @@ class Parameter:
                 "the standard deviation of a logarithm is that of a cell of any size; leave capacity_power out."
             )
         self.check("default", self.default)
+        if self.neutral is not None and not self.log:
+            self.check("neutral", self.neutral)
 
     def check(self, name: str, value: float) -> float:
         """Return `value` if it lies within the bounds, or is the nought that the lower one stands for.

@@ -18,7 +18,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
-from aesi.tracer.case.free_parameter import by_owner
+from aesi.tracer.case.free_parameter import OF_ONE_RECORD, by_owner
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
 from aesi.tracer.decide.beside import gathered_beside
@@ -197,11 +197,16 @@ def inverse_problem(
 ) -> InverseProblem:
     """What `discover` searches; the arguments are its own.
 
-    Raises DataError where a record has too little to decide anything.
+    Raises DataError where a record has too little to decide anything, and for the id of an effect that is taken.
     """
     records = prepare_all(cell, measurements, soc0, holdout, given, good)
     for record in records:
         check_record(cell, record)
+    taken = next((name for name in effects if name in OF_ONE_RECORD), None)
+    if taken is not None:
+        raise DataError(
+            f"an effect cannot have the id {taken!r}, which records have their own of; give it another."
+        )
     there = {active.id for active in given} - _own(effects)
     tried = {name: effect for name, effect in effects.items() if name not in there}
     return InverseProblem(cell, records, tried, fixed=tuple(given), model=model)
@@ -223,7 +228,7 @@ class _Spent:
         if self.progress is None:
             return
         left = one.point.residual_v - one.point.jacobian_v @ one.score.shift
-        values = by_owner(one.placed)
+        values = by_owner(one.placed, one.hypothesis)
         tried = TriedHypothesis(
             one.hypothesis, problem.trust, gain, rms(left), one.score.delta_v, values, one.simulations
         )

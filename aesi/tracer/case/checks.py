@@ -13,11 +13,12 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.records import Run
 from aesi.records.checked import row_words
+from aesi.tracer.case.blocks import BLOCKS
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord
 
 FEWEST_SAMPLES = 200
-"""Fewest samples of a record shorter than ten times SHORTEST_S."""
+"""Fewest samples of a record shorter than ten times SHORTEST_S; of a longer one as many as there are blocks."""
 SHORTEST_S = 300.0
 """Shortest record: in less, neither diffusion nor the slope of the open-circuit voltage shows."""
 LEAST_C_RATE = 0.02
@@ -46,12 +47,13 @@ def check_record(cell: Cell, record: PreparedRecord) -> None:
     thin = record.thin
     until = min(record.fit_until_s, thin.time_s[-1])
     duration = float(until - thin.time_s[0])
-    if (record.n_fit < FEWEST_SAMPLES and duration < 10 * SHORTEST_S) or duration < SHORTEST_S:
+    fewest = FEWEST_SAMPLES if duration < 10 * SHORTEST_S else BLOCKS
+    if record.n_fit < fewest or duration < SHORTEST_S:
         kept_back = len(thin) - record.n_fit
         beside = f" ({kept_back} more kept back for the test)" if kept_back else ""
         raise DataError(
             f"{record.name}: {duration:.0f} s and {record.n_fit} rows to fit{beside} are too little to decide; "
-            f"give at least {FEWEST_SAMPLES} rows over {SHORTEST_S:.0f} s for the fit."
+            f"give at least {fewest} rows over {max(SHORTEST_S, np.floor(duration)):.0f} s for the fit."
         )
     rate = float(np.max(np.abs(thin.current_a[: record.n_fit]))) / cell.nominal_capacity_ah
     if rate < LEAST_C_RATE:

@@ -195,16 +195,23 @@ def capacity_share(record: int, sd: float) -> FreeParameter:
     )
 
 
-def values_of(free: Sequence[FreeParameter], x: Array) -> dict[str, dict[str, float]]:
-    """owner -> name -> value of the coordinates (n_free,)."""
-    return by_owner({one.key: one.value(float(v)) for one, v in zip(free, x, strict=True)})
+def values_of(
+    free: Sequence[FreeParameter], x: Array, hypothesis: Sequence[str]
+) -> dict[str, dict[str, float]]:
+    """owner -> name -> value of the coordinates (n_free,) of a hypothesis."""
+    return by_owner({one.key: one.value(float(v)) for one, v in zip(free, x, strict=True)}, hypothesis)
 
 
-def by_owner(placed: Mapping[tuple[str, str], float]) -> dict[str, dict[str, float]]:
-    """owner -> name -> value, of values by (owner, name)."""
+def by_owner(
+    placed: Mapping[tuple[str, str], float], hypothesis: Sequence[str]
+) -> dict[str, dict[str, float]]:
+    """owner -> name -> value, of values by (owner, name); an effect of the hypothesis that has no parameters has none
+    of these, and acts all the same."""
     out: dict[str, dict[str, float]] = {}
     for (owner, name), value in placed.items():
         out.setdefault(owner, {})[name] = value
+    for effect in hypothesis:
+        out.setdefault(effect, {})
     return out
 
 

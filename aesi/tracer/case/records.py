@@ -201,7 +201,8 @@ def prepare_test(
     """A record that chooses nothing.
 
     Where it is the continuation of a record that fits have seen, or has such a record as its beginning, the model
-    runs through that and only what comes after is judged.
+    runs through that and only what comes after is judged; not where one of the two has a temperature and the other
+    none, which no simulation could run at.
     """
     for index, known in enumerate(seen):
         n = len(known)
@@ -210,21 +211,21 @@ def prepare_test(
             whole = prepare(cell, data, soc0, 0.0, given=given, shared=True)
             return replace(whole, lead_rows=n, continues=index)
         gap = float(data.time_s[0] - known.time_s[-1])
-        if 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s))):
+        alike = (data.temperature_degc is None) == (known.temperature_degc is None)
+        if alike and 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s))):
             whole = prepare(cell, _joined(known, data), soc0, 0.0, given=given, shared=True)
             return replace(whole, lead_rows=n, continues=index)
     return prepare(cell, data, soc0, 0.0, given=given, shared=True)
 
 
 def _joined(first: Measurement, second: Measurement) -> Measurement:
-    temperatures = (first.temperature_degc, second.temperature_degc)
-    both = all(t is not None for t in temperatures)
+    temperatures = [t for t in (first.temperature_degc, second.temperature_degc) if t is not None]
     return replace(
         second,
         time_s=np.concatenate([first.time_s, second.time_s]),
         current_a=np.concatenate([first.current_a, second.current_a]),
         voltage_v=np.concatenate([first.voltage_v, second.voltage_v]),
-        temperature_degc=np.concatenate([t for t in temperatures if t is not None]) if both else None,
+        temperature_degc=np.concatenate(temperatures) if temperatures else None,
     )
 
 

@@ -66,7 +66,9 @@ def _slopes_v(
 
     def voltage_v(x: Array) -> Array | None:
         try:
-            return problem.run(course, soc0, problem.active(values_of(fit.free, x)), "linear").voltage_v
+            return problem.run(
+                course, soc0, problem.active(values_of(fit.free, x, fit.hypothesis)), "linear"
+            ).voltage_v
         except AesiError:
             return None
 

@@ -48,7 +48,7 @@ class FittedHypothesis:
     @property
     def values(self) -> dict[str, dict[str, float]]:
         """owner -> name -> value."""
-        return values_of(self.free, self.point.x)
+        return values_of(self.free, self.point.x, self.hypothesis)
 
     @property
     def placed(self) -> dict[tuple[str, str], float]:
@@ -87,7 +87,7 @@ class HypothesisFitter:
         key = x.tobytes()
         if key not in self._errors:
             self.simulations += 1
-            predicted = self.problem.predict(values_of(self.free, x))
+            predicted = self.problem.predict(values_of(self.free, x, self.hypothesis))
             self._errors[key] = None if predicted is None else self.problem.measured - predicted
         return self._errors[key]
 
@@ -114,7 +114,7 @@ class HypothesisFitter:
         def error_v(moved: Array) -> Array | None:
             nonlocal simulations
             simulations += 1
-            predicted = self.problem.predict(values_of(self.free, moved), only)
+            predicted = self.problem.predict(values_of(self.free, moved, self.hypothesis), only)
             return None if predicted is None else self.problem.measured[rows] - predicted
 
         slope = slope_within(error_v, x, residual[rows], j, (self.low[j], self.high[j]), STEP)

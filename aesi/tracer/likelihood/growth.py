@@ -94,7 +94,7 @@ class Grown:
     @property
     def values(self) -> dict[str, dict[str, float]]:
         """owner -> name -> value, with what the parent has on a hard bound."""
-        return by_owner({**self.held, **self.placed})
+        return by_owner({**self.held, **self.placed}, self.hypothesis)
 
 
 class EffectGrowth:
@@ -149,7 +149,7 @@ class EffectGrowth:
 
     def _simulated_error_v(self, u: Array) -> Array | None:
         self.simulations += 1
-        predicted = self.problem.predict({**self.held, **values_of(self.added, u)})
+        predicted = self.problem.predict({**self.held, **values_of(self.added, u, (self.effect,))})
         return None if predicted is None else self.problem.measured - predicted
 
     def jacobian(self, u: Array, e: Array) -> Array | None:

@@ -38,7 +38,6 @@ def features(run: Run) -> dict[str, Array]:
     sign = np.sign(i) * (np.abs(i) > REST_SHARE)
     turn = [_filtered(t, sign, tau) for tau in TURNS_S]
     throughput = np.concatenate([[0.0], np.cumsum(np.abs(current[1:]) * np.diff(t))])
-    throughput /= throughput[-1] + 1e-12
     electrolyte = run.series["c_e0"] - run.series["c_eL"]
     surface = [run.series[n] for n in ("c_sn", "c_sp")]
     return {

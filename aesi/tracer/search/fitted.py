@@ -94,7 +94,7 @@ def values_without(
     where all data put it and updates of the slopes that it has there."""
     fitter = HypothesisFitter(problem, blocks, fit.hypothesis)
     x = fitter.descend(fit.point.x, fit.score.size, 0, fit.point.jacobian_v, fold)
-    return values_of(fit.free, x)
+    return values_of(fit.free, x, fit.hypothesis)
 
 
 def _slopes_v(near: Explanation, free: Sequence[FreeParameter]) -> Array | None:

@@ -13,7 +13,7 @@ from aesi.tracer.case.blocks import blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
 from aesi.tracer.decide.carry_over import LeftOut, left_out_errors, range_fault
-from aesi.tracer.decide.confidence import FrequencyMap, fitted_map
+from aesi.tracer.decide.confidence import HIGHEST, FrequencyMap, fitted_map
 from aesi.tracer.decide.evidence import consistent, named_options
 from aesi.tracer.decide.verdict import (
     Thresholds,
@@ -430,9 +430,9 @@ def test_the_map_gives_the_frequency_that_it_was_fitted_to():
     margins = rng.normal(0.0, 2.0, 3000)
     right = rng.random(3000) < 1.0 / (1.0 + np.exp(-(0.5 + 0.8 * margins)))
     found = fitted_map(margins.tolist(), right.tolist())
-    truth = FrequencyMap(0.5, 0.8, 0)
     for margin in (-2.0, 0.0, 2.0):
-        assert found.frequency(margin) == pytest.approx(truth.frequency(margin), abs=0.04)
+        assert found.frequency(margin) == pytest.approx(1.0 / (1.0 + np.exp(-(0.5 + 0.8 * margin))), abs=0.04)
+    assert FrequencyMap(0.5, 0.8, 0).frequency(20.0) == HIGHEST
 
 
 def test_an_archive_knows_how_the_current_runs_between_rows(path):
@@ -474,6 +474,21 @@ def test_a_name_that_says_little_more_than_none_has_a_small_margin():
     chosen, base = told(("a",), 2.0), told((), 0.0)
     path = SimpleNamespace(chosen=chosen, explanations=lambda: [base, chosen], steps=(), admission_nats=0.5)
     assert look_alikes(path, Thresholds(), 1e-3) == ((), pytest.approx(2.0))
+
+
+def test_a_rival_that_lags_makes_the_margin_its_nats_over_their_deviation():
+    """Over three blocks of 10, 8 and 6 nats more the difference of 24 scatters by 2 * 3**0.5, 3.46."""
+    chosen, other, base = (
+        told(("a",), 60.0, (10.0, 8.0, 6.0)),
+        told(("b",), 36.0, (0.0, 0.0, 0.0)),
+        told((), 0.0),
+    )
+    for one in (chosen, other):
+        one.score.log_density["block"] = one.score.log_density["block"][:3]
+    path = SimpleNamespace(
+        chosen=chosen, explanations=lambda: [base, chosen, other], steps=(), admission_nats=3.0
+    )
+    assert look_alikes(path, Thresholds(), 1e-3) == ((), pytest.approx(24.0 / (2.0 * 3**0.5)))
 
 
 @pytest.mark.parametrize(("left_v", "group"), [(1.1e-3, (("a", "b"),)), (2e-3, ())])

@@ -7,6 +7,7 @@ import pytest
 
 from aesi.errors import DataError, SimulationError
 from aesi.physics import simulate
+from aesi.physics.effect import Contribution, Effect
 from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content, found_model
 from aesi.records import Measurement
@@ -127,6 +128,7 @@ def test_test_files_choose_nothing(cell, few, make):
     ("change", "sentence"),
     [
         (lambda m: m.take(slice(0, 120)), "too little to decide"),
+        (lambda m: replace(m.take(slice(400, 430)), time_s=200.0 * np.arange(30)), "give at least 24 rows"),
         (lambda m: replace(m, current_a=0.001 * m.current_a), "does not respond"),
         (lambda m: replace(m, voltage_v=m.voltage_v - 2.0), "outside the range"),
         (lambda m: replace(m, current_a=m.current_a + 300.0), "state of charge"),
@@ -219,3 +221,22 @@ def test_a_candidate_that_the_test_part_cannot_be_simulated_with_has_no_error_th
     found = discover(cell, [make()], soc0=0.9, effects=few)
     assert {c.test_rmse_v for c in found.candidates} == {None}
     assert {c["test_rmse_mv"] for c in discovery_content(found)["candidates"]} == {None}
+
+
+def test_an_effect_without_parameters_never_acted_in_a_search(cell, few, make):
+    def drop(trace):
+        return Contribution(-2e-4 * trace.current_a)
+
+    fixed = Effect("fixed_contact", "physics", "A contact of 0.2 mohm.", on_voltage=drop)
+    data = make((fixed.activate(),))
+    found = discover(
+        cell, [data], soc0=0.9, effects={"fixed_contact": fixed, "ocv_hysteresis": few["ocv_hysteresis"]}
+    )
+    assert (found.verdict.word, found.verdict.effects) == ("found", ("fixed_contact",))
+    assert found.written == {"fixed_contact": {}}
+
+
+@pytest.mark.parametrize("name", ["soc0", "capacity_share"])
+def test_an_effect_named_like_what_records_have_of_their_own_is_refused(cell, few, make, name):
+    with pytest.raises(DataError, match=f"cannot have the id '{name}'"):
+        discover(cell, [make()], soc0=0.9, effects={name: replace(few["series_resistance"], id=name)})

@@ -89,9 +89,10 @@ def test_values_and_coordinates_are_one_anothers_inverse():
     free = [*of_effect("a", {"resistance_ohm": OHM}, 5.0), state_of_charge(0, 0.5, 0.02)]
     known = {("a", "resistance_ohm"): 2e-3}
     x = coordinates_of(free, known, elsewhere=1.0)
-    assert values_of(free, x) == {
+    assert values_of(free, x, ("a", "without")) == {
         "a": {"resistance_ohm": pytest.approx(2e-3)},
         "soc0": {"0": pytest.approx(0.52)},
+        "without": {},
     }
 
 
@@ -125,3 +126,8 @@ def test_a_file_of_a_measured_cell_is_believed_where_its_instruments_are_not():
             assert exact == (pytest.approx(0.1 * tight) if effect is declared else tight)
     open_here = {n for n, p in declared.parameters.items() if own_sd("tight", declared, p, 1.0) is not None}
     assert open_here
+
+
+def test_a_parameter_that_vanishes_outside_its_bounds_is_refused():
+    with pytest.raises(ParameterError, match=r"neutral = 0 1 is outside \[0.5, 2\]"):
+        Parameter(1.0, "1", bounds=(0.5, 2.0), source="test", neutral=0.0)

@@ -148,6 +148,9 @@ def test_a_continuation_is_judged_only_after_what_was_seen(cell, degc):
         assert len(record.data) == 900
         assert record.continues == 0
         assert (record.data.temperature_degc is None) == (degc is None)
+    column = np.full(300, 20.0) if degc is None else None
+    apart = prepare_test(cell, replace(rest, temperature_degc=column), [seen], 0.9)
+    assert (apart.lead_rows, apart.continues) == (0, None)  # what was measured in one of them is not left out
     other = replace(rest, time_s=rest.time_s + 5000.0, current_a=np.zeros(300))
     stranger = prepare_test(cell, other, [seen], None)
     assert (stranger.lead_rows, stranger.continues) == (0, None)
