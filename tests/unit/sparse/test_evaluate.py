@@ -295,5 +295,5 @@ def test_one_lucky_validation_drive_does_not_choose_alone(split):
 def test_pieces_so_long_that_nothing_is_left_to_fit_are_refused(split):
     longest = max(len(record.error_v) for record in split.train)
     alone = Split(split.train[:1], split.valid, split.test)
-    with pytest.raises(DataError, match="leave no other training row to fit; lower search.fold"):
+    with pytest.raises(DataError, match=r"leave no other training row to fit; lower search\.fold"):
         Problem.build(alone, Options(p_c=1, d=2, mixed=False, resamples=5, block=60, fold=longest))
