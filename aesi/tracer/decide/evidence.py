@@ -139,7 +139,7 @@ def _best_explanation(problem: InverseProblem, searches: _Searches) -> tuple[Pat
         path, verdict = _with_one_cause(path, verdict, archive, thresholds)
     if verdict.word != "unknown":
         path, verdict = _sharpened(problem, path, verdict, archive, thresholds)
-    if verdict.word == "none" and path.problem.trust == "tight":  # own parameters may hide an effect
+    if verdict.word == "none":  # own parameters may hide an effect
         exact = searches.at(problem, "exact")
         found = exact, judged(exact, thresholds)
         if believed((path, verdict), found):

@@ -42,6 +42,13 @@ def test_a_cell_as_declared_lacks_nothing(cell, few, make):
     assert found.after.yardstick.explained_v < 0.5e-3
 
 
+def test_where_nothing_is_named_own_parameters_that_hid_an_effect_are_taken_as_declared(cell, few, make):
+    """The declared parameters, which are right here, are the more plausible anyway; that was no search with them."""
+    asked = []
+    discover(cell, [make()], soc0=0.9, effects=few, progress=asked.append)
+    assert {one.trust for one in asked} == {"tight", "exact"}
+
+
 def test_progress_tells_every_effect_that_was_tried(cell, few, make):
     tried = []
     discover(cell, [make()], soc0=0.9, effects=few, progress=tried.append)
