@@ -54,6 +54,21 @@ class SimulationError(AesiError, RuntimeError):
     """The model cannot be evaluated on this input (a stoichiometry ran out, a solver did not converge)."""
 
 
+class NoNumberError(SimulationError):
+    """A function of a user's own gives no number at these values of its parameters: a search passes them by."""
+
+    exit_code = 2
+
+
+class OwnEffectError(RuntimeError):
+    """A function of a user's own cannot be run, or gives what it may not.
+
+    No AesiError: a search passes those by, and this has to end it.
+    """
+
+    exit_code = 2
+
+
 class FitError(AesiError, RuntimeError):
     """An estimation cannot be carried out on these data."""
 

@@ -230,7 +230,7 @@ def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
     record = Record(np.zeros(1), np.zeros(1), np.array([kelvin]))
     for active in effects:
         if active.effect.on_record is not None:
-            record = active.effect.on_record(record, **active.parameters)
+            record = active.act(active.effect.on_record, record)
     return float(cast(Array, record.temperature_k)[0])
 
 

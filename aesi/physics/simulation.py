@@ -25,7 +25,7 @@ from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
-from aesi.physics.effect import ActiveEffect, Record, Trace, check_contribution, check_row_of
+from aesi.physics.effect import ActiveEffect, Record, Trace, check_states
 from aesi.physics.espm.plain import run_plain, shifted_ocp
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
@@ -174,7 +174,13 @@ def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: 
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
         if model.heat is None and not model.cell.winding_resistance_k_w:
             temperature = None
-    return solve(model, record.time_s, record.current_a, temperature, soc0, hold)
+    warm = None if temperature is None else _own(temperature)
+    return solve(model, _own(record.time_s), _own(record.current_a), warm, soc0, hold)
+
+
+def _own(row: Array) -> Array:
+    """As kernels are compiled for: contiguous, and may be written to, which what effects are given may not."""
+    return np.require(row, float, ["C", "W"])
 
 
 @dataclass(frozen=True)
@@ -234,17 +240,14 @@ def _voltage_effects(
         if active.effect.on_voltage is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
             added = active.act(active.effect.on_voltage, trace)
-            if active.effect.file is not None:
-                check_contribution(active.effect.file, added, trace)
+            check_states(active.effect, added, trace)
             voltage = voltage + added.voltage_v
             series.update(added.series)
     for active in effects:
         if active.effect.on_reading is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
             voltage = active.act(active.effect.on_reading, trace)
-            if active.effect.file is not None:
-                check_row_of(active.effect.file, "on_reading", voltage, trace)
-    return voltage
+    return _own(voltage)
 
 
 def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
@@ -281,7 +284,7 @@ def _soc_from_rest(
     for active in effects:
         if active.effect.on_reading is not None:
             trace = Trace(model, one, one, np.array([rest_voltage_v]), {})
-            true = true - (active.effect.on_reading(trace, **active.parameters) - rest_voltage_v)
+            true = true - (active.act(active.effect.on_reading, trace) - rest_voltage_v)
     cell = model.cell
     rise = (cell.initial_temperature_k if kelvin is None else float(kelvin[0])) - cell.reference_temperature_k
     cell = cell.with_negative(ocp=shifted_ocp(cell.negative, rise))
