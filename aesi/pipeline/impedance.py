@@ -73,11 +73,15 @@ def impedance_file(
 
 
 def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:
-    """Sentences on the effects that act on a record or a reading alone, or on a temperature that is given."""
+    """Sentences on the effects that act on a record or a reading alone, or on a temperature that is given, and on those
+    on the voltage: but for what is `ohmic` by its own word they may go on to answer after the current is there."""
     warm = [one.id for one in effects if one.effect.infers == "temperature"]
     acting = (one for one in effects if one.id not in warm)
     names = [one.id for one in acting if one.effect.on_model is None and one.effect.on_voltage is None]
     said = [f"{', '.join(names)}: of a record, not of the cell, and not in its impedance."] if names else []
+    later = [one.id for one in effects if one.effect.on_voltage is not None and not one.effect.ohmic]
+    if later:
+        said.append(f"{', '.join(later)}: only what it answers to a current at once is in the impedance.")
     if warm:
         said.append(f"{', '.join(warm)}: not in the impedance, which is at the temperature that is given.")
     return said

@@ -81,6 +81,16 @@ def test_a_shift_of_the_temperature_was_left_out_of_an_impedance_without_a_word(
     assert "ambient_temperature: not in the impedance, which is at the temperature that is given." in said
 
 
+def test_what_an_effect_on_the_voltage_answers_later_was_left_out_without_a_word(tmp_path):
+    said = []
+    effects = activated([("ocv_hysteresis", {}), ("film_growth", {}), ("double_layer", {})])
+    cell = CELLS / "nmc_30ah.bpx.json"
+    impedance_file(cell, 0.5, "0.01:10:4", tmp_path / "z.csv", effects=effects, say_notes=said.extend)
+    assert (
+        "ocv_hysteresis, film_growth: only what it answers to a current at once is in the impedance." in said
+    )
+
+
 @pytest.mark.parametrize("text", ["1:1000:100000000", "1:1e30:10"])
 def test_frequencies_without_end_killed_the_process(text):
     with pytest.raises(InputError, match=f"--frequencies {text}: at most 100,000 frequencies up to 1e.09 Hz"):
