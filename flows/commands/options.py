@@ -83,7 +83,8 @@ HoldOption = Annotated[
     typer.Option(
         "--hold",
         help="How the current runs between rows. linear: straight; backward: constant since the row before, as loggers "
-        "write. Without it: backward where rows come more than 5 s apart; what was taken is said.",
+        "write. Without it that of a saved model; elsewhere backward where rows come more than 5 s apart, but linear "
+        "for a profile without a voltage. What was taken is said.",
     ),
 ]
 

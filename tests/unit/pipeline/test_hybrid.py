@@ -222,6 +222,29 @@ def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
         again.predict(data.time_s, data.current_a)
 
 
+def test_a_saved_model_was_simulated_with_another_hold_than_it_was_predicted_with(model, data, tmp_path):
+    folder = replace(model, correction=None, intervals=None, bands=None).save(tmp_path / "model")
+    for name, hold in (("own", None), ("asked", "linear")):
+        said = {}
+        for todo in (simulate_file, predict_file):
+            said[todo] = []
+            data.to_frame().to_csv(tmp_path / "drive.csv", index=False)
+            asked = ProfileRequest(SOC0, hold)
+            todo(
+                folder,
+                tmp_path / "drive.csv",
+                tmp_path / f"{todo.__name__}.csv",
+                asked,
+                say_notes=said[todo].extend,
+            )
+        simulated, predicted = (
+            pd.read_csv(tmp_path / f"{todo.__name__}.csv").voltage_v for todo in (simulate_file, predict_file)
+        )
+        np.testing.assert_allclose(simulated, predicted, atol=1e-8)
+        words = "as declared" if name == "asked" else "since the row before, as the saved model was made"
+        assert all(any(words in note for note in notes) for notes in said.values())
+
+
 @pytest.mark.parametrize("damage", ["missing", "schema", "list", "no parts", "arrays", "part"])
 def test_a_damaged_folder_is_named(model, tmp_path, damage):
     folder = model.save(tmp_path / "model")
