@@ -371,6 +371,17 @@ def test_a_temperature_of_0_in_a_file_was_taken_for_25_degc(content, name):
             r"film resistance \[Ohm.m2\] is -0.01 at a stoichiometry of 0.02; it has to be 0 or more",
         ),
         (
+            {"Negative electrode film resistance [Ohm.m2]": 3.0},
+            r"film resistance .* = 3 takes 4.46 V at 5 A over 3.36 m2 .* 10 Ohm.cm2, is 0.001",
+        ),
+        (
+            {"Negative electrode double-layer capacity [F.m-2]": 2e4},
+            "capacity .* = 20000 is no double layer's; .* 20 uF/cm2 is 0.2",
+        ),
+        ({"Positive electrode double-layer capacity [F.m-2]": 2e-5}, "= 2e-05 is no double layer's"),
+        ({"Thermal conductivity [W.m-1.K-1]": 200.0}, "= 200 is no winding's; .* 200 mW/.m K. is 0.2"),
+        ({"Thermal conductivity [W.m-1.K-1]": 0.002}, "= 0.002 is no winding's"),
+        (
             {"Positive electrode reaction rate factor": 0.0},
             "reaction rate factor is 0 at a stoichiometry of 0; it has to be a positive number",
         ),
