@@ -264,6 +264,39 @@ def test_a_damaged_folder_is_named(model, tmp_path, damage):
         HybridModel.load(folder)
 
 
+@pytest.mark.parametrize(
+    ("file", "changes", "sentence"),
+    [
+        ("model.json", {"dt_s": "one"}, "dt_s = 'one' has to be a positive number of seconds"),
+        ("model.json", {"dt_s": -1.0}, "dt_s = -1.0 has to be a positive number of seconds"),
+        ("model.json", {"hold": "forward"}, "hold = 'forward' is not known; give 'linear' or 'backward'"),
+        ("model.json", {"soc0": 90}, "soc0 = 90 is not a state of charge"),
+        ("model.json", {"model": "spm"}, "model = 'spm' is not known"),
+        ("model.json", {"hold": None}, "model.json lacks 'hold'; save the model again"),
+        ("model.json", {"parts": 3}, "model.json has no list of parts"),
+        ("effects.json", [{"id": "series_resistance"}], "effects.json lacks 'effect'"),
+        ("effects.json", ["series_resistance"], "effects.json is not as it was saved"),
+        (
+            "effects.json",
+            [{"effect": "series_resistance", "parameters": {"resistance_ohm": 99}}],
+            "effects.json: series_resistance: resistance_ohm = 99 ohm is outside",
+        ),
+        ("correction.json", {"terms": "array:none"}, "arrays.npz lacks 'none', which correction.json names"),
+    ],
+)
+def test_a_damaged_file_of_a_model_was_told_without_its_name_or_as_a_bug(
+    model, tmp_path, file, changes, sentence
+):
+    path = model.save(tmp_path / "model") / file
+    if file == "model.json":
+        whole = json.loads(path.read_text()) | changes
+        changes = {key: value for key, value in whole.items() if value is not None}
+    path.write_text(json.dumps(changes))
+    with pytest.raises(InputError, match=sentence) as caught:
+        HybridModel.load(tmp_path / "model")
+    assert str(tmp_path / "model") in str(caught.value)
+
+
 def test_a_record_of_other_sampling_is_loaded_at_the_experiments_step(record):
     config = experiment(record)
     coarse = config.model_copy(update={"data": config.data.model_copy(update={"dt_s": 2.0})})
