@@ -347,10 +347,21 @@ def say_notes(notes: Iterable[str]) -> None:
 
 
 def added_effects(texts: list[str] | None, files: list[Path] | None) -> tuple[ActiveEffect, ...]:
-    """The effects of `--effect id:parameter=value,...`, of the catalogue and of the user's files."""
-    from aesi.physics.effects import activated
+    """The effects of `--effect id:parameter=value,...`, of the catalogue and of the user's files.
 
-    return activated([_effect_values(text) for text in texts or []], files or [])
+    Raises InputError also for a file whose effect no `--effect` names: it would not be simulated.
+    """
+    from aesi.physics.effects import activated, load_effect
+
+    active = activated([_effect_values(text) for text in texts or []], files or [])
+    for file in files or []:
+        own = load_effect(file)
+        if own.id not in {one.id for one in active}:
+            raise InputError(
+                f"--effect-file {file}: its effect is not simulated unless it is named; add --effect {own.id}, or "
+                "leave the file out."
+            )
+    return active
 
 
 def _effect_values(text: str) -> tuple[str, dict[str, float]]:

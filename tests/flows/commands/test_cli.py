@@ -266,6 +266,38 @@ def test_a_folder_given_for_a_record_was_told_as_a_file_that_would_be_lost(call,
     assert (tmp_path / "records" / "new.csv").read_text() == "kept"
 
 
+@pytest.mark.parametrize("option", ["--cell", "--current"])
+def test_a_folder_around_the_output_was_told_as_a_file_that_would_be_lost(
+    call, cell, current, tmp_path, option
+):
+    (tmp_path / "o.csv").write_text("kept")
+    given = {"--cell": cell, "--current": current} | {option: tmp_path}
+    code, _, err = call(
+        "simulate", *(word for pair in given.items() for word in pair), "--out", tmp_path / "o.csv"
+    )
+    assert code == 2
+    assert "holds no model.json, so it is no model" in err or f"{tmp_path} is a folder" in err
+    assert "would be lost" not in err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("simulate", "--current", "i.csv"),
+        ("impedance", "--soc", "0.5", "--frequencies", "1:10:3"),
+        ("impedance", "--soc", "0.5", "--frequencies", "1:10:3", "--effect", "double_layer"),
+    ],
+)
+def test_an_effect_file_that_no_effect_names_was_ignored_without_a_word(call, cell, tmp_path, command):
+    (tmp_path / "mine.py").write_text(
+        '"""Nothing."""\nfrom aesi.physics import Effect\n'
+        'EFFECT = Effect("nothing", "physics", __doc__, on_model=lambda m: m)\n'
+    )
+    code, _, err = call(*command, "--cell", cell, "--out", "o.csv", "--effect-file", tmp_path / "mine.py")
+    assert code == 2
+    assert "not simulated unless it is named; add --effect nothing, or leave the file out" in err
+
+
 @pytest.mark.parametrize("out", ["cells", "cells/found"])
 def test_results_of_a_batch_were_read_as_a_cell_the_next_time(call, tmp_path, out):
     (tmp_path / "cells" / "a").mkdir(parents=True)
