@@ -21,7 +21,7 @@ from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
+from aesi.pipeline.impedance import BAND_HZ, SpectrumError, check_spectra, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -65,7 +65,9 @@ def calibrate_files(
     check_posterior(asked.posterior)
     given = declared_model(cell)
     declared, model = given.cell, conditions.physics or given.model
-    check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    start = sized(declared, measurements)[0]  # the start file may be of another size
+    check_measured(start, measurements)
+    check_spectra(start, asked.impedance)
     found = calibrate(declared, measurements, replace(conditions, physics=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
