@@ -12,6 +12,7 @@ import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
+from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
@@ -50,6 +51,12 @@ class Request:
     posterior: int = 0
     seed: int = 0
     title: str | None = None
+
+
+def check_request(cell: Path, request: Request) -> None:
+    """Raises CellError or InputError, one sentence, for what is asked of a fit and needs no record to be refused."""
+    check_posterior(request.posterior)
+    check_names(declared_model(cell).cell, request.conditions.priors)
 
 
 def calibrate_files(

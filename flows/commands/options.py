@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable
 from datetime import date
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -260,9 +260,13 @@ def priors(pairs: list[str] | None) -> dict[str, tuple[float, float]]:
     for pair in pairs or []:
         name, _, told = (part.strip() for part in pair.partition("="))
         try:
-            value, sd = map(_finite, told.split(":"))
+            value, sd = map(float, told.split(":"))
         except ValueError:
             raise InputError(f"--prior {pair}: has to read NAME=VALUE:SD.") from None
+        if not isfinite(value) or not 0.0 < sd < inf:
+            raise InputError(
+                f"--prior {pair}: VALUE has to be a finite number, and SD, its standard deviation, one above 0."
+            )
         if name in out:
             raise InputError(f"--prior is there twice for {name}; give it once.")
         out[name] = value, sd

@@ -93,6 +93,8 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ([*CALIBRATE, "--data", "./d.csv"], "--data d.csv is there twice; give it once"),
         ([*CALIBRATE, "--impedance", "z.csv"], "There is no file z.csv"),
         ([*CALIBRATE, "--temperature", "e.csv=10"], "--temperature e.csv=...: there is no such record"),
+        ([*CALIBRATE, "--prior", "contact.resistance=nan:0.1"], "VALUE has to be a finite number, and SD,"),
+        ([*CALIBRATE, "--prior", "contact.resistance=0.1:0"], "its standard deviation, one above 0"),
         (["run", "."], ". is a folder; give an experiment file"),
     ],
 )
@@ -329,6 +331,30 @@ def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(
     assert err.endswith("or in the one that AESI_HOME names.\n")
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        (
+            "--prior",
+            "foo=1:0.1",
+            "no such parameter in this fit. There are negative.capacity, positive.capacity,",
+        ),
+        ("--posterior", "2", "--posterior 2: at least 4 samples"),
+    ],
+)
+def test_what_no_fit_can_be_asked_for_was_told_after_it_was_announced(
+    call, cell, tmp_path, option, value, words
+):
+    if option == "--posterior":
+        pytest.importorskip("emcee")
+    code, _, err = call(
+        "calibrate", "--cell", cell, "--data", "none.csv", "--out", tmp_path / "n.json", option, value
+    )
+    assert code == 2
+    assert words in err
+    assert "Fitting" not in err
+
+
 def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
     code, _, err = call(
         "impedance",
@@ -352,8 +378,11 @@ def test_days_of_records_are_read_by_record():
 
 def test_what_is_known_of_parameters_is_read_by_name():
     assert priors(["contact.resistance=0.0134:0.001"]) == {"contact.resistance": (0.0134, 0.001)}
-    for text in ("contact.resistance=0.0134", "0.0134:0.001", "contact.resistance=a:b", "a=1:inf"):
+    for text in ("contact.resistance=0.0134", "0.0134:0.001", "contact.resistance=a:b"):
         with pytest.raises(InputError, match=f"--prior {text}: has to read NAME=VALUE:SD"):
+            priors([text])
+    for text in ("a=1:inf", "a=nan:1", "a=1:-1"):
+        with pytest.raises(InputError, match=f"--prior {text}: VALUE has to be a finite number, and SD"):
             priors([text])
     with pytest.raises(InputError, match="--prior is there twice for a; give it once"):
         priors(["a=1:1", "a=2:1"])

@@ -134,7 +134,7 @@ def test_a_prior_that_the_records_contradict_is_told(start, records, found):
         (
             "contacts",
             (0.01, 1e-3),
-            "the prior of contacts: there is no such parameter in this fit, whose names are those of its report",
+            "there is no such parameter in this fit; did you mean 'contact.resistance'? There are negative.capacity, ",
         ),
         (
             "contact.resistance",
