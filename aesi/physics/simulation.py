@@ -68,7 +68,8 @@ def simulate(
     on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
     "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
     at 10 V per unit of stoichiometry, and `series["depleted"]` is 1 from the first such sample on.
-    model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both.
+    model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both. Without it
+    "espm", also for a cell whose file was fitted with the other (`Cell.fitted_with`), which commands take by default.
     profiles : of "dfn" alone: what runs across the electrodes, see `Run.profiles`.
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.

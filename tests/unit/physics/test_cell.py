@@ -179,6 +179,11 @@ def test_a_single_particle_file_is_refused(content):
     assert "Electrolyte" in fault(content)
 
 
+def test_a_full_cell_under_the_header_of_a_single_particle_was_told_in_words_of_the_schema(content):
+    content["Header"]["Model"] = "SPM"
+    assert 'those of a full cell; write "Model": "SPMe" there, or "DFN".' in fault(content)
+
+
 def test_a_blend_is_refused(content):
     content["Parameterisation"]["Negative electrode"]["Particle"] = {"Primary": {}}
     assert "blend" in fault(content)
@@ -457,6 +462,14 @@ def test_a_file_that_is_no_text_is_refused_in_one_sentence(tmp_path):
     (tmp_path / "record.mpr").write_bytes(bytes(range(256)))
     with pytest.raises(CellError, match=r"record\.mpr is not text .* is it a record\?"):
         Cell.from_bpx(tmp_path / "record.mpr")
+
+
+def test_a_cell_file_in_latin_1_was_taken_for_a_record(content, tmp_path):
+    content["Header"]["Title"] = "Zelle für Prüfstand 3"
+    path = tmp_path / "cell.json"
+    path.write_bytes(json.dumps(content, ensure_ascii=False).encode("latin-1"))
+    with pytest.raises(CellError, match=r"cell\.json is not written in UTF-8, .*; save it as UTF-8\."):
+        Cell.from_bpx(path)
 
 
 @pytest.mark.parametrize(
