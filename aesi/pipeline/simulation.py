@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.constants import MV_PER_V
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
@@ -68,6 +68,9 @@ def simulate_file(
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
+    Beside `temperature_k` stands `temperature_degc`, which files are read by: the case's as the profile has it, else
+    the model's, unless that is the cell file's all along.
+
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     effects : added to those.
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
@@ -101,8 +104,11 @@ def simulate_file(
         used.hold,
         model=used.model,
     )
+    degc = profile.temperature_degc
+    if degc is None and np.any(run.series["temperature_k"] != declared.cell.initial_temperature_k):
+        degc = run.series["temperature_k"] - ZERO_CELSIUS_K
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
-    write_table(out, columns_out)
+    write_table(out, columns_out if degc is None else columns_out | {"temperature_degc": degc})
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     return run
 

@@ -410,6 +410,21 @@ def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
     assert table["soc"][0] == pytest.approx(0.6, abs=1e-3)
 
 
+def test_the_temperature_of_a_simulated_file_was_not_read_again(call, cell, current, tmp_path):
+    warm, own, plain, again = (tmp_path / f"{name}.csv" for name in ("warm", "own", "plain", "again"))
+    pd.read_csv(current).assign(temperature_degc=40.0).to_csv(tmp_path / "i.csv", index=False)
+    simulate = ("simulate", "--cell", cell, "--soc0", 0.8)
+    assert call(*simulate, "--current", tmp_path / "i.csv", "--out", warm)[0] == 0
+    assert call(*simulate, "--current", current, "--out", own, "--self-heating")[0] == 0
+    assert call(*simulate, "--current", current, "--out", plain)[0] == 0
+    assert np.all(pd.read_csv(warm).temperature_degc == 40.0)
+    table = pd.read_csv(own)
+    assert np.allclose(table.temperature_degc, table.temperature_k - 273.15)
+    assert "temperature_degc" not in pd.read_csv(plain)  # it is that of the cell's file
+    assert call(*simulate, "--current", warm, "--out", again)[0] == 0
+    assert np.allclose(pd.read_csv(again).voltage_v, pd.read_csv(warm).voltage_v)
+
+
 def test_a_profile_with_other_headers_is_told_only_of_columns_that_it_has(call, cell, tmp_path):
     path = tmp_path / "bad.csv"
     path.write_text("Time [s],I [A]\n0,0\n1,1\n")
