@@ -6,6 +6,7 @@ sentence and an exit code. An expected failure inside a search is a value, `aesi
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -54,6 +55,21 @@ class SimulationError(AesiError, RuntimeError):
     """The model cannot be evaluated on this input (a stoichiometry ran out, a solver did not converge)."""
 
 
+class NoNumberError(SimulationError):
+    """A function of a user's own gives no number at these values of its parameters: a search passes them by."""
+
+    exit_code = 2
+
+
+class OwnEffectError(RuntimeError):
+    """A function of a user's own cannot be run, or gives what it may not.
+
+    No AesiError: a search passes those by, and this has to end it.
+    """
+
+    exit_code = 2
+
+
 class FitError(AesiError, RuntimeError):
     """An estimation cannot be carried out on these data."""
 
@@ -83,6 +99,6 @@ def wanted(fault: Mapping[str, Any]) -> str:
         return "takes keys with a value each, as in {KEY: VALUE}"
     if fault["type"] in ("bool_parsing", "bool_type"):
         return "has to be true or false"
-    said = fault["msg"].rstrip(".").split(", unable to ")[0].split(", got ")[0]
-    own = said.removeprefix("Input should ")
+    said = fault["msg"].rstrip(".").split(", unable to ")[0].split(", got ")[0].split(" after validation")[0]
+    own = re.sub(r"^\w+ should ", "", said)  # Input, or Tuple, String and other types of Python
     return f"has to {own}" if own != said else said[:1].lower() + said[1:]

@@ -12,7 +12,7 @@ from typing import NoReturn
 
 import typer
 
-from aesi.errors import AesiError
+from aesi.errors import AesiError, OwnEffectError
 from flows.base import environment
 from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
 from flows.commands import batch, bench, cell, data, effects, experiment
@@ -60,7 +60,9 @@ def main() -> NoReturn:
     try:
         with ending_soon_on_interrupt():
             app(args=repeated(sys.argv[1:]))
-    except AesiError as error:
+    except (AesiError, OwnEffectError) as error:
+        if isinstance(error, OwnEffectError) and os.environ.get("AESI_DEBUG"):
+            raise
         _fail(str(error), error.exit_code)
     except MemoryError:
         _fail("out of memory; use fewer library terms, a larger dt_s or fewer workers.", 1)
@@ -75,8 +77,7 @@ def main() -> NoReturn:
     except Exception as error:
         if os.environ.get("AESI_DEBUG"):
             raise
-        told = "; ".join((_first_line(error), *getattr(error, "__notes__", ())))
-        _fail(f"unexpected {type(error).__name__}: {told} (AESI_DEBUG=1 shows where).", 1)
+        _fail(f"unexpected {type(error).__name__}: {_first_line(error)} (AESI_DEBUG=1 shows where).", 1)
     raise SystemExit(0)
 
 

@@ -75,13 +75,13 @@ class Ageing:
         """
         check_dates([r.name for r in records], dates)
         if as_of is not None and not dates:
-            raise DataError(f"--as-of {as_of}: no record has a date; give theirs, --date FILE=YYYY-MM-DD.")
+            raise DataError(f"as of {as_of}: no record has a date; give theirs (--date FILE=YYYY-MM-DD).")
         days = [day_of(dates[r.name]) if r.name in dates else None for r in records]
         as_of = None if as_of is None else day_of(as_of)
         told = [d for d in days if d is not None]
         if as_of is not None and not min(told) <= as_of <= max(told):
             raise DataError(
-                f"--as-of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the "
+                f"as of {as_of}: the dated records are of {min(told)} to {max(told)}, and nothing shows what the "
                 "cell was on another day; give a day from the first to the last of them."
             )
         loaded = [d for r, d in zip(records, days, strict=True) if d is not None and not r.slow]
@@ -155,5 +155,5 @@ def check_dates(names: Sequence[str], dates: Mapping[str, date]) -> None:
     for name in dates:
         if name not in names:
             raise DataError(
-                f"--date {name}=...: there is no such record; there are {', '.join(sorted(names))}."
+                f"the date of {name}: there is no such record; there are {', '.join(sorted(names))}."
             )

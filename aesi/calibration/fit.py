@@ -119,9 +119,7 @@ def problem(
     """What is fitted, and sentences on how it was set up."""
     if not records:
         raise DataError("give at least one record to calibrate with.")
-    records = named_apart(
-        records, {"--temperature": conditions.temperatures_degc, "--date": conditions.dates}
-    )
+    records = named_apart(records, {"temperature": conditions.temperatures_degc, "date": conditions.dates})
     for record in records:
         check_voltage(cell, record)
         if not record.current_a.any():

@@ -6,7 +6,8 @@ is a standard normal deviate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -203,13 +204,28 @@ def with_priors(free: Sequence[Free], priors: Mapping[str, tuple[float, float]])
     """
     by_name = {one.name: one for one in free}
     for name, prior in priors.items():
-        if name not in by_name:
-            raise InputError(
-                f"the prior of {name}: there is no such parameter in this fit, whose names are those of its report "
-                f"(activation energies where records span more than {SPAN_K:g} K){did_you_mean(name, by_name)}"
-            )
+        _check_name(name, by_name)
         by_name[name] = _with_prior(by_name[name], Prior(*prior))
     return tuple(by_name.values())
+
+
+def check_names(cell: Cell, priors: Iterable[str]) -> None:
+    """Raises InputError for a prior of what no fit of `cell` has, whatever its records."""
+    known = [one.name for one in free_parameters(with_interfaces(cell, True), np.inf, measured=True)]
+    for name in priors:
+        _check_name(name, known)
+
+
+def _check_name(name: str, known: Collection[str]) -> None:
+    if name in known:
+        return
+    places = [round(100 * place) for place in PLACES]
+    listed = dict.fromkeys(re.sub(r"_at_\d+_percent", "_at_N_percent", one) for one in known)
+    raise InputError(
+        f"the prior of {name}: there is no such parameter in this fit{did_you_mean(name, known)} There are "
+        f"{', '.join(listed)} (activation energies where records span more than {SPAN_K:g} K; N is one of "
+        f"{', '.join(map(str, places))})."
+    )
 
 
 def _with_prior(one: Free, prior: Prior) -> Free:

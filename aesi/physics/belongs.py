@@ -169,17 +169,24 @@ def _moved(record: Measurement, rows: tuple[int, int]) -> str:
 def _cause(ratio: float, record: Measurement) -> str:
     """What the ratio of capacities rather says: units differ by factors that cells do not."""
     if ratio > 200.0:
-        return "the current is in mA or the time in ms; declare it: --unit current_a=mA, or --unit time_s=ms"
+        return (
+            "the current is in mA or the time in ms; give A and s, or declare it: --unit current_a=mA, or --unit "
+            "time_s=ms"
+        )
     if ratio < 1.0 / 1000.0:
         return (
-            "the time is in hours or the current in kA; declare it: --unit time_s=h, or --unit current_a=kA"
+            "the time is in hours or the current in kA; give s and A, or declare it: --unit time_s=h, or --unit "
+            "current_a=kA"
         )
     if ratio < 1.0 / 15.0:
-        return "the time is in minutes or hours (declare it: --unit time_s=min or h), or the cell file is another's"
+        return (
+            "the time is in minutes or hours (give s, or declare it: --unit time_s=min or h), or the cell file is "
+            "another's"
+        )
     if ratio > 15.0:
         return (
-            "the current is in mA or the time in ms (declare it: --unit current_a=mA, or --unit time_s=ms), or the "
-            "cell file is another's"
+            "the current is in mA or the time in ms (give A and s, or declare it: --unit current_a=mA, or --unit "
+            "time_s=ms), or the cell file is another's"
         )
     if ratio < 1.0:
         return "the cell file is another cell's, or the cell holds much less than when it was new (--soh)"

@@ -7,6 +7,7 @@ An effect acts at one or more of four places, each a function of plain values th
     on_voltage   (Trace, **parameters) -> Contribution        a voltage in series with the cell, with own states
     on_reading   (Trace, **parameters) -> (n,) V              the voltage as the instrument wrote it
 
+What a Record or a Trace holds can be read and not written: it is the caller's own, and other effects read it too.
 Nothing in the core knows an effect by name: a new one is a file, a line of registration and a test, or a
 file of the user's own that `load_effect` reads.
 """
@@ -14,13 +15,14 @@ file of the user's own that `load_effect` reads.
 from __future__ import annotations
 
 import inspect
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
 import numpy as np
 
-from aesi.errors import ParameterError, SimulationError
+from aesi.errors import AesiError, NoNumberError, OwnEffectError, ParameterError
 from aesi.numerics.typing import Array
 from aesi.over_time import stamp
 from aesi.parameters import Parameter, checked
@@ -42,6 +44,10 @@ class Record:
     current_a: Array
     temperature_k: Array | None = None
 
+    def __post_init__(self) -> None:
+        """What it holds becomes read-only views of what it is given."""
+        _lock(self, "time_s", "current_a", "temperature_k")
+
 
 @dataclass(frozen=True, eq=False)
 class Trace:
@@ -57,6 +63,11 @@ class Trace:
     voltage_v: Array
     series: Mapping[str, Array]
     backward: bool = False
+
+    def __post_init__(self) -> None:
+        """What it holds becomes read-only views of what it is given."""
+        _lock(self, "time_s", "current_a", "voltage_v")
+        object.__setattr__(self, "series", {name: _read_only(state) for name, state in self.series.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,13 +183,24 @@ class ActiveEffect:
         return dict(self.values)
 
     def act(self, function: Callable[..., Acted], given: object) -> Acted:
-        """What one of the effect's functions makes of what it is given; what a user's own raises names its file."""
-        try:
+        """What one of the effect's functions makes of what it is given.
+
+        Of a user's own, raises OwnEffectError where it fails or gives what cannot be used, NoNumberError where there is
+        no number, each with file and line; an AesiError that it raises itself is left as it is.
+        """
+        if self.effect.file is None:
             return function(given, **self.parameters)
-        except Exception as error:
-            if self.effect.file is not None:
-                error.add_note(f"raised by {function.__name__} of {self.effect.file}")
+        try:
+            acted = function(given, **self.parameters)
+        except AesiError:
             raise
+        except (Exception, SystemExit) as error:
+            arithmetic = isinstance(error, ArithmeticError)
+            raise (NoNumberError if arithmetic else OwnEffectError)(
+                _failure(self.effect.file, error)
+            ) from error
+        _check_acted(self.effect, function, given, acted)
+        return acted
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-ready; `aesi.physics.effects.active_effect` gives it back."""
@@ -188,29 +210,72 @@ class ActiveEffect:
         return out
 
 
-def check_contribution(file: str, added: object, trace: Trace) -> None:
-    """Raises TypeError or ValueError, which stop a search, for what no on_voltage of a user's own may give."""
-    if not isinstance(added, Contribution):
-        raise TypeError(
-            f"{file}: on_voltage gives an object of type {type(added).__name__}, not a Contribution."
+def check_states(effect: Effect, added: Contribution, trace: Trace) -> None:
+    """Raises OwnEffectError where an effect of a user's own gives a state that the run has already."""
+    clash = [name for name in added.series if name in trace.series]
+    if clash and effect.file is not None:
+        raise OwnEffectError(
+            f"{effect.file}: on_voltage gives a state {clash[0]!r}, which the run has; name it otherwise."
         )
-    check_row_of(file, "on_voltage", added.voltage_v, trace)
-    for name, state in added.series.items():
-        if name in trace.series:
-            raise ValueError(
-                f"{file}: on_voltage gives a state {name!r}, which the run has; name it otherwise."
-            )
-        check_row_of(file, f"on_voltage, state {name!r},", state, trace)
 
 
-def check_row_of(file: str, what: str, row: Any, trace: Trace) -> None:
-    """Raises ValueError for a row of another shape; SimulationError, which a search passes by, where values lack."""
-    shape = np.shape(row)
-    if shape != trace.time_s.shape:
-        raise ValueError(
-            f"{file}: {what} gives the shape {shape}, where the record has {trace.time_s.shape}."
-        )
-    unknown = ~np.isfinite(row)
-    if unknown.any():
-        at = float(trace.time_s[int(np.argmax(unknown))])
-        raise SimulationError(f"{file}: {what} gives no number at {stamp(at)} s.")
+def _failure(file: str, error: BaseException) -> str:
+    """What a function of the file raised: in which of its lines, and what."""
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == file]
+    where = f"{file}, line {frames[-1].lineno}, in {frames[-1].name}" if frames else file
+    said = str(error).rstrip(".")
+    if isinstance(error, ValueError) and "read-only" in said:  # numpy's word, of assignments and of out=
+        return f"{where}: it writes into its input; make a copy first, as record.current_a.copy() is."
+    return f"{where}: {type(error).__name__}{': ' if said else ''}{said}."
+
+
+def _check_acted(effect: Effect, function: Callable[..., Any], given: Any, acted: Any) -> None:
+    """Raises OwnEffectError for what no function of a user's own may give, NoNumberError for a row without numbers."""
+    if function is effect.on_reading:
+        _check_rows(effect, "on_reading", {"": acted}, given.time_s)
+        return
+    places: dict[type, tuple[str, type]] = {
+        EspmModel: ("on_model", EspmModel),
+        Record: ("on_record", Record),
+        Trace: ("on_voltage", Contribution),
+    }
+    place, wanted = places[type(given)]
+    if not isinstance(acted, wanted):
+        what = f"an object of type {type(acted).__name__}"
+        raise OwnEffectError(f"{effect.file}: {place} gives {what}, not {_article(wanted.__name__)}.")
+    if isinstance(acted, Record):
+        rows = {"time_s": acted.time_s, "current_a": acted.current_a, "temperature_k": acted.temperature_k}
+        _check_rows(effect, place, {k: row for k, row in rows.items() if row is not None}, given.time_s)
+    elif isinstance(acted, Contribution):
+        states = {f"state {name!r}": state for name, state in acted.series.items()}
+        _check_rows(effect, place, {"": acted.voltage_v, **states}, given.time_s)
+
+
+def _article(name: str) -> str:
+    return f"an {name}" if name[0] in "AEIO" else f"a {name}"
+
+
+def _check_rows(effect: Effect, place: str, rows: Mapping[str, Any], time_s: Array) -> None:
+    """Raises OwnEffectError for a row of another shape or not of numbers; NoNumberError where values lack."""
+    for name, row in rows.items():
+        what = f"{effect.file}: {place}{f', {name},' if name else ''} gives"
+        if np.shape(row) != time_s.shape:
+            raise OwnEffectError(f"{what} the shape {np.shape(row)}, where the record has {time_s.shape}.")
+        if np.asarray(row).dtype.kind not in "biuf":
+            raise OwnEffectError(f"{what} values of type {np.asarray(row).dtype}, not numbers.")
+        unknown = ~np.isfinite(row)
+        if unknown.any():
+            raise NoNumberError(f"{what} no number at {stamp(float(time_s[int(np.argmax(unknown))]))} s.")
+
+
+def _lock(holder: object, *names: str) -> None:
+    for name in names:
+        values = getattr(holder, name)
+        if values is not None:
+            object.__setattr__(holder, name, _read_only(values))
+
+
+def _read_only(values: Array) -> Array:
+    view = np.asarray(values).view()
+    view.flags.writeable = False
+    return view

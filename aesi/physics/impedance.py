@@ -61,7 +61,8 @@ def impedance(
     """Impedance of `cell` at rest.
 
     frequency_hz : (n,) Hz, positive.  soc : state of charge by the declared windows; where an effect moved these, the
-    cell rests at the same voltage in the new ones, as in `simulate`.  effects, model : as there.
+    cell rests at the same voltage in the new ones, as in `simulate`.  effects : as there; of one that acts on the
+    voltage, what it answers to a current at once.  model : as there, "espm" unless another is named.
     Returns (n,) ohm, complex; the imaginary part is negative where capacitive.
     Raises DataError for frequencies or a state that have none, InputError for what is no Cell, no effect, no state of
     charge or no temperature of a cell.
@@ -230,7 +231,7 @@ def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
     record = Record(np.zeros(1), np.zeros(1), np.array([kelvin]))
     for active in effects:
         if active.effect.on_record is not None:
-            record = active.effect.on_record(record, **active.parameters)
+            record = active.act(active.effect.on_record, record)
     return float(cast(Array, record.temperature_k)[0])
 
 

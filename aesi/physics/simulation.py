@@ -25,7 +25,7 @@ from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell, initial_soc
-from aesi.physics.effect import ActiveEffect, Record, Trace, check_contribution, check_row_of
+from aesi.physics.effect import ActiveEffect, Record, Trace, check_states
 from aesi.physics.espm.plain import run_plain, shifted_ocp
 from aesi.physics.model import EspmModel
 from aesi.records import Hold, Run
@@ -68,7 +68,8 @@ def simulate(
     on_depletion : what happens where a surface stoichiometry leaves [0, 1] or the electrolyte runs dry.
     "raise" is for users; "clip" is for searches: kinetics are held at the edge, open-circuit potentials go on
     at 10 V per unit of stoichiometry, and `series["depleted"]` is 1 from the first such sample on.
-    model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both.
+    model : "espm", one particle an electrode, or "dfn", the porous electrode; the same effects act on both. Without it
+    "espm", also for a cell whose file was fitted with the other (`Cell.fitted_with`), which commands take by default.
     profiles : of "dfn" alone: what runs across the electrodes, see `Run.profiles`.
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
@@ -174,7 +175,13 @@ def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: 
         model = model.with_cell(initial_temperature_k=float(temperature[0]))
         if model.heat is None and not model.cell.winding_resistance_k_w:
             temperature = None
-    return solve(model, record.time_s, record.current_a, temperature, soc0, hold)
+    warm = None if temperature is None else _own(temperature)
+    return solve(model, _own(record.time_s), _own(record.current_a), warm, soc0, hold)
+
+
+def _own(row: Array) -> Array:
+    """As kernels are compiled for: contiguous, and may be written to, which what effects are given may not."""
+    return np.require(row, float, ["C", "W"])
 
 
 @dataclass(frozen=True)
@@ -234,17 +241,14 @@ def _voltage_effects(
         if active.effect.on_voltage is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
             added = active.act(active.effect.on_voltage, trace)
-            if active.effect.file is not None:
-                check_contribution(active.effect.file, added, trace)
+            check_states(active.effect, added, trace)
             voltage = voltage + added.voltage_v
             series.update(added.series)
     for active in effects:
         if active.effect.on_reading is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")
             voltage = active.act(active.effect.on_reading, trace)
-            if active.effect.file is not None:
-                check_row_of(active.effect.file, "on_reading", voltage, trace)
-    return voltage
+    return _own(voltage)
 
 
 def _checked_record(time_s: object, current_a: object) -> tuple[Array, Array]:
@@ -281,7 +285,7 @@ def _soc_from_rest(
     for active in effects:
         if active.effect.on_reading is not None:
             trace = Trace(model, one, one, np.array([rest_voltage_v]), {})
-            true = true - (active.effect.on_reading(trace, **active.parameters) - rest_voltage_v)
+            true = true - (active.act(active.effect.on_reading, trace) - rest_voltage_v)
     cell = model.cell
     rise = (cell.initial_temperature_k if kelvin is None else float(kelvin[0])) - cell.reference_temperature_k
     cell = cell.with_negative(ocp=shifted_ocp(cell.negative, rise))

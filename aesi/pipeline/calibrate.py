@@ -12,6 +12,7 @@ import numpy as np
 
 from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
+from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
@@ -21,7 +22,7 @@ from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.impedance import BAND_HZ, SpectrumError, held_against
+from aesi.pipeline.impedance import BAND_HZ, SpectrumError, check_spectra, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -52,6 +53,12 @@ class Request:
     title: str | None = None
 
 
+def check_request(cell: Path, request: Request) -> None:
+    """Raises CellError or InputError, one sentence, for what is asked of a fit and needs no record to be refused."""
+    check_posterior(request.posterior)
+    check_names(declared_model(cell).cell, request.conditions.priors)
+
+
 def calibrate_files(
     cell: Path, measurements: Sequence[Measurement], out: Path, request: Request | None = None
 ) -> dict[str, Any]:
@@ -65,7 +72,9 @@ def calibrate_files(
     check_posterior(asked.posterior)
     given = declared_model(cell)
     declared, model = given.cell, conditions.physics or given.model
-    check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    start = sized(declared, measurements)[0]  # the start file may be of another size
+    check_measured(start, measurements)
+    check_spectra(start, asked.impedance)
     found = calibrate(declared, measurements, replace(conditions, physics=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))

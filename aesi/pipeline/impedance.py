@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aesi.data.channels.implausible import HIGHEST_CHARGE_RESISTANCE_OHM_AH
 from aesi.data.readers import open_table
 from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
@@ -73,11 +74,15 @@ def impedance_file(
 
 
 def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:
-    """Sentences on the effects that act on a record or a reading alone, or on a temperature that is given."""
+    """Sentences on the effects that act on a record or a reading alone, or on a temperature that is given, and on those
+    on the voltage: but for what is `ohmic` by its own word they may go on to answer after the current is there."""
     warm = [one.id for one in effects if one.effect.infers == "temperature"]
     acting = (one for one in effects if one.id not in warm)
     names = [one.id for one in acting if one.effect.on_model is None and one.effect.on_voltage is None]
     said = [f"{', '.join(names)}: of a record, not of the cell, and not in its impedance."] if names else []
+    later = [one.id for one in effects if one.effect.on_voltage is not None and not one.effect.ohmic]
+    if later:
+        said.append(f"{', '.join(later)}: only what it answers to a current at once is in the impedance.")
     if warm:
         said.append(f"{', '.join(warm)}: not in the impedance, which is at the temperature that is given.")
     return said
@@ -130,6 +135,27 @@ class SpectrumError:
     soc: float
     z_ohm: ComplexArray
     off: float | None
+
+
+def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
+    """Raises DataError, before anything is fitted, for spectra that are no such cell's, and where none could be used.
+
+    cell : whose capacity may be off by what a fit moves it, so that a state in Ah is not judged by it.
+    A spectrum in milliohm is told as a current in mA is, by capacity times resistance: that of its smallest |Z|.
+    """
+    for spectrum in spectra:
+        least_ohm = float(np.min(np.abs(spectrum.z_ohm)))
+        if least_ohm * cell.nominal_capacity_ah > HIGHEST_CHARGE_RESISTANCE_OHM_AH:
+            raise DataError(
+                f"{spectrum.name}: |Z| is {least_ohm:.3g} ohm and more, as of no cell of "
+                f"{cell.nominal_capacity_ah:.3g} A.h; z_real_ohm and z_imag_ohm are in ohm, so that 30 mOhm is 0.03."
+            )
+    beyond = [s for s in spectra if s.soc is not None and not 0.0 <= s.soc <= 1.0]
+    if spectra and len(beyond) == len(spectra):
+        raise DataError(
+            f"{beyond[0].name}: its state of charge of {beyond[0].soc:.4g} is not between 0 and 1 (50 % is 0.5), and "
+            "there is no other spectrum to be held against the cell."
+        )
 
 
 def held_against(

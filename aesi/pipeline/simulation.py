@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from aesi.constants import MV_PER_V
+from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.data.convert import write_csv
 from aesi.data.current import CurrentProfile, read_current
 from aesi.data.reading import Reading, record_name
@@ -43,8 +43,8 @@ class ProfileRequest:
 
     soc0 : state of charge at the first row; None takes it from the file's voltage, where it has one (see
     `initial_state`), else from the saved model.
-    hold : how the current runs between rows; None takes, for a simulation, straight lines for a profile alone and what
-    `assumed_hold` says for a measurement, and for a prediction the saved model's.
+    hold : how the current runs between rows; None takes that of a saved model, and of a cell's file straight lines for
+    a profile alone and what `assumed_hold` says for a measurement.
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
@@ -68,6 +68,9 @@ def simulate_file(
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
+    Beside `temperature_k` stands `temperature_degc`, which files are read by: the case's as the profile has it, else
+    the model's, unless that is the cell file's all along.
+
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     effects : added to those.
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
@@ -81,14 +84,15 @@ def simulate_file(
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
     say(of_another_model(declared, model))
-    lone = profile.voltage_v is None
+    saved, lone = cell.is_dir(), profile.voltage_v is None
+    assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)
     used = replace(
         declared,
         effects=(*declared.effects, *effects),
-        hold=asked.hold or ("linear" if lone else assumed_hold(profile.time_s)),
+        hold=asked.hold or assumed,
         model=model or declared.model,
     )
-    placed = _placed(used, profile, current, asked, say)
+    placed = _placed(used, profile, current, asked, say, saved=saved)
     used = placed.model
     run = simulate(
         used.cell,
@@ -100,8 +104,11 @@ def simulate_file(
         used.hold,
         model=used.model,
     )
+    degc = profile.temperature_degc
+    if degc is None and np.any(run.series["temperature_k"] != declared.cell.initial_temperature_k):
+        degc = run.series["temperature_k"] - ZERO_CELSIUS_K
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
-    write_table(out, columns_out)
+    write_table(out, columns_out if degc is None else columns_out | {"temperature_degc": degc})
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     return run
 
@@ -125,7 +132,8 @@ def predict_file(
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
     saved = HybridModel.load(model).with_soh(asked.soh)
-    placed = _placed(replace(saved, hold=asked.hold or saved.hold), profile, current, asked, say)
+    used = replace(saved, hold=asked.hold or saved.hold)
+    placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record
     prediction = hybrid.predict_record(record, placed.start.soc, one_step=measured)
     frame = prediction.to_frame()
@@ -146,9 +154,18 @@ class _Placed:
 
 
 def _placed(
-    model: HybridModel, profile: CurrentProfile, file: Path, asked: ProfileRequest, say: SayNotes
+    model: HybridModel,
+    profile: CurrentProfile,
+    file: Path,
+    asked: ProfileRequest,
+    say: SayNotes,
+    *,
+    saved: bool,
 ) -> _Placed:
-    """The model as it is asked for on a profile that can be of its cell, and what is assumed, said."""
+    """The model as it is asked for on a profile that can be of its cell, and what is assumed, said.
+
+    saved : it is one of a folder, whose hold it has where none is asked for.
+    """
     if asked.self_heating:
         model = replace(model, effects=warmed(model.cell, model.effects))
     record = _record(profile, file, asked.hold)
@@ -158,7 +175,7 @@ def _placed(
         [
             *model.cell.unread,
             start.sentence,
-            hold_sentence(record.name, model.hold, asked.hold is not None),
+            hold_sentence(record.name, model.hold, asked.hold is not None, saved=saved),
             temperature_sentence(model.cell, record, model.effects),
             *without_energies(model.cell, [record.temperature_degc], model.effects),
             *_with_effects(record, model),

@@ -31,12 +31,15 @@ def assumed_hold(time_s: Array) -> Hold:
     return "backward" if float(np.diff(time_s).max(initial=0.0)) > SLOW_SAMPLING_S else "linear"
 
 
-def hold_sentence(name: str, hold: Hold, declared: bool, option: str = "--hold ") -> str:
-    """What was taken, for a reader.  option : what takes it otherwise."""
+def hold_sentence(
+    name: str, hold: Hold, declared: bool, option: str = "--hold ", *, saved: bool = False
+) -> str:
+    """What was taken, for a reader.  option : what takes it otherwise.  saved : it is that of a saved model."""
     words = {"linear": "in straight lines between rows", "backward": "constant since the row before"}
     if declared:
         return f"{name}: the current is taken {words[hold]}, as declared."
     writer, other = {"linear": ("", "backward"), "backward": (", as loggers write", "linear")}[hold]
+    writer = ", as the saved model was made" if saved else writer
     return f"{name}: the current is taken {words[hold]}{writer}; {option}{other} takes it otherwise."
 
 

@@ -129,11 +129,12 @@ def calibrate(
     spectra, priors = options.spectra(impedance), options.priors(prior)
     options.say_reading(data)
     from aesi.calibration import Conditions
-    from aesi.pipeline.calibrate import Request
+    from aesi.pipeline.calibrate import Request, check_request
     from flows.jobs.calibration import calibrate as flow
 
     conditions = Conditions(soc0, temperatures, days, day, model, priors=priors)
     request = Request(conditions, spectra, posterior, seed, title)
+    check_request(cell, request)
     records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable
 from datetime import date
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
@@ -83,7 +83,8 @@ HoldOption = Annotated[
     typer.Option(
         "--hold",
         help="How the current runs between rows. linear: straight; backward: constant since the row before, as loggers "
-        "write. Without it: backward where rows come more than 5 s apart; what was taken is said.",
+        "write. Without it that of a saved model; elsewhere backward where rows come more than 5 s apart, but linear "
+        "for a profile without a voltage. What was taken is said.",
     ),
 ]
 
@@ -259,9 +260,13 @@ def priors(pairs: list[str] | None) -> dict[str, tuple[float, float]]:
     for pair in pairs or []:
         name, _, told = (part.strip() for part in pair.partition("="))
         try:
-            value, sd = map(_finite, told.split(":"))
+            value, sd = map(float, told.split(":"))
         except ValueError:
             raise InputError(f"--prior {pair}: has to read NAME=VALUE:SD.") from None
+        if not isfinite(value) or not 0.0 < sd < inf:
+            raise InputError(
+                f"--prior {pair}: VALUE has to be a finite number, and SD, its standard deviation, one above 0."
+            )
         if name in out:
             raise InputError(f"--prior is there twice for {name}; give it once.")
         out[name] = value, sd
@@ -346,10 +351,21 @@ def say_notes(notes: Iterable[str]) -> None:
 
 
 def added_effects(texts: list[str] | None, files: list[Path] | None) -> tuple[ActiveEffect, ...]:
-    """The effects of `--effect id:parameter=value,...`, of the catalogue and of the user's files."""
-    from aesi.physics.effects import activated
+    """The effects of `--effect id:parameter=value,...`, of the catalogue and of the user's files.
 
-    return activated([_effect_values(text) for text in texts or []], files or [])
+    Raises InputError also for a file whose effect no `--effect` names: it would not be simulated.
+    """
+    from aesi.physics.effects import activated, load_effect
+
+    active = activated([_effect_values(text) for text in texts or []], files or [])
+    for file in files or []:
+        own = load_effect(file)
+        if own.id not in {one.id for one in active}:
+            raise InputError(
+                f"--effect-file {file}: its effect is not simulated unless it is named; add --effect {own.id}, or "
+                "leave the file out."
+            )
+    return active
 
 
 def _effect_values(text: str) -> tuple[str, dict[str, float]]:

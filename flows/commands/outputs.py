@@ -10,6 +10,8 @@ from pathlib import Path
 from aesi.errors import InputError
 from aesi.numerics.files.whole import check_writable
 
+HEAD = "model.json"
+"""Of a saved model, as `aesi.pipeline.product.model_folder` has it, which takes its time to import."""
 MODEL = "model"
 """The folder of the model within a folder of results."""
 PAGES = (".html", ".htm")
@@ -30,7 +32,7 @@ def check_file(out: Path, inputs: Sequence[Path] = (), written: Sequence[Path] =
         if out.is_dir():
             raise InputError(f"--out {out} is a folder; name the file to write.")
         lost = [
-            file for file in {out, *written} if file.exists() and any(_lies_in(file, one) for one in inputs)
+            file for file in {out, *written} if file.exists() and any(_is_read(file, one) for one in inputs)
         ]
         if lost:
             beside = "" if out in lost else f": {lost[0]}, which is written beside it,"
@@ -87,6 +89,11 @@ def check_beside(out: Path, source: Path) -> None:
         raise InputError(
             f"--out {out} lies in {source}, whose subfolders are read as cells; name a folder beside it."
         )
+
+
+def _is_read(file: Path, given: Path) -> bool:
+    """Is a file that is there the one that is given, or of the saved model that is?  Of other folders none is read."""
+    return (not given.is_dir() or (given / HEAD).exists()) and _lies_in(file, given)
 
 
 def _lies_in(file: Path, place: Path) -> bool:

@@ -66,7 +66,7 @@ def _trace(case: Case, out: Path, run: Stages, console: Console, experiment: str
     if (out / ARCHIVE).exists():
         console.say(
             f"{out} holds an earlier search: fits of the same cell and records by this version are taken up again, and "
-            "its finding is replaced."
+            "its finding is replaced when this search ends."
         )
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
     title = ", ".join(m.name for m in case.measurements)

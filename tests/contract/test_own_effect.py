@@ -2,6 +2,7 @@
 
 import json
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import aesi
-from aesi.errors import ConfigError, InputError, SimulationError
+from aesi.errors import ConfigError, InputError, NoNumberError, OwnEffectError
 from aesi.physics import Effect
 from aesi.physics.effects import CATALOGUE, activated, known_effects, load_effect
 from aesi.pipeline.discovery.discover import Case, write_discovery
@@ -197,20 +198,21 @@ def test_a_file_that_cannot_be_used_is_told_when_it_is_read(tmp_path, was, now, 
     [
         (
             "-lead_ohm * trace.current_a",
-            TypeError,
+            OwnEffectError,
             "on_voltage gives an object of type ndarray, not a Contribution",
         ),
         (
             "Contribution(trace.current_a[1:])",
-            ValueError,
+            OwnEffectError,
             r"gives the shape \(1799,\), where the record has \(1800,\)",
         ),
         (
             "Contribution(0 * trace.current_a, {'soc': trace.current_a})",
-            ValueError,
+            OwnEffectError,
             "a state 'soc', which the run has",
         ),
-        ("Contribution(trace.current_a / 0.0)", SimulationError, "on_voltage gives no number at 0 s"),
+        ("Contribution(trace.current_a / 0.0)", NoNumberError, "on_voltage gives no number at 0 s"),
+        ("Contribution(trace.current_a.astype(object))", OwnEffectError, "gives values of type object"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:invalid value", "ignore:divide by zero")
@@ -224,12 +226,58 @@ def test_what_an_effect_of_ones_own_may_not_give_is_told_with_its_file(
     assert str(path) in str(caught.value)
 
 
-def test_what_an_effect_of_ones_own_raises_names_its_file(tmp_path, cell, current):
+@pytest.mark.parametrize(
+    ("statement", "error", "sentence"),
+    [
+        ("lead_ohm / 0", NoNumberError, "ZeroDivisionError: float division by zero."),
+        ("{}['lead']", OwnEffectError, "KeyError: 'lead'."),
+        ("raise SystemExit(0)", OwnEffectError, "SystemExit: 0."),
+        ("trace.current_a[0] = 0", OwnEffectError, "it writes into its input; make a copy first"),
+        ("trace.series['soc'].sort()", OwnEffectError, "it writes into its input; make a copy first"),
+    ],
+)
+def test_what_an_effect_of_ones_own_raises_names_file_and_line(
+    tmp_path, cell, current, statement, error, sentence
+):
     path = tmp_path / "mine.py"
-    path.write_text(OWN.replace("    return", "    lead_ohm / 0\n    return"))
-    with pytest.raises(ZeroDivisionError) as caught:
+    path.write_text(OWN.replace("    return", f"    {statement}\n    return"))
+    line = path.read_text().splitlines().index(f"    {statement}") + 1
+    with pytest.raises(error, match=re.escape(f"{path}, line {line}, in drop: {sentence}")) as caught:
         aesi.simulate(cell, TIME, current, SOC0, [load_effect(path).activate()])
-    assert caught.value.__notes__ == [f"raised by drop of {path}"]
+    assert caught.value.exit_code == 2
+
+
+def test_a_file_that_ends_python_ended_the_command_as_if_all_were_done(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text("import sys\n\nsys.exit()\n")
+    with pytest.raises(InputError, match=f"the effect file {path} fails: SystemExit"):
+        load_effect(path)
+
+
+@pytest.mark.parametrize(
+    ("body", "sentence"),
+    [
+        ("record.current_a.__iadd__(0.05); return record", "line 3, in shift: it writes into its input"),
+        ("return None", "on_record gives an object of type NoneType, not a Record"),
+        ("return Record(record.time_s, record.current_a[1:])", r"on_record, current_a, gives the shape"),
+    ],
+)
+def test_an_effect_that_wrote_into_its_record_changed_it_for_all_that_read_it(tmp_path, cell, body, sentence):
+    path = tmp_path / "mine.py"
+    path.write_text(
+        f'"""An offset."""\nfrom aesi.physics import Effect, Record\ndef shift(record): {body}\n'
+        'EFFECT = Effect("shifted", "instrument", __doc__, on_record=shift)\n'
+    )
+    current = np.full(60, 5.0)
+    with pytest.raises(OwnEffectError, match=sentence):
+        aesi.simulate(cell, np.arange(60.0), current, SOC0, [load_effect(path).activate()])
+    assert np.all(current == 5.0)
+
+
+def test_what_a_run_gives_is_the_callers_to_write_to(cell):
+    same = Effect("same", "instrument", "As it is.", on_reading=lambda trace: trace.voltage_v).activate()
+    run = aesi.simulate(cell, np.arange(60.0), np.full(60, 5.0), SOC0, [same])
+    assert run.voltage_v.flags.writeable
 
 
 def test_an_effect_that_was_written_anew_acted_as_the_one_before(tmp_path, cell):

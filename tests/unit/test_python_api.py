@@ -1,6 +1,7 @@
 """`import aesi` at a prompt: what it offers, what it shows, and what it says of what cannot be meant."""
 
 from dataclasses import replace
+from datetime import date
 from functools import partial
 from pathlib import Path
 from typing import get_type_hints
@@ -321,6 +322,8 @@ def test_a_day_that_is_text_or_a_number_is_told(cell, record, days, sentence):
             r"priors\['contact.resistance'\] = 0.01 is no pair of numbers; give a dict of",
         ),
         ({"priors": {"contacts": (0.01, 0.001)}}, "the prior of contacts: there is no such parameter"),
+        ({"temperatures_degc": {"nope": 10}}, "the temperature of nope: there is no such record; there are"),
+        ({"dates": {"nope": date(2019, 5, 31)}}, "the date of nope: there is no such record"),
         ({"dates": ["2019-05-31"]}, r"dates = \['2019-05-31'\] names no record; give a dict"),
         ({"temperatures_degc": {"drive": "room"}}, "the temperature of drive holds 'room', which is not a n"),
         ({"temperatures_degc": {"drive": [25.0, 26.0]}}, "the temperature of drive is a row of 2; give one"),
@@ -331,6 +334,11 @@ def test_what_is_said_of_records_in_a_form_that_nothing_reads_was_an_error_of_py
 ):
     with pytest.raises(InputError, match=sentence):
         aesi.calibrate(cell, record, **said)
+
+
+def test_arrays_in_another_unit_were_told_options_of_the_command_line_alone(cell, record):
+    with pytest.raises(DataError, match="give it in A, or declare"):
+        aesi.discover(cell, replace(record, current_a=1e3 * record.current_a, source=""))
 
 
 def test_a_table_in_place_of_a_file_is_told_what_takes_one():

@@ -16,15 +16,15 @@ def named_apart(
 ) -> tuple[Measurement, ...]:
     """The records; those that share a name are numbered: `us06 (1)`, `us06 (2)`.
 
-    said : option -> what it says, by record name.
+    said : what is said, in a word -> that, by record name.
     Raises DataError where it is said of a name that several records share.
     """
     counts = Counter(record.name for record in records)
-    for option, by_name in said.items():
+    for what, by_name in said.items():
         for name in by_name:
             if counts[name] > 1:
                 raise DataError(
-                    f"{option} {name}=...: {counts[name]} records have this name; give each one of its own."
+                    f"the {what} of {name}: {counts[name]} records have this name; give each one of its own."
                 )
     taken = {name for name, many in counts.items() if many == 1}
     out = []

@@ -135,15 +135,15 @@ def with_temperatures(
     for name in degc:
         if name not in known:
             raise DataError(
-                f"--temperature {name}=...: there is no such record; there are {', '.join(sorted(known))}."
+                f"the temperature of {name}: there is no such record; there are {', '.join(sorted(known))}."
             )
     out, notes = [], []
     for record in records:
         given = degc.get(record.name)
         if given is not None and record.temperature_degc is not None:
             raise DataError(
-                f"--temperature {record.name}={given:g}: this record has a measured temperature of its own; leave the "
-                "option out, or the column (--column temperature_degc=)."
+                f"the temperature of {record.name}, {given:g} degC: this record has a measured temperature of its own; "
+                "leave out what is given, or the column (--column temperature_degc=)."
             )
         if given is not None:
             record = replace(record, temperature_degc=np.full(len(record), float(given)))
@@ -155,7 +155,7 @@ def with_temperatures(
             declared = cell.initial_temperature_k - ZERO_CELSIUS_K
             notes.append(
                 f"{record.name}: no temperature in it; taken at {declared:.4g} degC, as the cell's file declares; "
-                "--temperature FILE=DEGC says another."
+                "its own can be given (--temperature FILE=DEGC)."
             )
         out.append(record)
     return tuple(out), tuple(notes)

@@ -113,7 +113,7 @@ def check_ranges(columns: Columns, context: Context) -> None:
         row = int(np.argmax(voltage > HIGHEST_PLAIN_VOLT))
         raise DataError(
             f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is plainly in mV; "
-            "declare it: --unit voltage_v=mV."
+            "give it in V, or declare it: --unit voltage_v=mV."
         )
     bad: BoolArray = (voltage <= 0) | (voltage > HIGHEST_VOLTAGE_V)
     if np.any(bad):
@@ -127,7 +127,7 @@ def check_ranges(columns: Columns, context: Context) -> None:
         row = int(np.argmax(large))
         raise DataError(
             f"{context.at('current_a', row)}: {current[row]:.6g} A is beyond any cell; "
-            "check the row, or declare the unit: --unit current_a=mA."
+            "check the row, give it in A, or declare the unit: --unit current_a=mA."
         )
     temperature = columns.get("temperature_degc")
     if temperature is not None:

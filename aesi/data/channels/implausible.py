@@ -80,23 +80,24 @@ def check_scale(columns: Columns, context: Context) -> None:
     if resistance is not None and resistance < LOWEST_RESISTANCE_OHM:
         raise DataError(
             f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA (its steps would show "
-            f"{resistance * 1e6:.3g} microohm); declare it: --unit current_a=mA."
+            f"{resistance * 1e6:.3g} microohm); give it in A, or declare it: --unit current_a=mA."
         )
     if moved > HIGHEST_CHARGE_AH:
         if resistance is not None and moved * resistance > HIGHEST_CHARGE_RESISTANCE_OHM_AH:
             raise DataError(
                 f"{context.at('time_s', len(time) - 1)}: {moved:.4g} Ah would have moved, which "
                 f"a cell that shows {resistance * 1e3:.3g} mohm at the steps of its current does not hold: "
-                "the time is in ms; declare it: --unit time_s=ms."
+                "the time is in ms; give it in s, or declare it: --unit time_s=ms."
             )
         if resistance is not None:
             raise DataError(
                 f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA ({moved:.4g} Ah would have "
-                "moved); declare it: --unit current_a=mA."
+                "moved); give it in A, or declare it: --unit current_a=mA."
             )
         raise DataError(
             f"{context.at('current_a', row)}: {current[row]:.6g} A is plainly in mA, or the time in ms "
-            f"({moved:.4g} Ah would have moved); declare it: --unit current_a=mA, or --unit time_s=ms."
+            f"({moved:.4g} Ah would have moved); give A and s, or declare it: "
+            "--unit current_a=mA, or --unit time_s=ms."
         )
     if resistance is not None:
         _check_slide(columns, context, moved, resistance)
@@ -113,13 +114,14 @@ def _check_slide(columns: Columns, context: Context, moved_ah: float, resistance
         raise DataError(
             f"{context.at('time_s', last)}: the voltage slides by {slide:.2f} V while {1e3 * moved_ah:.3g} mAh move in "
             f"{columns['time_s'][last] - columns['time_s'][0]:.3g} s, of a cell that shows {resistance_ohm * 1e3:.3g} "
-            "mohm at the steps of its current; the time is in another unit, declare it: --unit time_s=h, or min."
+            "mohm at the steps of its current; the time is in another unit, give it in s, or declare it: "
+            "--unit time_s=h, or min."
         )
     if moved_ah * resistance_ohm > MOST_CHARGE_RESISTANCE_AH_A * max(slide, FLAT_V):
         raise DataError(
             f"{context.at('time_s', last)}: {moved_ah:.4g} Ah would have moved while the voltage slides by {slide:.2f} "
             f"V, of a cell that shows {resistance_ohm * 1e3:.3g} mohm at the steps of its current; the time is in ms, "
-            "declare it: --unit time_s=ms."
+            "give it in s, or declare it: --unit time_s=ms."
         )
 
 
@@ -203,8 +205,8 @@ def _check_pace(columns: Columns, context: Context) -> None:
         if slide > SLIDE_V and seconds < FASTEST_SLIDE_S:
             raise DataError(
                 f"{context.at('time_s', rows.start)}: the voltage moves by {slide:.2f} V in {seconds:.3g} s of one "
-                "held current, faster than any cell's; the time is in another unit, declare it: --unit time_s=h, or "
-                "min."
+                "held current, faster than any cell's; the time is in another unit, give it in s, or declare it: "
+                "--unit time_s=h, or min."
             )
 
 

@@ -54,6 +54,10 @@ def _load(source: str | PathLike[str] | Mapping[str, Any]) -> tuple[dict[str, An
     except OSError as error:
         raise CellError(f"cannot read the cell file {path}: {error.strerror or error}.") from None
     except UnicodeDecodeError as error:
+        if path.read_bytes().lstrip().startswith(b"{"):
+            raise CellError(
+                f"{path} is not written in UTF-8, as JSON has to be (byte {error.start}); save it as UTF-8."
+            ) from None
         raise CellError(
             f"{path} is not text ({error.reason} at byte {error.start}), so no BPX file; is it a record?"
         ) from None
@@ -125,6 +129,12 @@ def _refuse_what_is_not_modelled(v1: dict[str, Any], where: str) -> None:
             raise CellError(
                 f"{where}: {section} is a blend of materials; only single materials are modelled."
             )
+
+    if isinstance(v1.get("Header"), dict) and v1["Header"].get("Model") == "SPM":
+        raise CellError(
+            f"{where}: its Header is of the model 'SPM', which has no electrolyte, and its parameters are those of a "
+            'full cell; write "Model": "SPMe" there, or "DFN".'
+        )
 
 
 def _check_schema(v1: dict[str, Any], where: str) -> None:

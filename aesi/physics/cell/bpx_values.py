@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from aesi.constants import COLDEST_DEGC, WARMEST_DEGC, ZERO_CELSIUS_K
+from aesi.constants import COLDEST_DEGC, SECONDS_PER_HOUR, WARMEST_DEGC, ZERO_CELSIUS_K
 from aesi.errors import CellError
 from aesi.numerics.typing import Array
 from aesi.physics.cell.bpx_transport import POINTS, inside_window
 from aesi.physics.cell.parts import (
     CAPACITY_SHARES,
     CONTACT_RESISTANCE,
+    DOUBLE_LAYERS,
     FILM_ENERGIES,
     FILM_RESISTANCES,
     HEAT_TRANSFER,
@@ -45,6 +46,12 @@ LARGEST_ENTROPIC_V_K = 0.01
 HEAT_J_K_AH = (0.5, 1000.0)
 """Heat capacity over nominal capacity: 9 to 52 J/(K Ah) in the shipped files, 7 to 27 by the layers of eight published
 sets (of PyBaMM), and a thousand times more or less where one of its factors is in another unit."""
+LEAST_LAYER_F_M2 = 1e-4
+"""Of a double layer that is declared: a layer of molecules has 0.05 to 0.5 F/m2, fits 1.6 to 31 in the shipped files,
+and 20 uF/cm2 as 2e-5 F/cm2 are below."""
+CONDUCTS_W_M_K = (0.01, 100.0)
+"""Across a winding 0.15 to 0.2 W/(m K) as measured (Drake et al. 2014), 0.18 to 0.69 in the shipped files. Air that
+stands still has 0.026 and foils along themselves some 30; in W/(cm K) or mW/(m K) they are outside."""
 LEAST_CUT_OFF_V = 0.1
 """Lower cut-offs are 1 V and more (LFP|LTO), which is 0.001 kV; 0.06 V is half way to the 0.004 kV of the highest."""
 
@@ -96,7 +103,7 @@ def check_values(cell: CellParameters, where: str) -> None:
 
 
 def _check_own_fields(cell: CellParameters, what: str) -> None:
-    """Contacts, films and rate factors, and the capacities and days of records."""
+    """Contacts, films, double layers and rate factors, and the capacities and days of records."""
     # A cell whose contacts alone took it from one cut-off to the other at 1C would be of no use, whatever its size.
     # Those of the shipped files take 0.001 to 0.02 of that window, and 1.5 to 20 times it where they are in milliohms.
     drop_v = cell.contact_resistance_ohm * cell.nominal_capacity_ah
@@ -113,6 +120,7 @@ def _check_own_fields(cell: CellParameters, what: str) -> None:
         _check_positive(
             electrode.film_ohm_m2, stoichiometry, f"{what}: {FILM_RESISTANCES[side]}", "", none=True
         )
+        _check_surface(cell, electrode, side, window_v, what)
     for name, share in cell.capacity_shares:
         if not 1.0 / OTHER_UNIT <= share <= OTHER_UNIT:
             raise CellError(
@@ -123,6 +131,29 @@ def _check_own_fields(cell: CellParameters, what: str) -> None:
         raise CellError(
             f"{what}: {TESTED_ON}: {without[0]} has no share of the capacity; give it one in {CAPACITY_SHARES!r}, or "
             "take its day out."
+        )
+
+
+def _check_surface(cell: CellParameters, electrode: Electrode, side: str, window_v: float, what: str) -> None:
+    """Films and double layers by what they do on all of the reactive surface, as contacts: no film takes the cell from
+    one cut-off to the other at 1C, and no double layer holds as much charge as the cell over that voltage.
+
+    In the shipped files films take 0.0006 to 0.008 of that window, double layers hold 0.0004 to 0.009 of the charge.
+    """
+    reactive_m2 = cell.total_area_m2 * electrode.thickness_m * electrode.area_per_volume_1_m
+    film = float(np.median(electrode.film_ohm_m2(inside_window(electrode))))
+    drop_v = film * cell.nominal_capacity_ah / reactive_m2
+    if drop_v > window_v:
+        raise CellError(
+            f"{what}: {FILM_RESISTANCES[side]} = {film:g} takes {drop_v:.3g} V at {cell.nominal_capacity_ah:g} A over "
+            f"{reactive_m2:.3g} m2 of reactive surface, more than the {window_v:.3g} V between the cut-offs; it is in "
+            "Ohm.m2, so that 1 mOhm.m2, or 10 Ohm.cm2, is 0.001."
+        )
+    layer = electrode.double_layer_f_m2
+    held_ah = layer * reactive_m2 * window_v / SECONDS_PER_HOUR
+    if held_ah > cell.nominal_capacity_ah or 0.0 < layer < LEAST_LAYER_F_M2:
+        raise CellError(
+            f"{what}: {DOUBLE_LAYERS[side]} = {layer:g} is no double layer's; it is in F/m2, so that 20 uF/cm2 is 0.2."
         )
 
 
@@ -205,6 +236,12 @@ def _check_thermal(cell: CellParameters, where: str) -> None:
         THERMAL_CONDUCTIVITY: cell.thermal_conductivity_w_m_k,
     }
     require_positive(where, {name: value for name, value in declared.items() if value is not None})
+    conducts = cell.thermal_conductivity_w_m_k
+    if conducts is not None and not CONDUCTS_W_M_K[0] <= conducts <= CONDUCTS_W_M_K[1]:
+        raise CellError(
+            f"{where}: User-defined: {THERMAL_CONDUCTIVITY} = {conducts:g} is no winding's; it is in W/(m K), across "
+            "the winding, so that 200 mW/(m K) is 0.2."
+        )
     cooled = cell.heat_transfer_w_m2_k
     if cooled is not None and not 0.0 <= cooled < np.inf:
         raise CellError(f"{where}: {HEAT_TRANSFER} = {cooled:g} has to be a number from 0 (no cooling) on.")

@@ -111,7 +111,7 @@ def _load(path: str, content: bytes) -> Effect:
     try:
         # Not by the loader, whose kept byte code is told by a time in whole seconds and a size.
         exec(spec.loader.source_to_code(content, path), module.__dict__)
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # an exit would end the command as if all were done
         said = str(error).rstrip(".")
         raise InputError(f"the effect file {path} fails: {type(error).__name__}: {said}.") from error
     effect = getattr(module, "EFFECT", None)

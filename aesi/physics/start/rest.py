@@ -30,5 +30,5 @@ def freed_of_instruments(model: EspmModel, effects: Sequence[ActiveEffect], volt
     for active in effects:
         if active.effect.on_reading is not None:
             trace = Trace(model, one, one, np.array([voltage_v]), {})
-            true = true - (active.effect.on_reading(trace, **active.parameters) - voltage_v)
+            true = true - (active.act(active.effect.on_reading, trace) - voltage_v)
     return float(true[0])

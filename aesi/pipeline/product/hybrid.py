@@ -6,7 +6,10 @@ back to its own rows. How a model is kept on disk: `aesi.pipeline.product.model_
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any, Self
 
@@ -14,15 +17,16 @@ import numpy as np
 
 from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
-from aesi.errors import DataError, InputError
+from aesi.errors import CellError, DataError, InputError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
+from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Soh
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
-from aesi.pipeline.product.model_folder import part_file, read_model, write_model
+from aesi.pipeline.product.model_folder import HEAD, part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
@@ -55,6 +59,17 @@ class HybridModel:
     model: ModelName = "espm"
     held: tuple[str, ...] = ()
     finding: str = ""
+
+    def __post_init__(self) -> None:
+        """Raises InputError for what is no Cell, no effects, no step, no hold, no state of charge or no model."""
+        check_cell(self.cell)
+        object.__setattr__(self, "effects", checked_effects(self.effects))
+        step: object = self.dt_s  # a file may hold anything
+        if not isinstance(step, Real) or not 0.0 < float(step) < np.inf:
+            raise InputError(f"dt_s = {self.dt_s!r} has to be a positive number of seconds.")
+        check_choice("hold", self.hold, Hold)
+        check_soc(self.soc0)
+        check_choice("model", self.model, ModelName)
 
     def __repr__(self) -> str:
         cell = f"cell {self.cell.name!r}" + (f" changed by {', '.join(self.held)}" if self.held else "")
@@ -137,23 +152,27 @@ class HybridModel:
         """Read a model folder. Raises InputError naming the file that is missing or not as written by `save`."""
         folder = Path(folder)
         head, parts = read_model(folder)
-        correction, intervals, bands = (parts.get(name) for name in ("correction", "intervals", "bands"))
-        try:
+        read: dict[str, Any] = {}
+        for name, of_content in (
+            ("correction", SparseModel.from_dict),
+            ("intervals", calibrated_from_dict),
+            ("bands", FreeRunBands.from_dict),
+        ):
+            with _as_saved(part_file(folder, name)):
+                read[name] = of_content(parts[name]) if parts.get(name) else None
+        with _as_saved(part_file(folder, "effects")):
+            read["effects"] = tuple(active_effect(content) for content in parts.get("effects", ()))
+        with _as_saved(folder / HEAD):
             return HybridModel(
                 cell=Cell.from_bpx(part_file(folder, "cell.bpx"), fitted=True),
-                effects=tuple(active_effect(content) for content in parts.get("effects", ())),
-                correction=SparseModel.from_dict(correction) if correction else None,
-                intervals=calibrated_from_dict(intervals) if intervals else None,
-                bands=FreeRunBands.from_dict(bands) if bands else None,
-                dt_s=float(head["dt_s"]),
+                dt_s=head["dt_s"],
                 hold=head["hold"],
                 soc0=head["soc0"],
                 model=head.get("model", "espm"),
                 held=tuple(head.get("held", ())),
                 finding=head.get("finding", ""),
+                **read,
             )
-        except (KeyError, TypeError) as error:
-            raise InputError(f"{folder} is not a whole model: {error}; save it again.") from None
 
     def _soc0(self, record: Measurement, soc0: float | None, measured: bool) -> float:
         if soc0 is not None:
@@ -262,6 +281,21 @@ class HybridModel:
             soc=physics.soc,
             outside=onto(prediction.outside.astype(float)) > 0,
         )
+
+
+@contextmanager
+def _as_saved(file: Path) -> Iterator[None]:
+    """What is wrong with the content of a file of a model, as a sentence that names the file."""
+    try:
+        yield
+    except CellError:
+        raise  # which names its own
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    except KeyError as error:
+        raise InputError(f"{file} lacks {error}; save the model again.") from None
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
+        raise InputError(f"{file} is not as it was saved ({error}); save the model again.") from None
 
 
 def _each_row(temperature_degc: Numbers | None, rows: tuple[int, ...]) -> Array | None:

@@ -59,13 +59,19 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     schema = head.get("schema") if isinstance(head, dict) else None
     if schema != SCHEMA:
         raise InputError(f"{folder / HEAD} has schema {schema!r}; this version reads {SCHEMA!r}.")
+    names = head.get("parts")
+    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise InputError(f"{folder / HEAD} has no list of parts; save the model again.")
     arrays = _read_arrays(folder / ARRAYS)
-    try:
-        return head, {
-            name: _with_arrays(_read_json(part_file(folder, name)), arrays) for name in head["parts"]
-        }
-    except (KeyError, TypeError) as error:
-        raise InputError(f"{folder} is not a whole model: {error} is missing; save it again.") from None
+    parts = {}
+    for name in names:
+        try:
+            parts[name] = _with_arrays(_read_json(part_file(folder, name)), arrays)
+        except KeyError as error:
+            raise InputError(
+                f"{folder / ARRAYS} lacks {error}, which {part_file(folder, name).name} names; save the model again."
+            ) from None
+    return head, parts
 
 
 def _below(folder: Path) -> str:
@@ -119,5 +125,7 @@ def _read_json(path: Path, hint: str = "save the model again.") -> Any:
 def _read_arrays(path: Path) -> dict[str, Array]:
     try:
         return read_arrays(path)
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist; save the model again.") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read ({error}); save the model again.") from None

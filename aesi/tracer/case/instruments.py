@@ -33,7 +33,7 @@ def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measureme
     record = Record(data.finer.time_s, data.finer.current_a)
     for active in acting:
         assert active.effect.on_record is not None
-        record = active.effect.on_record(record, **active.parameters)
+        record = active.act(active.effect.on_record, record)
     return data.with_record(record.time_s, record.current_a)
 
 

@@ -93,6 +93,8 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ([*CALIBRATE, "--data", "./d.csv"], "--data d.csv is there twice; give it once"),
         ([*CALIBRATE, "--impedance", "z.csv"], "There is no file z.csv"),
         ([*CALIBRATE, "--temperature", "e.csv=10"], "--temperature e.csv=...: there is no such record"),
+        ([*CALIBRATE, "--prior", "contact.resistance=nan:0.1"], "VALUE has to be a finite number, and SD,"),
+        ([*CALIBRATE, "--prior", "contact.resistance=0.1:0"], "its standard deviation, one above 0"),
         (["run", "."], ". is a folder; give an experiment file"),
     ],
 )
@@ -266,6 +268,38 @@ def test_a_folder_given_for_a_record_was_told_as_a_file_that_would_be_lost(call,
     assert (tmp_path / "records" / "new.csv").read_text() == "kept"
 
 
+@pytest.mark.parametrize("option", ["--cell", "--current"])
+def test_a_folder_around_the_output_was_told_as_a_file_that_would_be_lost(
+    call, cell, current, tmp_path, option
+):
+    (tmp_path / "o.csv").write_text("kept")
+    given = {"--cell": cell, "--current": current} | {option: tmp_path}
+    code, _, err = call(
+        "simulate", *(word for pair in given.items() for word in pair), "--out", tmp_path / "o.csv"
+    )
+    assert code == 2
+    assert "holds no model.json, so it is no model" in err or f"{tmp_path} is a folder" in err
+    assert "would be lost" not in err
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("simulate", "--current", "i.csv"),
+        ("impedance", "--soc", "0.5", "--frequencies", "1:10:3"),
+        ("impedance", "--soc", "0.5", "--frequencies", "1:10:3", "--effect", "double_layer"),
+    ],
+)
+def test_an_effect_file_that_no_effect_names_was_ignored_without_a_word(call, cell, tmp_path, command):
+    (tmp_path / "mine.py").write_text(
+        '"""Nothing."""\nfrom aesi.physics import Effect\n'
+        'EFFECT = Effect("nothing", "physics", __doc__, on_model=lambda m: m)\n'
+    )
+    code, _, err = call(*command, "--cell", cell, "--out", "o.csv", "--effect-file", tmp_path / "mine.py")
+    assert code == 2
+    assert "not simulated unless it is named; add --effect nothing, or leave the file out" in err
+
+
 @pytest.mark.parametrize("out", ["cells", "cells/found"])
 def test_results_of_a_batch_were_read_as_a_cell_the_next_time(call, tmp_path, out):
     (tmp_path / "cells" / "a").mkdir(parents=True)
@@ -297,6 +331,30 @@ def test_a_workspace_that_may_not_be_written_to_says_where_else_it_can_be(
     assert err.endswith("or in the one that AESI_HOME names.\n")
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "words"),
+    [
+        (
+            "--prior",
+            "foo=1:0.1",
+            "no such parameter in this fit. There are negative.capacity, positive.capacity,",
+        ),
+        ("--posterior", "2", "--posterior 2: at least 4 samples"),
+    ],
+)
+def test_what_no_fit_can_be_asked_for_was_told_after_it_was_announced(
+    call, cell, tmp_path, option, value, words
+):
+    if option == "--posterior":
+        pytest.importorskip("emcee")
+    code, _, err = call(
+        "calibrate", "--cell", cell, "--data", "none.csv", "--out", tmp_path / "n.json", option, value
+    )
+    assert code == 2
+    assert words in err
+    assert "Fitting" not in err
+
+
 def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
     code, _, err = call(
         "impedance",
@@ -320,8 +378,11 @@ def test_days_of_records_are_read_by_record():
 
 def test_what_is_known_of_parameters_is_read_by_name():
     assert priors(["contact.resistance=0.0134:0.001"]) == {"contact.resistance": (0.0134, 0.001)}
-    for text in ("contact.resistance=0.0134", "0.0134:0.001", "contact.resistance=a:b", "a=1:inf"):
+    for text in ("contact.resistance=0.0134", "0.0134:0.001", "contact.resistance=a:b"):
         with pytest.raises(InputError, match=f"--prior {text}: has to read NAME=VALUE:SD"):
+            priors([text])
+    for text in ("a=1:inf", "a=nan:1", "a=1:-1"):
+        with pytest.raises(InputError, match=f"--prior {text}: VALUE has to be a finite number, and SD"):
             priors([text])
     with pytest.raises(InputError, match="--prior is there twice for a; give it once"):
         priors(["a=1:1", "a=2:1"])
@@ -347,6 +408,21 @@ def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
     assert {"time_s", "current_a", "voltage_v", "c_sp", "c_sn", "c_e0", "c_eL", "soc"} <= set(table)
     assert len(table) == 600
     assert table["soc"][0] == pytest.approx(0.6, abs=1e-3)
+
+
+def test_the_temperature_of_a_simulated_file_was_not_read_again(call, cell, current, tmp_path):
+    warm, own, plain, again = (tmp_path / f"{name}.csv" for name in ("warm", "own", "plain", "again"))
+    pd.read_csv(current).assign(temperature_degc=40.0).to_csv(tmp_path / "i.csv", index=False)
+    simulate = ("simulate", "--cell", cell, "--soc0", 0.8)
+    assert call(*simulate, "--current", tmp_path / "i.csv", "--out", warm)[0] == 0
+    assert call(*simulate, "--current", current, "--out", own, "--self-heating")[0] == 0
+    assert call(*simulate, "--current", current, "--out", plain)[0] == 0
+    assert np.all(pd.read_csv(warm).temperature_degc == 40.0)
+    table = pd.read_csv(own)
+    assert np.allclose(table.temperature_degc, table.temperature_k - 273.15)
+    assert "temperature_degc" not in pd.read_csv(plain)  # it is that of the cell's file
+    assert call(*simulate, "--current", warm, "--out", again)[0] == 0
+    assert np.allclose(pd.read_csv(again).voltage_v, pd.read_csv(warm).voltage_v)
 
 
 def test_a_profile_with_other_headers_is_told_only_of_columns_that_it_has(call, cell, tmp_path):

@@ -74,9 +74,7 @@ def test_the_file_is_in_the_state_of_the_last_day_with_a_load_or_of_a_given_one(
 
 @pytest.mark.parametrize("as_of", [date(2017, 3, 10), date(2027, 3, 11)])
 def test_a_day_outside_those_of_the_records_was_taken_without_a_word(as_of):
-    with pytest.raises(
-        DataError, match=f"--as-of {as_of}: the dated records are of 2017-03-11 to 2017-06-07"
-    ):
+    with pytest.raises(DataError, match=f"as of {as_of}: the dated records are of 2017-03-11 to 2017-06-07"):
         of([*DAYS, "undated"], DAYS, as_of=as_of)
 
 

@@ -135,7 +135,7 @@ def test_a_prior_that_the_records_contradict_is_told(start, records, found):
         (
             "contacts",
             (0.01, 1e-3),
-            "the prior of contacts: there is no such parameter in this fit, whose names are those of its report",
+            "there is no such parameter in this fit; did you mean 'contact.resistance'? There are negative.capacity, ",
         ),
         (
             "contact.resistance",
@@ -166,7 +166,7 @@ def test_a_record_without_the_column_takes_the_temperature_that_is_given_for_it(
     assert given.residual(x) == pytest.approx(measured.residual(x), abs=1e-9)
     without = problem(start, bare, Conditions())
     assert len(without[0].free) < len(given.free)  # nothing tells energies
-    assert any("declares; --temperature FILE=DEGC says another." in note for note in without[1])
+    assert any("declares; its own can be given (--temperature FILE=DEGC)." in note for note in without[1])
 
 
 def test_a_temperature_that_cannot_be_used_is_refused(start, records):

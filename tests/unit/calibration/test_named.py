@@ -25,9 +25,9 @@ def test_only_those_that_share_a_name_are_numbered():
 
 def test_what_is_said_of_a_name_that_two_share_is_refused():
     given = tuple(record(name) for name in ("us06", "c20", "us06"))
-    with pytest.raises(DataError, match=r"--temperature us06=\.\.\.: 2 records have this name"):
-        named_apart(given, {"--temperature": {"us06": 10.0}})
-    assert len(named_apart(given, {"--temperature": {"c20": 10.0}})) == 3
+    with pytest.raises(DataError, match="the temperature of us06: 2 records have this name"):
+        named_apart(given, {"temperature": {"us06": 10.0}})
+    assert len(named_apart(given, {"temperature": {"c20": 10.0}})) == 3
 
 
 def test_two_records_of_one_name_each_have_their_own_share_of_the_capacity(start, records):

@@ -179,6 +179,11 @@ def test_a_single_particle_file_is_refused(content):
     assert "Electrolyte" in fault(content)
 
 
+def test_a_full_cell_under_the_header_of_a_single_particle_was_told_in_words_of_the_schema(content):
+    content["Header"]["Model"] = "SPM"
+    assert 'those of a full cell; write "Model": "SPMe" there, or "DFN".' in fault(content)
+
+
 def test_a_blend_is_refused(content):
     content["Parameterisation"]["Negative electrode"]["Particle"] = {"Primary": {}}
     assert "blend" in fault(content)
@@ -371,6 +376,17 @@ def test_a_temperature_of_0_in_a_file_was_taken_for_25_degc(content, name):
             r"film resistance \[Ohm.m2\] is -0.01 at a stoichiometry of 0.02; it has to be 0 or more",
         ),
         (
+            {"Negative electrode film resistance [Ohm.m2]": 3.0},
+            r"film resistance .* = 3 takes 4.46 V at 5 A over 3.36 m2 .* 10 Ohm.cm2, is 0.001",
+        ),
+        (
+            {"Negative electrode double-layer capacity [F.m-2]": 2e4},
+            "capacity .* = 20000 is no double layer's; .* 20 uF/cm2 is 0.2",
+        ),
+        ({"Positive electrode double-layer capacity [F.m-2]": 2e-5}, "= 2e-05 is no double layer's"),
+        ({"Thermal conductivity [W.m-1.K-1]": 200.0}, "= 200 is no winding's; .* 200 mW/.m K. is 0.2"),
+        ({"Thermal conductivity [W.m-1.K-1]": 0.002}, "= 0.002 is no winding's"),
+        (
             {"Positive electrode reaction rate factor": 0.0},
             "reaction rate factor is 0 at a stoichiometry of 0; it has to be a positive number",
         ),
@@ -446,6 +462,14 @@ def test_a_file_that_is_no_text_is_refused_in_one_sentence(tmp_path):
     (tmp_path / "record.mpr").write_bytes(bytes(range(256)))
     with pytest.raises(CellError, match=r"record\.mpr is not text .* is it a record\?"):
         Cell.from_bpx(tmp_path / "record.mpr")
+
+
+def test_a_cell_file_in_latin_1_was_taken_for_a_record(content, tmp_path):
+    content["Header"]["Title"] = "Zelle für Prüfstand 3"
+    path = tmp_path / "cell.json"
+    path.write_bytes(json.dumps(content, ensure_ascii=False).encode("latin-1"))
+    with pytest.raises(CellError, match=r"cell\.json is not written in UTF-8, .*; save it as UTF-8\."):
+        Cell.from_bpx(path)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import json
 from datetime import date
 from pathlib import Path
 
+import numpy as np
 import pytest
 from small_experiment import BPX, SOC0, experiment, write_record
 
@@ -14,6 +15,7 @@ from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_experiment, case_of_files
 from aesi.pipeline.experiment.config import read_experiment
 from aesi.pipeline.experiment.load import load
+from aesi.records import Spectrum
 
 EXPERIMENTS = Path(__file__).resolve().parents[3] / "experiments"
 
@@ -131,6 +133,14 @@ def test_a_posterior_of_too_few_samples_was_refused_after_the_fit(tmp_path, monk
     record = read_measurement(write_record(tmp_path))
     with pytest.raises(InputError, match="--posterior 2: at least 4"):
         calibrate_files(BPX, [record], tmp_path / "new.json", Request(posterior=2))
+
+
+def test_spectra_that_cannot_be_used_were_told_after_the_fit(tmp_path, monkeypatch):
+    monkeypatch.setattr("aesi.pipeline.calibrate.calibrate", lambda *_, **__: pytest.fail("it was fitted"))
+    record = read_measurement(write_record(tmp_path))
+    percent = Spectrum("z", np.array([1.0]), np.array([1e-3 - 1e-4j]), soc=50.0)
+    with pytest.raises(DataError, match="z: its state of charge of 50"):
+        calibrate_files(BPX, [record], tmp_path / "new.json", Request(impedance=(percent,)))
 
 
 def test_runs_of_a_cell_file_that_was_edited_were_taken_for_seeds_of_one_setting(tmp_path):

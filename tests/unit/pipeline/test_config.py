@@ -85,7 +85,7 @@ def test_an_unknown_key_is_named_with_its_nearest_match(changes, found, near):
             },
             "repeat 1 is in train twice",
         ),
-        ({"models": []}, "models = [] is not admissible"),
+        ({"models": []}, "models = [] is not admissible: it has to have at least 1 item."),
         ({"models": ["ESPM", "ESPM"]}, "models: ESPM is named twice"),
         (
             {"conformal": {"method": "spci"}},

@@ -222,6 +222,29 @@ def test_physics_with_effects_alone_is_a_model_too(model, data, tmp_path):
         again.predict(data.time_s, data.current_a)
 
 
+def test_a_saved_model_was_simulated_with_another_hold_than_it_was_predicted_with(model, data, tmp_path):
+    folder = replace(model, correction=None, intervals=None, bands=None).save(tmp_path / "model")
+    for name, hold in (("own", None), ("asked", "linear")):
+        said = {}
+        for todo in (simulate_file, predict_file):
+            said[todo] = []
+            data.to_frame().to_csv(tmp_path / "drive.csv", index=False)
+            asked = ProfileRequest(SOC0, hold)
+            todo(
+                folder,
+                tmp_path / "drive.csv",
+                tmp_path / f"{todo.__name__}.csv",
+                asked,
+                say_notes=said[todo].extend,
+            )
+        simulated, predicted = (
+            pd.read_csv(tmp_path / f"{todo.__name__}.csv").voltage_v for todo in (simulate_file, predict_file)
+        )
+        np.testing.assert_allclose(simulated, predicted, atol=1e-8)
+        words = "as declared" if name == "asked" else "since the row before, as the saved model was made"
+        assert all(any(words in note for note in notes) for notes in said.values())
+
+
 @pytest.mark.parametrize("damage", ["missing", "schema", "list", "no parts", "arrays", "part"])
 def test_a_damaged_folder_is_named(model, tmp_path, damage):
     folder = model.save(tmp_path / "model")
@@ -239,6 +262,39 @@ def test_a_damaged_folder_is_named(model, tmp_path, damage):
         (folder / "correction.json").unlink()
     with pytest.raises(InputError, match=str(folder)):
         HybridModel.load(folder)
+
+
+@pytest.mark.parametrize(
+    ("file", "changes", "sentence"),
+    [
+        ("model.json", {"dt_s": "one"}, "dt_s = 'one' has to be a positive number of seconds"),
+        ("model.json", {"dt_s": -1.0}, "dt_s = -1.0 has to be a positive number of seconds"),
+        ("model.json", {"hold": "forward"}, "hold = 'forward' is not known; give 'linear' or 'backward'"),
+        ("model.json", {"soc0": 90}, "soc0 = 90 is not a state of charge"),
+        ("model.json", {"model": "spm"}, "model = 'spm' is not known"),
+        ("model.json", {"hold": None}, "model.json lacks 'hold'; save the model again"),
+        ("model.json", {"parts": 3}, "model.json has no list of parts"),
+        ("effects.json", [{"id": "series_resistance"}], "effects.json lacks 'effect'"),
+        ("effects.json", ["series_resistance"], "effects.json is not as it was saved"),
+        (
+            "effects.json",
+            [{"effect": "series_resistance", "parameters": {"resistance_ohm": 99}}],
+            "effects.json: series_resistance: resistance_ohm = 99 ohm is outside",
+        ),
+        ("correction.json", {"terms": "array:none"}, "arrays.npz lacks 'none', which correction.json names"),
+    ],
+)
+def test_a_damaged_file_of_a_model_was_told_without_its_name_or_as_a_bug(
+    model, tmp_path, file, changes, sentence
+):
+    path = model.save(tmp_path / "model") / file
+    if file == "model.json":
+        whole = json.loads(path.read_text()) | changes
+        changes = {key: value for key, value in whole.items() if value is not None}
+    path.write_text(json.dumps(changes))
+    with pytest.raises(InputError, match=sentence) as caught:
+        HybridModel.load(tmp_path / "model")
+    assert str(tmp_path / "model") in str(caught.value)
 
 
 def test_a_record_of_other_sampling_is_loaded_at_the_experiments_step(record):

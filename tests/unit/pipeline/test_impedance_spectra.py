@@ -1,5 +1,6 @@
 """Measured spectra held against a cell: what is left out or assumed is said."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 import aesi
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import activated
-from aesi.pipeline.impedance import held_against, impedance_file, read_frequencies
+from aesi.pipeline.impedance import check_spectra, held_against, impedance_file, read_frequencies
 from aesi.records import Spectrum
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -46,6 +47,24 @@ def test_a_spectrum_below_empty_was_left_out_in_silence(cell):
     ]
 
 
+def test_spectra_in_milliohm_were_held_against_a_cell_in_ohm(cell):
+    cold = Spectrum(
+        "s", FREQUENCY_HZ, aesi.impedance(cell, FREQUENCY_HZ, soc=0.5, temperature_degc=-20.0), soc=0.5
+    )
+    check_spectra(cell, [spectrum(cell, soc=0.5), cold])
+    with pytest.raises(DataError, match=r"s: \|Z\| is .* as of no cell of 5 A.h; .* 30 mOhm is 0.03"):
+        check_spectra(
+            cell, [spectrum(cell, soc=0.5), replace(spectrum(cell, soc=0.5), z_ohm=1e3 * cold.z_ohm)]
+        )
+
+
+def test_a_calibration_went_on_to_its_end_where_no_spectrum_could_be_used(cell):
+    check_spectra(cell, [])
+    check_spectra(cell, [spectrum(cell, soc=50.0), spectrum(cell, soc=0.5)])
+    with pytest.raises(DataError, match=r"s: its state of charge of 50 is not .* there is no other"):
+        check_spectra(cell, [spectrum(cell, soc=50.0)])
+
+
 def test_an_assumed_temperature_is_said_and_a_state_is_not_assumed(cell):
     (one,), told = held_against(cell, [spectrum(cell, soc=0.5)])
     assert told == ("s: no temperature; the model is taken at 25 degC.",)
@@ -79,6 +98,16 @@ def test_a_shift_of_the_temperature_was_left_out_of_an_impedance_without_a_word(
     cell = CELLS / "nmc_30ah.bpx.json"
     impedance_file(cell, 0.5, "1:10:4", tmp_path / "z.csv", effects=effects, say_notes=said.extend)
     assert "ambient_temperature: not in the impedance, which is at the temperature that is given." in said
+
+
+def test_what_an_effect_on_the_voltage_answers_later_was_left_out_without_a_word(tmp_path):
+    said = []
+    effects = activated([("ocv_hysteresis", {}), ("film_growth", {}), ("double_layer", {})])
+    cell = CELLS / "nmc_30ah.bpx.json"
+    impedance_file(cell, 0.5, "0.01:10:4", tmp_path / "z.csv", effects=effects, say_notes=said.extend)
+    assert (
+        "ocv_hysteresis, film_growth: only what it answers to a current at once is in the impedance." in said
+    )
 
 
 @pytest.mark.parametrize("text", ["1:1000:100000000", "1:1e30:10"])
