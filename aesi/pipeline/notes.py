@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from datetime import date
 
 import numpy as np
 
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName
+from aesi.physics.cell import Soh
 from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
@@ -65,6 +67,15 @@ def without_energies(
     return (
         f"the cell's file declares no activation energy for {', '.join(missing)}: taken as at "
         f"{reference_k - ZERO_CELSIUS_K:.4g} degC, which is up to {farthest:.0f} K off.",
+    )
+
+
+def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
+    """A sentence on what a state of health that is a day stands for; none for a share."""
+    if not isinstance(soh, date):
+        return ()
+    return (
+        f"the cell as of {soh}: {cell.soh_on(soh):.3f} of its file's capacity, by the records that it was fitted to.",
     )
 
 

@@ -23,7 +23,7 @@ from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.start.open_circuit import GIVEN_SD
-from aesi.pipeline.notes import of_another_model, temperature_sentence, without_energies
+from aesi.pipeline.notes import of_another_model, of_day, temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -83,7 +83,7 @@ def simulate_file(
     declared = declared_model(cell).with_soh(asked.soh)
     if declared.correction is not None:
         say(["the saved model's learnt correction is no part of a simulation; `aesi predict` has it."])
-    say(of_another_model(declared, model))
+    say([*of_another_model(declared, model), *of_day(declared.cell, asked.soh)])
     saved, lone = cell.is_dir(), profile.voltage_v is None
     assumed = declared.hold if saved else "linear" if lone else assumed_hold(profile.time_s)
     used = replace(
@@ -132,6 +132,7 @@ def predict_file(
     if measured and profile.voltage_v is None:
         raise DataError(f"{current.name} has no voltage_v; leave out --measured for a free run.")
     saved = HybridModel.load(model).with_soh(asked.soh)
+    say(of_day(saved.cell, asked.soh))
     used = replace(saved, hold=asked.hold or saved.hold)
     placed = _placed(used, profile, current, asked, say, saved=True)
     hybrid, record = placed.model, placed.record

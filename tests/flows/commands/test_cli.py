@@ -473,6 +473,7 @@ def test_a_state_of_health_is_that_of_the_day_of_a_test(call, cell, current, tmp
     for name, soh in (("share", 0.9), ("day", "2018-01-16")):
         code, _, err = call(*arguments, tmp_path / name, "--soh", soh)
         assert code == 0, err
+    assert "the cell as of 2018-01-16: 0.900 of its file's capacity" in err
     assert (tmp_path / "day").read_text() == (tmp_path / "share").read_text()
     code, _, err = call(*arguments, tmp_path / "c.csv", "--soh", "2018-02-01")
     assert code == 2
