@@ -30,7 +30,7 @@ from aesi.pipeline.experiment.sources import (
     sources_of,
     with_keys,
 )
-from aesi.pipeline.notes import temperature_sentence, without_energies
+from aesi.pipeline.notes import of_day, temperature_sentence, without_energies
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, LeftOutDrives, Split, hold_sentence
@@ -118,7 +118,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     cell, hold = given.cell, config.data.hold
     sources = sources_of(config, path)
     records, told = _on_grid(config, given, sources)
-    notes = [*cell.unread, *told]
+    notes = [*cell.unread, *of_day(cell, config.cell.soh), *told]
     drives = training_drives(config.data, records, sources.roles)
     if config.data.repeats is not None:
         (cut,) = records.values()

@@ -174,5 +174,6 @@ def test_an_experiment_has_a_cell_of_the_day_of_its_test(tmp_path):
     assert "the cell as of 2018-01-06: 0.950 of its file's capacity" in " ".join(case.notes)
     cell = {"bpx": str(dated), "soc0": SOC0, "start": "declared"}
     record = write_record(tmp_path)
-    whole, aged = (load(experiment(record, cell=c)).cell for c in (cell, cell | {"soh": date(2018, 1, 6)}))
-    assert aged.capacity_ah == pytest.approx(0.95 * whole.capacity_ah)
+    whole, aged = (load(experiment(record, cell=c)) for c in (cell, cell | {"soh": date(2018, 1, 6)}))
+    assert aged.cell.capacity_ah == pytest.approx(0.95 * whole.cell.capacity_ah)
+    assert "the cell as of 2018-01-06: 0.950 of its file's capacity" in " ".join(aged.notes)
