@@ -160,15 +160,20 @@ def _withdraw(record: RunRecord, tracker: Tracker) -> None:
 
 def resume_key(config: ExperimentConfig) -> str:
     """What a run has to share to be gone on with: the settings, what a candidate may take, the content of the files
-    that they name, the program.
+    that they name and of those of the catalogue, the program.
 
     What a run has tracked is not tracked again, so that candidates of other data or of another version, or that had
     failed for want of time, would stand beside the new ones.
     """
-    from aesi.pipeline.experiment.sources import named_files
+    from aesi.pipeline.experiment.sources import catalogue_files, named_files
 
+    files = list(named_files(config).values())
+    with suppress(
+        InputError
+    ):  # there is nothing of a set that cannot be had, which is told when the data are loaded
+        files += catalogue_files(config)
     limits = f"{config.search.timeout_s:g} s, {config.search.memory_mb:g} MB"
-    return fingerprint.key(config.digest, limits, source_digest(), *contents(named_files(config).values()))
+    return fingerprint.key(config.digest, limits, source_digest(), *contents(files))
 
 
 def _unfinished(

@@ -42,14 +42,18 @@ WITH_UNIT = {
 
 
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
-    """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
+    """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one.
+
+    Raises BegunOtherwise where a run that is gone on with was begun on other data or of another cell.
+    """
+    held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
+    tracker.as_begun(held, "records or a cell file")
     whole = _without_logins(loaded.config.model_dump(mode="json"))
     content = {key: value for key, value in whole.items() if key not in NO_PARAMETERS}
     tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
     tags = {NOTE: config.note, "aesi.setting": loaded.setting}
     if loaded.fallback:
         tags["aesi.fallback"] = loaded.fallback
-    held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name, **held}, tags)
     tracker.json("experiment.json", whole)
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))

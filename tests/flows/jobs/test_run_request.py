@@ -58,6 +58,22 @@ def test_a_run_was_gone_on_with_on_other_data_or_by_another_version(tmp_path, mo
     assert resume_key(config) != changed
 
 
+@pytest.mark.parametrize("edited", ["drive.csv", "pulses.csv", "cell.bpx.json"])
+def test_a_run_was_gone_on_with_over_an_edited_copy_of_the_catalogue(tmp_path, monkeypatch, edited):
+    folder = tmp_path / "lg_m50t_w8"
+    folder.mkdir()
+    for name in ("drive.csv", "pulses.csv", "cell.bpx.json", "unused.csv"):
+        (folder / name).write_text(name)
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))
+    data = {"kind": "catalogue", "set": "lg_m50t_w8", "train": ["pulses"], "test": ["drive"]}
+    config = parse_experiment({"name": "x", "cell": {"bpx": "catalogue"}, "data": data}, base=tmp_path)
+    before = resume_key(config)
+    (folder / "unused.csv").write_text("corrected")
+    assert resume_key(config) == before
+    (folder / edited).write_text("corrected")
+    assert resume_key(config) != before
+
+
 def test_a_run_was_gone_on_with_though_its_candidates_may_take_longer_now(path):
     config = RunRequest(path).config()
     longer, more = (
