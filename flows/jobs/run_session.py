@@ -41,7 +41,7 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
     Raises DiskFull, with what to do, where there is no room for what the run has to keep, and RunTaken where another
     process works on the run that is to be gone on with.
     """
-    config = request.config()
+    config = request.config
     with _advice_where_full(request), ExitStack() as held:
         tracker, record = _begin(request, config, store, console, held)
         kept = f"Everything so far is kept; go on with: {request.resuming}"

@@ -42,7 +42,7 @@ def start(
     from flows.evaluation.in_reach import check_in_reach
 
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache, use_prefect)
-    config = request.config()  # bad input is refused before anything is started
+    config = request.config  # bad input is refused before anything is started
     check_roles(config)
     check_there(config)
     check_in_reach(config.runner)
@@ -57,6 +57,7 @@ def start(
             address=request.address,
             resume=request.resume,
             use_cache=request.use_cache,
+            request=request,
         )
         return Path(folder)
 

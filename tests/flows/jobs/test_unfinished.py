@@ -32,7 +32,7 @@ def unfinished(store, workspace):
     """An experiment, and the record of a run of it that failed."""
     path = workspace / "small.yaml"
     path.write_text("name: small\ndata: {kind: virtual}\n")
-    config = RunRequest(str(path)).config()
+    config = RunRequest(str(path)).config
     run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
     record = RunRecord(run_id, "small", resume_key(config), store.uri, time.time(), "failed")
     record.write()
