@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from aesi.errors import AesiError, InputError
 from aesi.numerics.files.contents import contents
 from aesi.numerics.files.source_digest import source_digest
+from aesi.numerics.files.whole import check_writable
 from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment, fingerprint
 from flows.base.console import Console
@@ -51,13 +52,22 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
 
 @contextmanager
 def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Tracker | None]:
-    """A tracked run of a job that is no experiment, closed as what it becomes; None where the store is away.
+    """A tracked run of a job that is no experiment, closed as what it becomes; None, which is said, where the store is
+    away or nothing can be written in the workspace: the job's results lie elsewhere.
 
     title : what the run is called.  Runs of the same name that were killed before are closed first.
     """
     from flows.tracking.store import Store, StoreAway
     from flows.tracking.tracker import Tracker
 
+    try:
+        check_writable(environment.state() / "state" / "any")
+    except OSError as error:
+        console.say(
+            f"not tracked: {error.filename}: {error.strerror}; AESI_HOME can name a folder for what is tracked."
+        )
+        yield None
+        return
     try:
         store = Store()
         _close_killed(subject.name, store, console)

@@ -107,9 +107,15 @@ def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], u
     """Under Prefect where it is wanted and answers; what the job came to does not depend on it."""
     if not use_prefect:
         return plainly()
+    try:
+        environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
+    except OSError as error:
+        Console().say(
+            f"Prefect has no place ({error.filename}: {error.strerror}); the stages run without it."
+        )
+        return plainly()
     if not os.environ.get("PREFECT_API_URL"):  # said at once: on a busy machine it takes half a minute
         Console().say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
-    environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
     job: KeptWork[T] = KeptWork()
     token = CURRENT.set(job)
     try:
