@@ -8,6 +8,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from aesi.numerics.files.whole import check_writable
+
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -65,5 +67,11 @@ def prepare_process() -> None:
 
 
 def make_prefect_home() -> None:
-    """Prefect makes its home folder but not the folders above it, and cannot start its server without."""
-    Path(os.environ["PREFECT_HOME"]).expanduser().mkdir(parents=True, exist_ok=True)
+    """Prefect makes its home folder but not the folders above it, and cannot start its server without.
+
+    Raises OSError where it cannot be made, or where a server that is started here could not keep its files in it.
+    """
+    home = Path(os.environ["PREFECT_HOME"]).expanduser()
+    home.mkdir(parents=True, exist_ok=True)
+    if not os.environ.get("PREFECT_API_URL"):
+        check_writable(home / "any")

@@ -9,8 +9,12 @@ from contextlib import contextmanager
 from types import FrameType
 
 
-class Overdue(Exception):
-    """The time is over. It names no reason: whoever set the limit knows what took too long."""
+class Overdue(BaseException):
+    """The time is over. It names no reason: whoever set the limit knows what took too long, and catches it.
+
+    No Exception, since work that goes on without what fails (a study's copy, a candidate, an artifact) would take it
+    for such a failure and go on without a limit.
+    """
 
 
 @contextmanager

@@ -30,7 +30,7 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
     from flows.tracking.store import Store
 
     started = time.monotonic()
-    config = request.config()
+    config = request.config
     console.say(f"{config.name}: {config.note}" if config.note else config.name)
     store = Store(config.tracking.uri)
     with working_on(request, store, console) as tracker:
@@ -60,7 +60,7 @@ def _stages(
     from flows.search.study import run_study
     from flows.tracking.experiment_log import UNFITTED, CandidateTracker, track_result, track_start
 
-    loaded = run("data and physics", lambda: load(request.config()), retries=2)
+    loaded = run("data and physics", lambda: load(request.config), retries=2)
     config = loaded.config  # that of the fallback where it fell back to one
     for note in together(loaded.notes):
         console.say(f"  {note}")

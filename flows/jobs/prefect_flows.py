@@ -19,10 +19,9 @@ from flows.jobs.temporary_server import as_the_job
 
 def _experiment_name() -> str:
     """`measured_nmc, seed 0`."""
-    from aesi.pipeline.experiment.config import read_experiment
-
     given = flow_run.parameters
-    config = read_experiment(given["path"], given.get("overrides") or ())
+    read = given.get("request")
+    config = (read or RunRequest(given["path"], tuple(given.get("overrides") or ()))).config
     return f"{config.name}, seed {config.seed}"
 
 
@@ -42,12 +41,17 @@ def experiment(
     address: str | None = None,
     resume: bool = False,
     use_cache: bool = True,
+    request: Any = None,
 ) -> Path:
-    """The whole job of `aesi run`: data, physics, search, ensembles, intervals, tables, figures, report."""
+    """The whole job of `aesi run`: data, physics, search, ensembles, intervals, tables, figures, report.
+
+    request : all of the above with the file as it was read, which only a process that has read it can hand over. A
+    deployment gives none, and the file is read as the flow starts.
+    """
     environment.prepare_process()
     console = Console()
-    request = RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
-    limit_s = request.config().runner.stage_timeout_s
+    request = request or RunRequest(path, tuple(overrides or ()), runner, address, resume, use_cache)
+    limit_s = request.config.runner.stage_timeout_s
     return as_the_job(lambda: run_experiment(request, PrefectStages(console.say, limit_s), console))
 
 

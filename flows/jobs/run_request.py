@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from aesi.errors import InputError
@@ -22,8 +23,12 @@ class RunRequest:
     use_cache: bool = True
     use_prefect: bool = True
 
+    @cached_property
     def config(self) -> ExperimentConfig:
-        """The experiment with all overrides.  Raises InputError for an address that nobody would go to."""
+        """The experiment with all overrides, read once: who edits the file then edits that of the next run.
+
+        Raises ConfigError for a file that is no experiment, InputError for an address that nobody would go to.
+        """
         config = read_experiment(self.path, self.overrides)
         if self.runner is None and self.address is None:
             return config

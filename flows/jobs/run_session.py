@@ -6,19 +6,20 @@ import errno
 import shutil
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from aesi.errors import AesiError, InputError
 from aesi.numerics.files.contents import contents
 from aesi.numerics.files.source_digest import source_digest
+from aesi.numerics.files.whole import check_writable
 from aesi.pipeline.experiment.config import ExperimentConfig
 from flows.base import environment, fingerprint
 from flows.base.console import Console
 from flows.base.interrupt import kept_on_interrupt
 from flows.jobs.run_request import RunRequest
-from flows.tracking.run_records import RunLock, RunRecord, records
+from flows.tracking.run_records import RunLock, RunRecord, RunTaken, records
 
 if TYPE_CHECKING:
     from flows.tracking.store import Store
@@ -38,11 +39,12 @@ class DiskFull(AesiError):
 def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[Tracker]:
     """The tracked run to work on, new or resumed, closed as what it becomes.
 
-    Raises DiskFull, with what to do, where there is no room for what the run has to keep.
+    Raises DiskFull, with what to do, where there is no room for what the run has to keep, and RunTaken where another
+    process works on the run that is to be gone on with.
     """
-    config = request.config()
-    with _advice_where_full(request):
-        tracker, record = _begin(request, config, store, console)
+    config = request.config
+    with _advice_where_full(request), ExitStack() as held:
+        tracker, record = _begin(request, config, store, console, held)
         kept = f"Everything so far is kept; go on with: {request.resuming}"
         with kept_on_interrupt(kept), _ended_as_it_ends(record, tracker, console):
             yield tracker
@@ -50,13 +52,22 @@ def working_on(request: RunRequest, store: Store, console: Console) -> Iterator[
 
 @contextmanager
 def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Tracker | None]:
-    """A tracked run of a job that is no experiment, closed as what it becomes; None where the store is away.
+    """A tracked run of a job that is no experiment, closed as what it becomes; None, which is said, where the store is
+    away or nothing can be written in the workspace: the job's results lie elsewhere.
 
     title : what the run is called.  Runs of the same name that were killed before are closed first.
     """
     from flows.tracking.store import Store, StoreAway
     from flows.tracking.tracker import Tracker
 
+    try:
+        check_writable(environment.state() / "state" / "any")
+    except OSError as error:
+        console.say(
+            f"not tracked: {error.filename}: {error.strerror}; AESI_HOME can name a folder for what is tracked."
+        )
+        yield None
+        return
     try:
         store = Store()
         _close_killed(subject.name, store, console)
@@ -66,34 +77,34 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
         yield None
         return
     record = RunRecord(tracker.run_id, subject.name, subject.digest, store.uri, time.time())
-    record.write()
-    with _ended_as_it_ends(record, tracker, console):
-        yield tracker
+    with RunLock(tracker.run_id):
+        record.write()
+        with _ended_as_it_ends(record, tracker, console):
+            yield tracker
 
 
 @contextmanager
 def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> Iterator[None]:
-    """Within, this process works on the run; it is closed as finished, failed or killed.
+    """Within, this process, which holds the run's lock, works on it; it is closed as finished, failed or killed.
 
     One that ends at bad input before anything came of it is taken back: nothing has run.
     """
-    with RunLock(tracker.run_id):
-        try:
-            yield
-        except KeyboardInterrupt:
-            _close(record, tracker, "killed", wait_s=5)
-            raise
-        except InputError as error:
-            if tracker.empty and error.exit_code == BAD_INPUT:
-                _withdraw(record, tracker)
-            else:
-                _close(record, tracker, "failed", wait_s=10)
-            raise
-        except BaseException:
+    try:
+        yield
+    except KeyboardInterrupt:
+        _close(record, tracker, "killed", wait_s=5)
+        raise
+    except InputError as error:
+        if tracker.empty and error.exit_code == BAD_INPUT:
+            _withdraw(record, tracker)
+        else:
             _close(record, tracker, "failed", wait_s=10)
-            raise
-        left = tracker.end("FINISHED")
-        replace(record, status="finished").write()
+        raise
+    except BaseException:
+        _close(record, tracker, "failed", wait_s=10)
+        raise
+    left = tracker.end("FINISHED")
+    replace(record, status="finished").write()
     if left:
         from flows.tracking.store import without_login
 
@@ -102,21 +113,22 @@ def _ended_as_it_ends(record: RunRecord, tracker: Tracker, console: Console) -> 
 
 
 def _begin(
-    request: RunRequest, config: ExperimentConfig, store: Store, console: Console
+    request: RunRequest, config: ExperimentConfig, store: Store, console: Console, held: ExitStack
 ) -> tuple[Tracker, RunRecord]:
-    """The tracker of the run to work on and its record, after what earlier runs have left is put in order."""
+    """The tracker of the run to work on and its record, after what earlier runs have left is put in order; `held` keeps
+    the run's lock, outside of which nothing is done with it."""
     from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.tracker import Tracker
 
     _close_killed(config.name, store, console)
     deliver_leftovers(store, console.say)
-    old = _unfinished(config, store, console) if request.resume else None
+    old = _unfinished(config, store, console, held) if request.resume else None
     tracker = Tracker(store, config, console.say, old.run_id if old else None)
-    record = (
-        replace(old, status="running")
-        if old
-        else RunRecord(tracker.run_id, config.name, resume_key(config), store.uri, time.time())
-    )
+    if old:
+        record = replace(old, status="running")
+    else:
+        record = RunRecord(tracker.run_id, config.name, resume_key(config), store.uri, time.time())
+        held.enter_context(RunLock(tracker.run_id))  # before anybody could find its record without
     record.write()
     return tracker, record
 
@@ -158,29 +170,37 @@ def _withdraw(record: RunRecord, tracker: Tracker) -> None:
 
 def resume_key(config: ExperimentConfig) -> str:
     """What a run has to share to be gone on with: the settings, what a candidate may take, the content of the files
-    that they name, the program.
+    that they name and of those of the catalogue, the program.
 
     What a run has tracked is not tracked again, so that candidates of other data or of another version, or that had
     failed for want of time, would stand beside the new ones.
     """
-    from aesi.pipeline.experiment.sources import named_files
+    from aesi.pipeline.experiment.sources import catalogue_files, named_files
 
+    files = list(named_files(config).values())
+    with suppress(
+        InputError
+    ):  # there is nothing of a set that cannot be had, which is told when the data are loaded
+        files += catalogue_files(config)
     limits = f"{config.search.timeout_s:g} s, {config.search.memory_mb:g} MB"
-    return fingerprint.key(config.digest, limits, source_digest(), *contents(named_files(config).values()))
+    return fingerprint.key(config.digest, limits, source_digest(), *contents(files))
 
 
-def _unfinished(config: ExperimentConfig, store: Store, console: Console) -> RunRecord | None:
-    """The newest unfinished run of the same experiment, settings, files and program that is still in the store and that
-    nobody works on."""
+def _unfinished(
+    config: ExperimentConfig, store: Store, console: Console, held: ExitStack
+) -> RunRecord | None:
+    """The newest unfinished run of the same experiment, settings, files and program that is still in the store, with
+    its lock in `held`.  Raises RunTaken where another process works on it."""
     there = [one for one in records(config.name) if one.status in UNFINISHED and one.uri == store.uri]
     key = resume_key(config) if there else ""
     for record in there:
         if record.config_digest != key or not store.holds(record.run_id):
             continue
-        lock = RunLock(record.run_id)
-        if lock.acquire():
-            lock.release()
-            return record
+        held.enter_context(RunLock(record.run_id))
+        now = record.again()
+        if now is not None and now.status in UNFINISHED:
+            return now
+        held.close()  # it has ended since its record was read
     console.say(
         "There is no unfinished run of these settings and files by this version; a new one is started."
     )
@@ -192,8 +212,8 @@ def _close_killed(experiment: str, store: Store, console: Console) -> None:
     for record in records(experiment):
         if record.status != "running" or record.uri != store.uri:
             continue
-        with RunLock(record.run_id) as lock:
-            if lock.held:
+        with suppress(RunTaken), RunLock(record.run_id) as lock:
+            if lock.held and record.again() == record:
                 replace(record, status="killed").write()
                 _terminate(store, record.run_id)
                 console.say(f"run {record.run_id} had been killed; it is closed as such.")

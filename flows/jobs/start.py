@@ -42,7 +42,7 @@ def start(
     from flows.evaluation.in_reach import check_in_reach
 
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache, use_prefect)
-    config = request.config()  # bad input is refused before anything is started
+    config = request.config  # bad input is refused before anything is started
     check_roles(config)
     check_there(config)
     check_in_reach(config.runner)
@@ -57,6 +57,7 @@ def start(
             address=request.address,
             resume=request.resume,
             use_cache=request.use_cache,
+            request=request,
         )
         return Path(folder)
 
@@ -106,9 +107,15 @@ def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], u
     """Under Prefect where it is wanted and answers; what the job came to does not depend on it."""
     if not use_prefect:
         return plainly()
+    try:
+        environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
+    except OSError as error:
+        Console().say(
+            f"Prefect has no place ({error.filename}: {error.strerror}); the stages run without it."
+        )
+        return plainly()
     if not os.environ.get("PREFECT_API_URL"):  # said at once: on a busy machine it takes half a minute
         Console().say("Starting Prefect's temporary server (--no-prefect runs the stages without it) ...")
-    environment.make_prefect_home()  # before Prefect loads: it makes no parent folders
     job: KeptWork[T] = KeptWork()
     token = CURRENT.set(job)
     try:

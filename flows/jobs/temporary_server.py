@@ -38,7 +38,7 @@ def start_server(limit_s: float = START_S) -> None:
     try:
         with time_limit(limit_s):
             server.start()
-    except Exception as error:
+    except (Exception, Overdue) as error:
         server.stop()
         late = isinstance(error, Overdue)
         reason = f"it does not answer after {limit_s:g} s" if late else first_line(error)

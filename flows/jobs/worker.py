@@ -12,22 +12,32 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from aesi.errors import FitError
+from aesi.errors import AesiError, FitError
+from aesi.numerics.files.whole import check_writable
 from aesi.pipeline.experiment.config import read_experiment
 from flows.base.console import Console, duration
 
 
+class NotShared(AesiError):
+    """What a worker evaluates would reach nobody."""
+
+
 def work(path: Path, overrides: Sequence[str]) -> int:
-    """Evaluate candidates of an experiment until all are known; returns how many this process evaluated."""
+    """Evaluate candidates of an experiment until all are known; returns how many this process evaluated.
+
+    Raises NotShared, before any is, where others could not use what it evaluates.
+    """
     from aesi.pipeline.experiment.fit import build_problem
     from aesi.pipeline.experiment.load import load
     from flows.evaluation.generation import Tally
     from flows.evaluation.in_reach import check_in_reach
-    from flows.search.study import run_study
+    from flows.search.study import run_study, shared_folder
 
     console = Console()
     config = read_experiment(path, overrides)
     check_in_reach(config.runner)
+    if config.runner.storage is None:
+        _check_shared(shared_folder())
     where = "the database of runner.storage" if config.runner.storage else "this workspace"
     console.say(f"{config.name}: a worker on the candidates shared in {where}")
     started = time.monotonic()
@@ -39,3 +49,13 @@ def work(path: Path, overrides: Sequence[str]) -> int:
         console.say(f"  {error}")  # the run that picks from these candidates fails; the work is done
     console.say(f"{tally.evaluated} candidates evaluated here, in {duration(time.monotonic() - started)}")
     return tally.evaluated
+
+
+def _check_shared(folder: Path) -> None:
+    try:
+        check_writable(folder / "any")
+    except OSError as error:
+        raise NotShared(
+            f"{error.filename}: {error.strerror}; nobody could use the candidates that a worker evaluates here: name "
+            "the run's workspace by AESI_HOME, or a database by runner.storage."
+        ) from None

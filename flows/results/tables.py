@@ -1,7 +1,7 @@
 """`aesi tables`: the paper's tables rebuilt from the tracking store, and from nothing else.
 
 Each finished run carries its rows as the artifact summary.json. Runs that differ by seed alone are put
-together as mean and spread, with their ids beneath.
+together as mean and spread, with their ids beneath; those of another version of the program are named, and left out.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from aesi.errors import InputError
 from aesi.pipeline.report import tables
-from flows.tracking.experiment_log import UNFITTED
+from flows.tracking.experiment_log import CODE, SETTING, UNFITTED
 from flows.tracking.store import KIND, Store, without_login
 
 RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
@@ -36,14 +36,14 @@ def tables_of(
     """
     name, place = tracked_as(experiment)
     store = Store.to_read(uri or place)
-    runs = _chosen(store, name, run_ids)
+    runs, left_out = _chosen(store, name, run_ids)
     summaries = [_summary(store, run) for run in runs]
     rows = merged([summary["models"] for summary in summaries])
     if figures is not None:
         for run in runs:
             _copy_figures(store, run.info.run_id, figures / run.info.run_id)
     text = tables.render(rows, format)
-    return f"{text}\n{_footer(name, runs, format)}"
+    return f"{text}\n{_footer(name, runs, left_out, format)}"
 
 
 def merged(runs: Sequence[Sequence[dict[str, Any]]]) -> list[dict[str, Any]]:
@@ -92,8 +92,9 @@ def tracked_as(experiment: str) -> tuple[str, str | None]:
     return config.name, config.tracking.uri
 
 
-def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:
-    """The runs asked for, else the newest finished run of each seed that shares the newest run's setting.
+def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any], list[Any]]:
+    """The runs asked for, else the newest finished run of each seed that shares setting and program with the newest
+    run; and those of seeds that only another version of the program has run.
 
     A discovery of the same experiment has a verdict and no tables.
     """
@@ -105,21 +106,31 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> list[Any]:
     condition = f"tags.`{KIND}` = 'run' and attributes.status = 'FINISHED'"
     finished = [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
     if run_ids:
-        return _of_one_setting({run.info.run_id: run for run in (_by_id(finished, i, name) for i in run_ids)})
+        asked = {run.info.run_id: run for run in (_by_id(finished, i, name) for i in run_ids)}
+        return _of_one_setting(asked), []
     if not finished:
         raise InputError(f"experiment {name!r} has no finished run yet; `aesi run` makes one.")
-    setting = finished[0].data.tags.get("aesi.setting")
-    by_seed: dict[str, Any] = {}
+    newest = finished[0].data.tags
+    of_program: dict[str, Any] = {}
+    of_others: dict[str, Any] = {}
     for run in finished:
-        if run.data.tags.get("aesi.setting") == setting:
-            by_seed.setdefault(run.data.params.get("seed", "0"), run)
-    return [by_seed[seed] for seed in sorted(by_seed, key=lambda text: int(text))]
+        tags, seed = run.data.tags, run.data.params.get("seed", "0")
+        if tags.get(SETTING) == newest.get(SETTING):
+            same = tags.get(CODE) == newest.get(CODE)  # runs of before it was tracked stay together
+            (of_program if same else of_others).setdefault(seed, run)
+    left_out = {seed: run for seed, run in of_others.items() if seed not in of_program}
+    return _by_seed(of_program), _by_seed(left_out)
+
+
+def _by_seed(runs: Mapping[str, Any]) -> list[Any]:
+    return [runs[seed] for seed in sorted(runs, key=int)]
 
 
 def _of_one_setting(asked: Mapping[str, Any]) -> list[Any]:
     """The runs by their ids.  Raises InputError where more than the seed differs: a mean of them would say nothing."""
     settings = {
-        (run.data.tags.get("aesi.setting"), run.data.params.get("seed")): i for i, run in asked.items()
+        ((run.data.tags.get(SETTING), run.data.tags.get(CODE)), run.data.params.get("seed")): i
+        for i, run in asked.items()
     }
     if len({setting for setting, _ in settings}) > 1 or len(settings) < len(asked):
         raise InputError(
@@ -147,9 +158,8 @@ def _copy_figures(store: Store, run_id: str, folder: Path) -> None:
             store.client.download_artifacts(run_id, item.path, str(folder))
 
 
-def _footer(name: str, runs: Sequence[Any], format: str) -> str:
-    ids = ", ".join(f"{run.info.run_id} (seed {run.data.params.get('seed', '?')})" for run in runs)
-    text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {ids}."
+def _footer(name: str, runs: Sequence[Any], left_out: Sequence[Any], format: str) -> str:
+    text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {_ids(runs)}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
     about, below, _ = runs[0].data.tags.get("mlflow.note.content", "").partition("\n\n")
@@ -158,4 +168,10 @@ def _footer(name: str, runs: Sequence[Any], format: str) -> str:
     for run in runs:
         told = (run.data.tags.get(tag) for tag in ("aesi.fallback", UNFITTED))
         text = " ".join((text, *filter(None, told)))
+    if left_out:
+        text = f"{text} Left out, as of another version of the program: {_ids(left_out)}."
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]
+
+
+def _ids(runs: Sequence[Any]) -> str:
+    return ", ".join(f"{run.info.run_id} (seed {run.data.params.get('seed', '?')})" for run in runs)

@@ -6,6 +6,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from aesi.errors import FitError
@@ -159,9 +160,14 @@ def _alive(number: int, outcome: ScoredCandidate | Failed) -> Candidate:
     return outcome.candidate
 
 
+def shared_folder() -> Path:
+    """Where the candidates of an experiment without a database are shared, in the workspace."""
+    return environment.state() / "cache" / "candidates"
+
+
 def shared_outcomes(config: ExperimentConfig) -> Outcomes:
     """Where the candidates of an experiment are shared: its database, or the workspace."""
-    return open_outcomes(environment.state() / "cache" / "candidates", config.runner.storage)
+    return open_outcomes(shared_folder(), config.runner.storage)
 
 
 def study_key(problem: Problem, config: ExperimentConfig) -> str:

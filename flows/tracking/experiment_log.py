@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aesi.constants import MV_PER_V
+from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
@@ -24,6 +25,8 @@ from flows.tracking.tracker import Tracker, flat
 from flows.tracking.view import HOW_TO_READ, NOTE, RUN_COLUMNS, experiment_tags
 
 CHOSEN, UNFITTED = "aesi.chosen", "aesi.unfitted"
+SETTING, CODE = "aesi.setting", "aesi.code"
+"""What runs share that differ by seed alone: what was run on which data, and the program that ran it."""
 INPUTS, RECORDS, LEFT_OUT, DECLARED = "inputs", "records.bin", "left_out.bin", "declared"
 """What a candidate is made from: the error series by role, those of training drives under physics that has not seen
 them, and the declared cell with its effects."""
@@ -42,14 +45,18 @@ WITH_UNIT = {
 
 
 def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, folder: Path) -> None:
-    """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one."""
+    """Settings, versions and data of a run, as it is run: those of the fallback where it fell back to one.
+
+    Raises BegunOtherwise where a run that is gone on with was begun on other data or of another cell.
+    """
+    held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
+    tracker.as_begun(held, "records or a cell file")
     whole = _without_logins(loaded.config.model_dump(mode="json"))
     content = {key: value for key, value in whole.items() if key not in NO_PARAMETERS}
     tracker.about(experiment_tags(f"{config.note}\n\n{HOW_TO_READ}".strip(), RUN_COLUMNS))
-    tags = {NOTE: config.note, "aesi.setting": loaded.setting}
+    tags = {NOTE: config.note, SETTING: loaded.setting, CODE: source_digest()}
     if loaded.fallback:
         tags["aesi.fallback"] = loaded.fallback
-    held = {"cell_digest": loaded.files, "data_digest": ", ".join(loaded.digests.values())}
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name, **held}, tags)
     tracker.json("experiment.json", whole)
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 
 from flows.base import environment
 from flows.tracking.delivery import deliver
 from flows.tracking.outbox import FLUSH_S, Outbox
-from flows.tracking.run_records import RunLock
+from flows.tracking.run_records import RunLock, RunTaken
 from flows.tracking.store import Store
 
 
@@ -19,7 +20,7 @@ def deliver_leftovers(store: Store, say: Callable[[str], None], wait_s: float = 
     for folder in sorted((environment.state() / "outbox").glob("*")):
         if not any(folder.glob("[0-9]*.json")) or not _belongs(store, folder.name):
             continue
-        with RunLock(folder.name) as lock:
+        with suppress(RunTaken), RunLock(folder.name) as lock:
             if not lock.held:
                 continue
             outbox = Outbox(folder, partial(deliver, store), store.away, say)

@@ -11,9 +11,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import TracebackType
 
+from aesi.errors import AesiError
 from aesi.numerics.files.whole import READ_BY_OWNER, write_whole
 from flows.base import environment
 from flows.base.locks import ProcessLock
+
+
+class RunTaken(AesiError):
+    """Another process works on the run."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,10 @@ class RunRecord:
         # The address of a store may hold a password.
         write_whole(_folder() / f"{self.run_id}.json", json.dumps(asdict(self)), READ_BY_OWNER)
 
+    def again(self) -> RunRecord | None:
+        """As it is on disk now: who waited for the run's lock knows the record of before. None where it is gone."""
+        return _read(_folder() / f"{self.run_id}.json")
+
     def forget(self) -> None:
         """Take it off the disk."""
         (_folder() / f"{self.run_id}.json").unlink(missing_ok=True)
@@ -42,22 +51,21 @@ class RunRecord:
 
 def records(experiment: str | None = None) -> list[RunRecord]:
     """All records, newest first; unreadable ones are left out."""
-    found = []
-    for path in _folder().glob("*.json"):
-        try:
-            found.append(RunRecord(**json.loads(path.read_text())))
-        except (OSError, ValueError, TypeError):
-            continue
+    found = [record for path in _folder().glob("*.json") if (record := _read(path))]
     found.sort(key=lambda record: record.started_s, reverse=True)
     return [record for record in found if experiment in (None, record.experiment)]
 
 
 class RunLock:
     """The right to work on a run; `held` says whether this process has it, as none is known to where the workspace's
-    file system has no locks."""
+    file system has no locks.
+
+    As a context it raises RunTaken where another process has it: nobody works on a run beside another.
+    """
 
     def __init__(self, run_id: str) -> None:
         folder = _folder()
+        self._run_id = run_id
         self._lock = ProcessLock(folder / f"{run_id}.lock", str(folder), "working on the same run")
 
     @property
@@ -74,13 +82,24 @@ class RunLock:
         self._lock.release()
 
     def __enter__(self) -> RunLock:
-        self.acquire()
+        if not self.acquire():
+            raise RunTaken(
+                f"another process works on run {self._run_id} or delivers what it tracked; wait for its end, then "
+                "start again."
+            )
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.release()
+
+
+def _read(path: Path) -> RunRecord | None:
+    try:
+        return RunRecord(**json.loads(path.read_text()))
+    except (OSError, ValueError, TypeError):
+        return None
 
 
 def _folder() -> Path:

@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
+from aesi.errors import AesiError
 from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
 from flows.tracking.delivery import deliver
@@ -25,6 +26,10 @@ PARAMETER_LIMIT = 6000  # MLflow cuts longer ones off
 SAMPLE_S = 10.0
 """Between two readings of memory and processor."""
 LOCAL_UI = "http://127.0.0.1:5000"
+
+
+class BegunOtherwise(AesiError):
+    """A run that is gone on with was begun with something else, which would be tracked as the same."""
 
 
 class Trackable(Protocol):
@@ -117,6 +122,17 @@ class Tracker:
             told = ", ".join(f"{name} = {self._began[name]} (now {texts[name]})" for name in sorted(changed))
             self._say(f"tracking: the run stays tracked as it was begun, with {told}.")
         self._batch(params={k: v for k, v in texts.items() if k not in changed}, tags=dict(tags or {}))
+
+    def as_begun(self, values: Mapping[str, str], what: str) -> None:
+        """Raises BegunOtherwise where the run is gone on with and began with another of these parameters.
+
+        what : what they are of, in words.
+        """
+        if any(self._began.get(name, text) != text for name, text in _texts(values).items()):
+            raise BegunOtherwise(
+                f"run {self.run_id} was begun with {what} that are others now, and its candidates would stand beside "
+                "new ones of these; leave out --resume to start a new run."
+            )
 
     def metrics(self, values: Mapping[str, float], step: int = 0) -> None:
         """Metrics of the parent run."""

@@ -101,7 +101,7 @@ def test_reading_an_experiment_loads_none_of_what_its_stages_need():
     code = f"""
 import sys
 from flows.jobs.start import RunRequest
-RunRequest({str(ROOT / "experiments" / "smoke.yaml")!r}).config()
+RunRequest({str(ROOT / "experiments" / "smoke.yaml")!r}).config
 print(sorted({heavy} & set(sys.modules)))
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -95,8 +95,16 @@ def _listed(data: DataConfig) -> tuple[str, ...]:
 def check_had(config: ExperimentConfig) -> None:
     """Raises DataError where a file of the catalogue that the experiment names cannot be had."""
     if config.data.kind == "catalogue":
-        cell_path(config)
-        _placed(_locator(config), _listed(config.data))
+        catalogue_files(config)
+
+
+def catalogue_files(config: ExperimentConfig) -> list[Path]:
+    """The files of the catalogue that an experiment works on: records, then the cell; fetched where they are not on
+    this machine.  Raises ConfigError or DataError where one cannot be had."""
+    where = _locator(config)
+    records = _listed(config.data) if config.data.kind == "catalogue" else ()
+    cell = [cell_path(config)] if config.cell.bpx == "catalogue" else []
+    return [*(where(name) for name in records), *cell]
 
 
 def check_there(config: ExperimentConfig) -> None:
@@ -195,7 +203,7 @@ def with_keys(sentence: str) -> str:
 
 def _locator(config: ExperimentConfig) -> Callable[[str], Path]:
     """Finds the file of a record by its name in the experiment."""
-    if config.data.kind == "files":
+    if config.data.kind != "catalogue":
         return config.path
     from aesi.data.catalogue import locate
 

@@ -138,3 +138,29 @@ def test_a_run_that_the_store_does_not_take_back_is_closed_as_failed(tracked, mo
     assert statuses("job") == ["FAILED"]
     (record,) = records("job")
     assert record.status == "failed"
+
+
+@pytest.fixture
+def closed(workspace, monkeypatch):
+    """A workspace in which nothing can be written, whoever asks: it would lie below a file."""
+    (workspace / "file").write_text("kept")
+    monkeypatch.setenv("AESI_HOME", str(workspace / "file" / "home"))
+
+
+def test_a_workspace_that_cannot_be_written_to_ended_a_job_whose_results_lie_elsewhere(closed, capsys):
+    done = []
+    with tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
+        done.append(tracker)
+    assert done == [None]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("file: Not a directory; AESI_HOME can name a folder for what is tracked.")
+    assert "not tracked: " in line
+
+
+def test_a_worker_evaluated_what_it_could_hand_to_nobody(closed, call, workspace, monkeypatch):
+    monkeypatch.setattr("aesi.pipeline.experiment.load.load", lambda config: pytest.fail("work was begun"))
+    path = workspace / "small.yaml"
+    path.write_text("name: small\ndata: {kind: virtual}\n")
+    code, _, err = call("worker", path)
+    assert code == 1
+    assert "file: Not a directory; nobody could use the candidates that a worker evaluates here" in err

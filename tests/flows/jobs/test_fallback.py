@@ -5,7 +5,7 @@ import json
 import pytest
 import yaml
 
-from aesi.errors import DataAway, DataError
+from aesi.errors import DataAway, DataError, FitError
 from aesi.pipeline.product.hybrid import HybridModel
 from flows.results.tables import tables_of
 from flows.tracking.store import KIND, Store
@@ -118,3 +118,30 @@ def test_a_run_was_gone_on_with_over_an_edited_fallback(experiment, tmp_path, ed
     assert resume_key(config) == before
     (tmp_path / edited).write_text("edited")
     assert resume_key(config) != before
+
+
+def test_a_run_that_fell_back_was_gone_on_with_on_other_data(experiment, call, monkeypatch):
+    from dataclasses import replace
+
+    from aesi.pipeline.experiment import load as module
+
+    load = module.load
+
+    def fails(problem, config):
+        raise FitError("no more.")
+
+    with monkeypatch.context() as first:
+        first.setattr("aesi.pipeline.experiment.fit.build_problem", fails)
+        assert call("run", experiment, "--no-prefect")[0] == 1
+
+    def others(config):
+        loaded = load(config)
+        return replace(loaded, digests=dict.fromkeys(loaded.digests, "0123"))
+
+    monkeypatch.setattr(module, "load", others)  # the key of what is on disk is the same
+    code, _, err = call("run", experiment, "--no-prefect", "--resume")
+    assert code == 1
+    assert "was begun with records or a cell file that are others now" in err.splitlines()[-1]
+    store = Store()
+    (run,) = store.runs(store.find_experiment("small"), f"tags.`{KIND}` = 'run'")
+    assert run.info.status == "FAILED"

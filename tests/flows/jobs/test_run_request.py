@@ -29,15 +29,15 @@ def path(tmp_path):
     ],
 )
 def test_runner_dask_forgot_the_address_of_the_file(path, runner, address, kind, goes_to):
-    asked = RunRequest(path, runner=runner, address=address).config().runner
+    asked = RunRequest(path, runner=runner, address=address).config.runner
     assert (asked.kind, asked.address) == (kind, goes_to)
 
 
 def test_an_address_that_nobody_would_go_to_is_refused(path):
     with pytest.raises(InputError, match="names a Dask scheduler, and --runner local uses none"):
-        RunRequest(path, runner="local", address=ELSEWHERE).config()
+        RunRequest(path, runner="local", address=ELSEWHERE).config
     with pytest.raises(ConfigError, match="runner: `address` names a Dask scheduler; give `kind: dask`"):
-        RunRequest(path, ("runner.kind=local",)).config()
+        RunRequest(path, ("runner.kind=local",)).config
 
 
 def test_a_run_was_gone_on_with_on_other_data_or_by_another_version(tmp_path, monkeypatch):
@@ -58,17 +58,59 @@ def test_a_run_was_gone_on_with_on_other_data_or_by_another_version(tmp_path, mo
     assert resume_key(config) != changed
 
 
+@pytest.mark.parametrize("edited", ["drive.csv", "pulses.csv", "cell.bpx.json"])
+def test_a_run_was_gone_on_with_over_an_edited_copy_of_the_catalogue(tmp_path, monkeypatch, edited):
+    folder = tmp_path / "lg_m50t_w8"
+    folder.mkdir()
+    for name in ("drive.csv", "pulses.csv", "cell.bpx.json", "unused.csv"):
+        (folder / name).write_text(name)
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))
+    data = {"kind": "catalogue", "set": "lg_m50t_w8", "train": ["pulses"], "test": ["drive"]}
+    config = parse_experiment({"name": "x", "cell": {"bpx": "catalogue"}, "data": data}, base=tmp_path)
+    before = resume_key(config)
+    (folder / "unused.csv").write_text("corrected")
+    assert resume_key(config) == before
+    (folder / edited).write_text("corrected")
+    assert resume_key(config) != before
+
+
 def test_a_run_was_gone_on_with_though_its_candidates_may_take_longer_now(path):
-    config = RunRequest(path).config()
+    config = RunRequest(path).config
     longer, more = (
-        RunRequest(path, (text,)).config() for text in ("search.timeout_s=500", "search.memory_mb=9000")
+        RunRequest(path, (text,)).config for text in ("search.timeout_s=500", "search.memory_mb=9000")
     )
     assert len({resume_key(each) for each in (config, longer, more)}) == 3
-    assert resume_key(RunRequest(path, ("search.workers=3", "runner.kind=dask")).config()) == resume_key(
-        config
-    )
+    assert resume_key(RunRequest(path, ("search.workers=3", "runner.kind=dask")).config) == resume_key(config)
 
 
 def test_a_run_without_prefect_was_told_to_go_on_with_it(path):
     assert RunRequest(path, use_prefect=False).resuming == f"aesi run {path} --no-prefect --resume"
     assert RunRequest(path).resuming == f"aesi run {path} --resume"
+
+
+@pytest.mark.parametrize(
+    "way", ["plain", pytest.param("as a flow", marks=pytest.mark.slow), "without the decorator"]
+)
+def test_a_file_that_was_edited_after_the_command_had_read_it_was_what_was_run(workspace, monkeypatch, way):
+    from flows.jobs import start as module
+    from flows.jobs.prefect_flows import experiment
+
+    file = workspace / "x.yaml"
+    file.write_text("name: x\nseed: 1\ndata: {kind: virtual}\n")
+    seen = []
+
+    def runs(request, run, console):
+        seen.append(request.config.seed)
+        return workspace
+
+    def edits(*_):
+        file.write_text("name: x\nseed: 2\nnonsense: 3\n")
+
+    for target in ("flows.jobs.start.run_experiment", "flows.jobs.prefect_flows.run_experiment"):
+        monkeypatch.setattr(target, runs)
+    monkeypatch.setattr("flows.evaluation.in_reach.check_in_reach", edits)
+    if way == "without the decorator":
+        monkeypatch.setattr("flows.jobs.prefect_flows.experiment", experiment.fn)
+        monkeypatch.setattr(module, "start_server", lambda: None)
+    module.start(file, use_prefect=way != "plain")
+    assert seen == [1]

@@ -3,6 +3,7 @@
 import logging
 import signal
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -26,6 +27,31 @@ def test_a_stage_that_takes_too_long_is_interrupted_in_one_sentence(said):
     assert time.monotonic() - started < 20
     assert "\n" not in str(caught.value)
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+def test_a_limit_that_came_while_a_failure_was_borne_was_taken_for_one(said):
+    def bears_all():
+        with suppress(Exception):  # as of a storage, a candidate or an artifact that fails
+            time.sleep(30)
+        return "without a limit"
+
+    with pytest.raises(StageOverdue, match="'search' took longer"):
+        PlainStages(said.append, timeout_s=0.2)("search", bears_all)
+    assert said == []
+
+
+def test_a_limit_that_came_while_a_candidate_was_kept_ended_the_copy_of_the_study_instead(said, monkeypatch):
+    import optuna
+
+    from flows.search.nsga2 import Constraints
+    from flows.search.published_study import PublishedStudy
+
+    monkeypatch.setattr(optuna, "create_study", lambda **_: time.sleep(30))
+    with pytest.raises(StageOverdue):
+        PlainStages(said.append, timeout_s=0.2)(
+            "search", lambda: PublishedStudy("one", None, Constraints(0.0, 0.0), None, said.append)
+        )
+    assert said == []
 
 
 def test_the_time_of_one_stage_is_not_taken_from_the_next(said):

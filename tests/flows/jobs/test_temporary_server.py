@@ -74,6 +74,15 @@ def test_a_server_that_does_not_start_in_time_is_not_waited_for(workspace, monke
     )
 
 
+def test_a_workspace_that_cannot_hold_prefects_files_ended_a_job_before_it_began(
+    workspace, monkeypatch, capsys
+):
+    (workspace / "file").write_text("kept")
+    monkeypatch.setenv("PREFECT_HOME", str(workspace / "file" / "prefect"))
+    assert start._with_or_without(lambda: pytest.fail("under Prefect"), lambda: "plainly", True) == "plainly"
+    assert "Not a directory); the stages run without it." in capsys.readouterr().err
+
+
 def test_a_job_that_was_tried_again_counts_as_its_last_try():
     job = KeptWork()
     with pytest.raises(OSError, match="once"):

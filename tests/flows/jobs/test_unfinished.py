@@ -1,15 +1,18 @@
 """Which run is gone on with: one that the tracking store has no more is none."""
 
 import time
+from contextlib import ExitStack
 from dataclasses import replace
 
 import pytest
 
 from flows.base.console import Console
 from flows.jobs.run_request import RunRequest
-from flows.jobs.run_session import _unfinished, resume_key
-from flows.tracking.run_records import RunRecord
+from flows.jobs.run_session import _close_killed, _unfinished, resume_key, tracked_job, working_on
+from flows.tracking.leftovers import deliver_leftovers
+from flows.tracking.run_records import RunLock, RunRecord, RunTaken, records
 from flows.tracking.store import Store
+from flows.tracking.tracker import Subject, Tracker
 
 
 @pytest.fixture
@@ -18,34 +21,41 @@ def store(tracked):
 
 
 @pytest.fixture
+def held():
+    """Holds the locks of the runs that were found."""
+    with ExitStack() as locks:
+        yield locks
+
+
+@pytest.fixture
 def unfinished(store, workspace):
     """An experiment, and the record of a run of it that failed."""
     path = workspace / "small.yaml"
     path.write_text("name: small\ndata: {kind: virtual}\n")
-    config = RunRequest(str(path)).config()
+    config = RunRequest(str(path)).config
     run_id = store.create_run(store.experiment("small"), "small, seed 0", {})
     record = RunRecord(run_id, "small", resume_key(config), store.uri, time.time(), "failed")
     record.write()
     return config, record
 
 
-def test_a_run_that_is_there_is_gone_on_with(store, unfinished):
+def test_a_run_that_is_there_is_gone_on_with(store, unfinished, held):
     config, record = unfinished
-    assert _unfinished(config, store, Console()) == record
+    assert _unfinished(config, store, Console(), held) == record
 
 
 @pytest.mark.parametrize("before_s", [-60.0, 60.0])
-def test_of_two_runs_the_newer_one_is_gone_on_with(store, unfinished, before_s):
+def test_of_two_runs_the_newer_one_is_gone_on_with(store, unfinished, held, before_s):
     config, record = unfinished
     run_id = store.create_run(store.experiment("small"), "small, seed 0, again", {})
     other = replace(record, run_id=run_id, started_s=record.started_s + before_s)
     other.write()
-    assert _unfinished(config, store, Console()) == (other if before_s > 0.0 else record)
+    assert _unfinished(config, store, Console(), held) == (other if before_s > 0.0 else record)
 
 
 @pytest.mark.parametrize("gone", ["deleted", "never there"])
 def test_a_run_that_the_store_has_no_more_was_gone_on_with_and_ended_in_a_traceback(
-    store, unfinished, capsys, gone
+    store, unfinished, held, capsys, gone
 ):
     config, record = unfinished
     if gone == "deleted":
@@ -53,5 +63,94 @@ def test_a_run_that_the_store_has_no_more_was_gone_on_with_and_ended_in_a_traceb
     else:
         record.forget()
         RunRecord("0" * 32, "small", record.config_digest, store.uri, time.time(), "failed").write()
-    assert _unfinished(config, store, Console()) is None
+    assert _unfinished(config, store, Console(), held) is None
     assert "There is no unfinished run" in capsys.readouterr().err
+
+
+def test_two_that_went_on_with_a_run_at_once_both_worked_on_it(store, unfinished, held):
+    config, record = unfinished
+    assert _unfinished(config, store, Console(), held) == record
+    with (
+        pytest.raises(RunTaken, match=f"another process works on run {record.run_id}"),
+        ExitStack() as second,
+    ):
+        _unfinished(config, store, Console(), second)
+    held.close()
+    with ExitStack() as later:
+        assert _unfinished(config, store, Console(), later) == record
+
+
+def test_a_run_that_another_process_works_on_is_told_and_ends_the_command(call, unfinished, workspace):
+    _, record = unfinished
+    with RunLock(record.run_id):
+        code, _, err = call("run", workspace / "small.yaml", "--resume", "--no-prefect")
+    assert code == 1
+    assert err.splitlines()[-1].endswith(
+        f"another process works on run {record.run_id} or delivers what it tracked; wait for its end, then start again."
+    )
+    assert [one.run_id for one in records("small")] == [record.run_id]  # no other was begun
+
+
+def test_a_run_was_tracked_and_noted_before_it_was_this_processs_alone(
+    store, unfinished, workspace, monkeypatch
+):
+    seen = []
+
+    def taken(run_id):
+        try:
+            with RunLock(run_id):
+                return False
+        except RunTaken:
+            return True
+
+    class Watched(Tracker):
+        def __init__(self, store, config, say, run_id=None, title=None):
+            seen.append(run_id is None or taken(run_id))
+            super().__init__(store, config, say, run_id, title)
+
+    written = RunRecord.write
+
+    def watched(record):
+        seen.append(taken(record.run_id))
+        written(record)
+
+    monkeypatch.setattr("flows.tracking.tracker.Tracker", Watched)
+    monkeypatch.setattr(RunRecord, "write", watched)
+    path = str(workspace / "small.yaml")
+    for resume in (True, False):
+        with working_on(RunRequest(path, resume=resume), store, Console()) as tracker:
+            assert taken(tracker.run_id)
+        assert not taken(tracker.run_id)
+    with tracked_job(Subject("job", 0, "key"), "title", Console()) as tracker:
+        assert taken(tracker.run_id)
+    assert not taken(tracker.run_id)
+    assert len(seen) == 9
+    assert all(seen)
+
+
+def test_a_run_that_others_work_on_is_neither_closed_nor_delivered(store, unfinished, workspace, said):
+    _, record = unfinished
+    replace(record, status="running").write()
+    box = workspace / ".aesi" / "outbox" / record.run_id
+    box.mkdir(parents=True)
+    (box / "00000001.json").write_text("{}")
+    with RunLock(record.run_id):
+        deliver_leftovers(store, said.append)
+        _close_killed("small", store, Console())
+    assert said == []
+    assert (box / "00000001.json").exists()
+    assert record.again().status == "running"
+
+
+def test_a_run_that_ended_while_its_lock_was_asked_for_was_closed_as_killed(
+    store, unfinished, monkeypatch, held
+):
+    config, record = unfinished
+    stale = replace(record, status="running")
+    replace(record, status="finished").write()
+    monkeypatch.setattr("flows.jobs.run_session.records", lambda experiment: [stale])
+    _close_killed("small", store, Console())
+    assert record.again().status == "finished"
+    assert _unfinished(config, store, Console(), held) is None
+    with RunLock(record.run_id):
+        pass

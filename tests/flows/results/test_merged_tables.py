@@ -62,6 +62,39 @@ def test_runs_that_were_named_were_averaged_as_seeds_whatever_they_were_of(call,
         assert f"`aesi compare {ids[other[0]]} {ids[other[1]]}` shows them" in err
 
 
+def test_runs_of_two_versions_of_the_program_were_averaged_as_seeds_of_one_setting(call, tracked):
+    store = Store()
+    experiment = store.experiment("two")
+    ids = []
+
+    def finish(seed, mser, *code):
+        tags = {KIND: "run", "aesi.setting": "a"} | dict(zip(["aesi.code"], code, strict=False))
+        run_id = store.create_run(experiment, "two", tags)
+        store.client.log_param(run_id, "seed", seed)
+        store.client.log_dict(run_id, {"models": run(mser, 90.0, None)}, "summary.json")
+        store.client.set_terminated(run_id)
+        ids.append(run_id)
+
+    def tables(*arguments):
+        return call("tables", "two", "--format", "csv", *arguments)[1]
+
+    finish(0, 10.0)
+    finish(1, 20.0)
+    assert f"Mean over 2 seeds. Experiment two, tracked runs {ids[0]} (seed 0), {ids[1]}" in tables()
+    finish(1, 30.0, "new")
+    shown = tables()
+    assert f"tracked run {ids[2]} (seed 1)." in shown
+    assert shown.rstrip().endswith(f"Left out, as of another version of the program: {ids[0]} (seed 0).")
+    finish(0, 40.0, "new")
+    assert (
+        f"Mean over 2 seeds. Experiment two, tracked runs {ids[3]} (seed 0), {ids[2]} (seed 1)." in tables()
+    )
+    assert "Left out" not in tables()
+    code, _, err = call("tables", "two", "--run", ids[0], "--run", ids[2])
+    assert code == 2
+    assert "do not differ by their seeds alone" in err
+
+
 @pytest.mark.parametrize(("note", "shown"), [("Our own cell", "(seed 1). Our own cell."), ("", "(seed 1).")])
 def test_the_figures_of_one_seed_stood_below_the_mean_of_an_experiment_without_a_note(
     call, tracked, note, shown

@@ -1,7 +1,9 @@
 """A run that is gone on with: what it was begun with stays tracked."""
 
+import pytest
+
 from aesi.pipeline.experiment.sections import TrackingConfig
-from flows.tracking.tracker import Subject, Tracker
+from flows.tracking.tracker import BegunOtherwise, Subject, Tracker
 
 QUIET = Subject("small", 0, "digest", TrackingConfig(system_metrics=False, log_model=False))
 
@@ -17,3 +19,18 @@ def test_a_resumed_run_with_another_setting_lost_all_of_its_parameters(store, sa
     assert run.data.params == {"search.workers": "1", "seed": "0", "chosen_candidate": "3"}
     assert run.data.tags["aesi.setting"] == "x"
     assert said == ["tracking: the run stays tracked as it was begun, with search.workers = 1 (now 2)."]
+
+
+def test_a_resumed_run_took_other_data_for_those_it_was_begun_with(store, said):
+    held = {"data_digest": "aa, bb", "cell_digest": "cc"}
+    begun = Tracker(store, QUIET, said.append)
+    begun.as_begun(held, "records")  # nothing yet
+    begun.parameters(held)
+    assert begun.end("FAILED") == 0
+    resumed = Tracker(store, QUIET, said.append, begun.run_id)
+    resumed.as_begun(held, "records")
+    with pytest.raises(
+        BegunOtherwise, match=f"run {begun.run_id} was begun with records that are others now"
+    ):
+        resumed.as_begun(held | {"data_digest": "aa, bd"}, "records")
+    assert resumed.end("FAILED") == 0

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from aesi.numerics.files.source_digest import source_digest
 from aesi.physics import Cell
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import Loaded
@@ -48,6 +49,11 @@ def test_the_password_of_a_database_was_tracked_as_a_parameter(kept):
     assert parameters["runner.storage"] == "postgresql://db.example.org/aesi"
     assert parameters["tracking.uri"] == "https://tracking.example.org"
     assert not {"name", "note", "base", "fallback", "discover"} & set(parameters)
+
+
+def test_the_program_that_ran_is_tracked(kept):
+    _, tags = kept.of("parameters")
+    assert tags["aesi.code"] == source_digest()
 
 
 def test_the_experiment_is_kept_whole(kept):
