@@ -8,6 +8,7 @@ import pytest
 
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, differing_settings, write_comparison
+from flows.jobs.experiment import _uri_option
 from flows.results.compare import compare
 from flows.tracking.store import KIND, Store
 from flows.tracking.whole_run import insert_run
@@ -170,3 +171,23 @@ def test_five_hundred_runs_make_one_page_of_a_size_that_opens(tracked, tmp_path)
     found = compare(["study"], tmp_path / "page.html")
     assert len(found) == 500
     assert (tmp_path / "page.html").stat().st_size < 20e6
+
+
+@pytest.mark.parametrize("command", ["compare", "candidate"])
+def test_what_waits_in_the_workspace_was_not_compared_nor_rebuilt(tracked, call, command):
+    store = Store()
+    experiment = store.experiment("two")
+    first, second = (store.create_run(experiment, "two", {KIND: "run"}) for _ in range(2))
+    waiting = {"kind": "end", "run_id": first, "status": "FINISHED", "at_ms": 2_000}
+    outbox = tracked / ".aesi" / "outbox" / first
+    outbox.mkdir(parents=True)
+    (outbox / "00000001.json").write_text(json.dumps(waiting))
+    more = [second] if command == "compare" else ["--out", "made"]
+    _, _, err = call(command, first, *more)
+    assert f"what run {first[:8]} had left over is delivered" in err
+    assert store.client.get_run(first).info.status == "FINISHED"
+
+
+def test_the_hints_at_the_end_of_a_run_did_not_find_it_on_a_server():
+    assert _uri_option(None) == ""
+    assert _uri_option("https://me:secret@host/my runs") == " --uri 'https://host/my runs'"
