@@ -58,7 +58,7 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
     from flows.tracking.tracker import Tracker
 
     try:
-        store = Store()
+        store = Store(subject.tracking.uri)
         _close_killed(subject.name, store, console)
         tracker = Tracker(store, subject, console.say, title=title)
     except StoreAway as error:
