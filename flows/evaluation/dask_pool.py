@@ -33,6 +33,11 @@ OWN_CLUSTER = {
 """A cluster of one's own shows no dashboard, and its monitors would take 3 % of each core. Memory is kept between
 candidates: Dask's default gives it back after each array, and taking it again costs a third of a candidate."""
 
+KEEP_RESTARTED = {"distributed.deploy.lost-worker-timeout": "365 days"}
+"""A cluster of one's own gives up a worker that is not there 15 s after it was lost, whatever came in between: one that
+is restarted for a second candidate that hangs is gone for good then, and its last one keeps the search for ever. Each
+has a nanny that starts it again. It is looked up when a worker is lost, so that it is set to stay."""
+
 
 def connect(address: str | None, workers: int) -> tuple[Any, Any]:
     """A client of the scheduler at an address, or of a new cluster of processes on this machine, and that cluster.
@@ -42,6 +47,7 @@ def connect(address: str | None, workers: int) -> tuple[Any, Any]:
     dask, distributed = _libraries()
     cluster = None
     if address is None:
+        dask.config.set(KEEP_RESTARTED)
         with dask.config.set(OWN_CLUSTER):
             cluster = distributed.LocalCluster(
                 n_workers=workers,
