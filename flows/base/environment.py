@@ -38,7 +38,12 @@ QUIET = {
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "20",
     "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
     "MLFLOW_LOGGING_LEVEL": "WARNING",
+    # The client tells where each run is on stdout, amidst tables that are written there.
+    "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
     "GIT_PYTHON_REFRESH": "quiet",
+    # s; PostgreSQL's own client waits for ever for one that accepts and says nothing. One that sleeps until it is asked
+    # wakes within a few seconds.
+    "PGCONNECT_TIMEOUT": "10",
 }
 
 

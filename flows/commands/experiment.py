@@ -73,13 +73,19 @@ def tables(
     """The paper's tables from tracked runs alone, with mean and spread where there are several seeds."""
     if figures is not None:
         outputs.check_folder(figures, option="--figures")
-    from flows.base.console import Console
     from flows.results.tables import tables_of, tracked_as
+
+    _deliver(uri or tracked_as(experiment)[1])
+    typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
+
+
+def _deliver(uri: str | None) -> None:
+    """Hand to a store what waits for it in this workspace, before it is read."""
+    from flows.base.console import Console
     from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.store import Store
 
-    deliver_leftovers(Store.to_read(uri or tracked_as(experiment)[1]), Console().say)
-    typer.echo(tables_of(experiment, format=format, run_ids=run_id or [], figures=figures, uri=uri))
+    deliver_leftovers(Store.to_read(uri), Console().say)
 
 
 def compare(
@@ -94,6 +100,7 @@ def compare(
     outputs.check_page(out)
     from flows.results.compare import compare as write
 
+    _deliver(uri)
     shown = write(runs, out, uri)
     typer.echo(f"{out}: {len(shown)} runs", err=True)
 
@@ -109,6 +116,7 @@ def candidate(
     from flows.base.folder_lock import alone_in
     from flows.results.candidate import Differs, rebuild, said, save
 
+    _deliver(uri)
     rebuilt = rebuild(run_id, uri)
     with alone_in(out):
         save(rebuilt, out)

@@ -7,6 +7,8 @@ builds the problem of a study once, from the experiment, and keeps it.
 from __future__ import annotations
 
 import time
+import uuid
+from dataclasses import dataclass
 from functools import lru_cache
 from queue import Empty, Queue
 from typing import Any
@@ -31,6 +33,11 @@ OWN_CLUSTER = {
 """A cluster of one's own shows no dashboard, and its monitors would take 3 % of each core. Memory is kept between
 candidates: Dask's default gives it back after each array, and taking it again costs a third of a candidate."""
 
+KEEP_RESTARTED = {"distributed.deploy.lost-worker-timeout": "365 days"}
+"""A cluster of one's own gives up a worker that is not there 15 s after it was lost, whatever came in between: one that
+is restarted for a second candidate that hangs is gone for good then, and its last one keeps the search for ever. Each
+has a nanny that starts it again. It is looked up when a worker is lost, so that it is set to stay."""
+
 
 def connect(address: str | None, workers: int) -> tuple[Any, Any]:
     """A client of the scheduler at an address, or of a new cluster of processes on this machine, and that cluster.
@@ -40,6 +47,7 @@ def connect(address: str | None, workers: int) -> tuple[Any, Any]:
     dask, distributed = _libraries()
     cluster = None
     if address is None:
+        dask.config.set(KEEP_RESTARTED)
         with dask.config.set(OWN_CLUSTER):
             cluster = distributed.LocalCluster(
                 n_workers=workers,
@@ -96,6 +104,17 @@ def _check_form(address: str) -> None:
         ) from None
 
 
+@dataclass
+class _Handed:
+    """A candidate that the scheduler has. since_s : when it began to run, on our monotonic clock; None while it waits
+    or its worker builds the problem."""
+
+    tag: Any
+    future: Any = None
+    worker: str = ""
+    since_s: float | None = None
+
+
 class DaskPool:
     """See `flows.evaluation.pool.Pool`.
 
@@ -114,8 +133,10 @@ class DaskPool:
     ) -> None:
         self._recipe, self._timeout_s = (content, base, study), timeout_s
         self._client, self._cluster = connect(address, workers)
-        self._futures: dict[Any, tuple[Any, float]] = {}
+        self._handed: dict[str, _Handed] = {}
         self._finished: Queue[Any] = Queue()
+        self._topic = f"aesi-began-{uuid.uuid4().hex}"
+        self._client.subscribe_topic(self._topic, self._began)
 
     @property
     def idle(self) -> int:
@@ -124,14 +145,15 @@ class DaskPool:
 
     @property
     def busy(self) -> int:
-        return len(self._futures)
+        return len(self._handed)
 
     def start(self, tag: Any, genome: Any) -> None:
         """Hand a genome to the scheduler."""
-        data = codec.dumps(genome)
-        future = self._client.submit(evaluate_bytes, *self._recipe, data, pure=False)
-        self._futures[future.key] = (tag, time.monotonic())
-        future.add_done_callback(self._finished.put)
+        key = f"candidate-{uuid.uuid4().hex}"
+        handed = self._handed[key] = _Handed(tag)  # before it is submitted: it may begin at once
+        given = (self._topic, key, *self._recipe, codec.dumps(genome))
+        handed.future = self._client.submit(_evaluate_timed, *given, key=key, pure=False)
+        handed.future.add_done_callback(self._finished.put)
 
     def collect(self, timeout_s: float) -> list[tuple[Any, Any]]:
         """(tag, outcome) of what has finished, after at most `timeout_s`."""
@@ -139,9 +161,9 @@ class DaskPool:
         try:
             future = self._finished.get(timeout=timeout_s)
             while True:
-                entry = self._futures.pop(future.key, None)
-                if entry is not None:
-                    found.append((entry[0], _outcome(future)))
+                handed = self._handed.pop(future.key, None)
+                if handed is not None:
+                    found.append((handed.tag, _outcome(future)))
                 future = self._finished.get_nowait()
         except Empty:
             pass
@@ -157,23 +179,38 @@ class DaskPool:
         """Processor seconds that each worker has used since it started."""
         return dict(self._client.run(time.process_time))
 
+    def _began(self, event: tuple[float, dict[str, str]]) -> None:
+        """A worker says that it begins with a candidate; one that is begun again elsewhere has all its time again."""
+        _, told = event
+        handed = self._handed.get(told["key"])
+        if handed is not None:
+            handed.worker, handed.since_s = told["worker"], time.monotonic()
+
     def _overdue(self) -> list[tuple[Any, Any]]:
         """Candidates past their time: their worker is restarted, since a thread cannot be stopped."""
         now = time.monotonic()
-        late = [key for key, (_, since) in self._futures.items() if now - since > self._timeout_s]
-        if not late:
-            return []
-        processing = self._client.processing()
-        running = {key: worker for worker, keys in processing.items() for key in list(keys)[:1]}
         found = []
-        for key in late:
-            if key not in running:  # it only waits behind another
-                self._futures[key] = (self._futures[key][0], now)
+        for key, handed in list(self._handed.items()):
+            if handed.since_s is None or now - handed.since_s <= self._timeout_s:
                 continue
-            tag, _ = self._futures.pop(key)
-            found.append((tag, Failed(f"took longer than {self._timeout_s:g} s", of_machine=True)))
-            self._client.restart_workers([running[key]], raise_for_error=False)
+            del self._handed[key]
+            found.append((handed.tag, Failed(f"took longer than {self._timeout_s:g} s", of_machine=True)))
+            self._client.cancel([handed.future], force=True)  # else another worker is given it
+            self._client.restart_workers([handed.worker], raise_for_error=False)
         return found
+
+
+def _evaluate_timed(topic: str, key: str, content: str, base: str, study: str, genome: bytes) -> bytes:
+    """As `evaluate_bytes`; tells the pool when the candidate begins, once the problem is built, as `LocalPool` counts.
+
+    Two candidates a thread are handed over, and one that waits behind another has used none of its time.
+    """
+    from distributed import get_worker
+
+    _scorer(content, base, study)
+    worker = get_worker()
+    worker.log_event(topic, {"key": key, "worker": worker.address})
+    return evaluate_bytes(content, base, study, genome)
 
 
 def evaluate_bytes(content: str, base: str, study: str, genome: bytes) -> bytes:

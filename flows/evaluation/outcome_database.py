@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from aesi.errors import InputError
+from flows.base.databases import limits, with_driver
 
 
 class DatabaseOutcomes:
@@ -137,6 +138,10 @@ class DatabaseOutcomes:
 
     def _create(self) -> None:
         try:
+            self._engine.connect().close()  # by itself: one that does not answer need not be waited for twice
+        except self._sa.exc.SQLAlchemyError as error:
+            raise self._unusable(error) from None
+        try:
             self._table.create(self._engine, checkfirst=True)
         except self._sa.exc.SQLAlchemyError as error:
             # Two workers may both have found no table; the second to create it is not wrong.
@@ -145,25 +150,17 @@ class DatabaseOutcomes:
             except self._sa.exc.SQLAlchemyError:
                 exists = False
             if not exists:
-                where = self._engine.url.render_as_string(hide_password=True)
-                raise InputError(f"runner.storage {where} cannot be used: {_reason(error)}.") from None
+                raise self._unusable(error) from None
+
+    def _unusable(self, error: Exception) -> InputError:
+        where = self._engine.url.render_as_string(hide_password=True)
+        return InputError(f"runner.storage {where} cannot be used: {_reason(error)}.")
 
 
 def _reason(error: Exception) -> str:
     """What the driver said, without the statement."""
     cause = error.__cause__ or error
     return (str(cause).strip().splitlines() or [type(cause).__name__])[0]
-
-
-def with_driver(url: str) -> str:
-    """The address of a database as SQLAlchemy takes it, PostgreSQL's with the driver that the `cluster` extra installs.
-
-    SQLAlchemy knows no `postgres://`, and takes `postgresql://` for another driver since its version 2.1.
-    """
-    for scheme in ("postgresql://", "postgres://"):
-        if url.startswith(scheme):
-            return f"postgresql+psycopg2://{url.removeprefix(scheme)}"
-    return url
 
 
 def engine_of(url: str) -> Any:
@@ -173,10 +170,8 @@ def engine_of(url: str) -> Any:
     """
     import sqlalchemy as sa
 
-    url = with_driver(url)
-    options: dict[str, Any] = {"connect_args": {"timeout": 60}} if url.startswith("sqlite") else {}
     try:
-        return sa.create_engine(url, pool_pre_ping=True, **options)
+        return sa.create_engine(with_driver(url), pool_pre_ping=True, **limits(url))
     except (ImportError, sa.exc.ArgumentError) as error:
         advice = "; pip install psycopg2-binary" if isinstance(error, ImportError) else ""
         raise InputError(f"runner.storage is no database that can be used: {error}{advice}.") from None

@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from aesi.constants import MV_PER_V
+from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
+from aesi.pipeline.experiment.sections import TrackingConfig
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.folder_lock import alone_in
@@ -25,6 +28,19 @@ if TYPE_CHECKING:
     from flows.tracking.tracker import Subject, Tracker
 
 EXPERIMENT = "discover"
+
+
+@dataclass(frozen=True)
+class TrackedUnder:
+    """The name that a discovery is tracked under, and the store and what it is sent; an experiment file says both."""
+
+    name: str = EXPERIMENT
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
+
+    @classmethod
+    def of(cls, config: ExperimentConfig) -> TrackedUnder:
+        """As the experiment has it."""
+        return cls(config.name, config.tracking)
 
 
 def check(case: Case) -> None:
@@ -43,23 +59,22 @@ def check(case: Case) -> None:
     )
 
 
-def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, str]:
-    """The case of an experiment file, the folder of its results, and the name it is tracked under."""
+def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tuple[Case, Path, TrackedUnder]:
+    """The case of an experiment file, the folder of its results, and what it is tracked under."""
     from aesi.pipeline.discovery.cases import case_of_experiment
-    from aesi.pipeline.experiment.config import read_experiment
 
     config = read_experiment(path, overrides)
     folder = out or environment.workspace() / "runs" / config.name / "discovery"
-    return case_of_experiment(config), folder, config.name
+    return case_of_experiment(config), folder, TrackedUnder.of(config)
 
 
-def trace(case: Case, out: Path, run: Stages, console: Console, experiment: str) -> dict[str, Any]:
+def trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder) -> dict[str, Any]:
     """The flow itself; `run` runs a stage.  Raises InputError where another process writes to `out` now."""
     with alone_in(out):
-        return _trace(case, out, run, console, experiment)
+        return _trace(case, out, run, console, under)
 
 
-def _trace(case: Case, out: Path, run: Stages, console: Console, experiment: str) -> dict[str, Any]:
+def _trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder) -> dict[str, Any]:
     from aesi.pipeline.discovery.discover import ARCHIVE, run_case, write_discovery
 
     started = time.monotonic()
@@ -70,7 +85,7 @@ def _trace(case: Case, out: Path, run: Stages, console: Console, experiment: str
         )
     kept = f"What was fitted is kept in {out}; the same command goes on from there."
     title = ", ".join(m.name for m in case.measurements)
-    with tracked_job(_subject(case, experiment), title, console) as tracker, kept_on_interrupt(kept):
+    with tracked_job(_subject(case, under), title, console) as tracker, kept_on_interrupt(kept):
         _track_case(tracker, case)
         follow = Follow(tracker, console)
         found = run("hypotheses", lambda: run_case(case, out, follow))
@@ -130,13 +145,13 @@ class Follow:
         )
 
 
-def _subject(case: Case, experiment: str) -> Subject:
+def _subject(case: Case, under: TrackedUnder) -> Subject:
     from aesi.records import digest
     from flows.tracking.tracker import Subject
 
     fitted = (*case.measurements, *case.good)
     key = digest(*(m.time_s for m in fitted), *(m.voltage_v for m in fitted))
-    return Subject(experiment, case.seed, key)
+    return Subject(under.name, case.seed, key, under.tracking)
 
 
 def _run_id(tracker: Tracker | None) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -37,8 +38,16 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
         folder = _stages(request, tracker, run, console, started)
     console.say(f"Finished in {duration(time.monotonic() - started)}.")
     console.say(f"Report: {_shown(folder / 'report.html')}")
-    console.say(f"Runs:   aesi ui        Tables: aesi tables {config.name}")
+    where = _uri_option(config.tracking.uri)
+    console.say(f"Runs:   aesi ui{where}        Tables: aesi tables {config.name}{where}")
     return folder
+
+
+def _uri_option(uri: str | None) -> str:
+    """What finds the store of an experiment that names one, as a shell takes it; without the login in it."""
+    from flows.tracking.store import without_login
+
+    return f" --uri {shlex.quote(without_login(uri))}" if uri else ""
 
 
 def _stages(

@@ -8,9 +8,10 @@ from typing import Any, Literal
 from prefect import flow
 from prefect.runtime import flow_run
 
+from aesi.pipeline.experiment.config import read_experiment
 from flows.base import environment
 from flows.base.console import Console
-from flows.jobs.discovery import EXPERIMENT, case_and_folder, trace
+from flows.jobs.discovery import TrackedUnder, case_and_folder, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PrefectStages
@@ -28,7 +29,7 @@ def _experiment_name() -> str:
 def _discovery_name() -> str:
     """`what nmc_30ah lacks on drive.csv`."""
     given = flow_run.parameters
-    if given.get("path"):
+    if given.get("case") is None:
         return f"what the model lacks, {Path(given['path']).stem}"
     return f"what {given['cell']} lacks on {', '.join(given['data'])}"
 
@@ -63,18 +64,22 @@ def discovery(
     cell: str = "",
     data: list[str] | None = None,
     case: Any = None,
-    tracked_as: str = EXPERIMENT,
 ) -> dict[str, Any]:
     """The whole job of `aesi discover`.
 
-    path : an experiment file that describes the case, as a deployment gives it; else `case`, which only a process
-    that has read the records can hand over: `cell` and `data` then say what it is about.
+    path : an experiment file that describes the case and how it is tracked, as a deployment gives it.
+    case : which only a process that has read the records can hand over: `cell` and `data` then say what it is about.
+    How it is tracked is still read from `path`, where there is one: the address may hold a password, which Prefect
+    would keep and show among the parameters.
     """
     environment.prepare_process()
     console = Console()
     folder = Path(out) if out else None
+    under = TrackedUnder()
     if case is None:
-        case, folder, tracked_as = case_and_folder(str(path), overrides or (), folder)
+        case, folder, under = case_and_folder(str(path), overrides or (), folder)
+    elif path is not None:
+        under = TrackedUnder.of(read_experiment(path, overrides or ()))
     assert folder is not None  # `aesi discover` with records asks for one
     stages = PrefectStages(console.say)
-    return as_the_job(lambda: trace(case, folder, stages, console, tracked_as))
+    return as_the_job(lambda: trace(case, folder, stages, console, under))

@@ -69,7 +69,7 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
         yield None
         return
     try:
-        store = Store()
+        store = Store(subject.tracking.uri)
         _close_killed(subject.name, store, console)
         tracker = Tracker(store, subject, console.say, title=title)
     except StoreAway as error:

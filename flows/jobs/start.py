@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from flows.base import environment
 from flows.base.console import Console, first_line
-from flows.jobs.discovery import EXPERIMENT, case_and_folder, check, trace
+from flows.jobs.discovery import TrackedUnder, case_and_folder, check, trace
 from flows.jobs.experiment import run_experiment
 from flows.jobs.run_request import RunRequest
 from flows.jobs.stages import PlainStages, server_in_reach
@@ -40,12 +40,14 @@ def start(
     environment.prepare_process()
     from aesi.pipeline.experiment.sources import check_roles, check_there
     from flows.evaluation.in_reach import check_in_reach
+    from flows.tracking.store import check_reached
 
     request = RunRequest(str(path), tuple(overrides), runner, address, resume, use_cache, use_prefect)
     config = request.config  # bad input is refused before anything is started
     check_roles(config)
     check_there(config)
     check_in_reach(config.runner)
+    check_reached(config.tracking.uri)
 
     def under_prefect() -> Path:
         from flows.jobs.prefect_flows import experiment
@@ -68,29 +70,42 @@ def start(
     return _with_or_without(under_prefect, plainly, use_prefect)
 
 
-def discover(case: Case, out: Path, use_prefect: bool = True, tracked_as: str = EXPERIMENT) -> dict[str, Any]:
+def discover(
+    case: Case,
+    out: Path,
+    use_prefect: bool = True,
+    under: TrackedUnder | None = None,
+    path: str | None = None,
+    overrides: Sequence[str] = (),
+) -> dict[str, Any]:
     """Trace one case and write the finding to `out`; returns the content of discovery.json.
 
+    under : what it is tracked under.  path, overrides : the experiment file that says so, if one does.
     Raises AesiError, one sentence, for what cannot be used; nothing is started then.
     """
     environment.prepare_process()
+    from flows.tracking.store import checked_address
+
+    under = under or TrackedUnder()
+    checked_address(under.tracking.uri)
     check(case)
 
     def under_prefect() -> dict[str, Any]:
         from flows.jobs.prefect_flows import discovery
 
         found: dict[str, Any] = discovery(
+            path=path,
+            overrides=list(overrides),
             out=str(out),
             cell=case.cell.name.removesuffix(".json").removesuffix(".bpx"),
             data=[one.name for one in case.measurements],
             case=case,
-            tracked_as=tracked_as,
         )
         return found
 
     def plainly() -> dict[str, Any]:
         console = Console()
-        return trace(case, out, PlainStages(console.say), console, tracked_as)
+        return trace(case, out, PlainStages(console.say), console, under)
 
     return _with_or_without(under_prefect, plainly, use_prefect)
 
@@ -99,8 +114,8 @@ def discover_experiment(
     path: str, overrides: Sequence[str] = (), out: Path | None = None, use_prefect: bool = True
 ) -> dict[str, Any]:
     """Trace the case that an experiment file describes; its results go below runs/ where no folder is given."""
-    case, folder, name = case_and_folder(path, overrides, out)
-    return discover(case, folder, use_prefect, name)
+    case, folder, under = case_and_folder(path, overrides, out)
+    return discover(case, folder, use_prefect, under, path, overrides)
 
 
 def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], use_prefect: bool) -> T:

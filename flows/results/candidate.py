@@ -172,7 +172,7 @@ def _candidate(store: Store, run_id: str) -> Any:
         if chosen is None:
             raise InputError(
                 f"run {run_id} chose candidate {number}, which is not in {without_login(store.uri)}: it was deleted, "
-                "or is not delivered yet, which the next `aesi run` or `aesi tables` does."
+                "or waits in the workspace of its run, where `aesi tables` delivers it."
             )
         run = chosen
     if run.data.tags.get(KIND) != "candidate":

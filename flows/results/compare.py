@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -65,10 +65,21 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         settings={k: v for k, v in run.data.params.items() if k not in OF_THE_RESULT},
         metrics=run.data.metrics,
         chosen=run.data.params.get("chosen_model", ""),
+        judged_on=_judged_on(run.data.params),
         tags=run.data.tags,
         comparison=_content(store, run, "comparison.json"),
         discovery=_content(store, run, "discovery.json") if "verdict" in run.data.tags else {},
     )
+
+
+def _judged_on(params: Mapping[str, str]) -> str:
+    """What tells the test records of a run from another's: their digests, which are tracked behind those of the other
+    roles; of a record that is cut, and of the virtual cell's, all digests and which part tests."""
+    digests = params.get("data_digest", "").split(", ")
+    tests = json.loads(params.get("data.test") or "[]")
+    if tests and len(digests) > len(tests):
+        return ", ".join(sorted(digests[-len(tests) :]))
+    return json.dumps([digests, tests, *(params.get(f"data.repeats.{key}") for key in ("period_s", "test"))])
 
 
 def _content(store: Store, run: Any, name: str) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from aesi.errors import InputError
 from flows.base import environment
 from flows.base.console import first_line
-from flows.tracking.store import PLACE, Store, default_uri, without_login
+from flows.tracking.store import PLACE, Store, checked_address, without_login
 from flows.tracking.view import VIEW, view_of
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ QUIETLY = {
 
 def serve(port: int, host: str, uri: str | None) -> None:
     """Serve until interrupted. A store that is a server already has its UI there: its address is printed."""
-    named, uri = uri is not None, uri or default_uri()
+    named, uri = uri is not None, checked_address(uri)
     if uri.startswith(("http://", "https://")):
         print(f"The runs are at {without_login(uri)}")
         return

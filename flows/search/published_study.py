@@ -25,7 +25,7 @@ from aesi.sparse import Genome
 from aesi.sparse.search.genome import GENE_WORDS
 from aesi.sparse.search.genome_space import GenomeSpace
 from flows.base import environment
-from flows.evaluation.outcome_database import with_driver
+from flows.base.databases import limits, with_driver
 from flows.search.nsga2 import Constraints
 from flows.search.term_sampler import distributions, widened
 
@@ -41,7 +41,7 @@ def journal() -> Path:
 def study_storage(url: str | None = None) -> BaseStorage:
     """Optuna's storage at a database URL, or the journal of the workspace."""
     if url:
-        return RDBStorage(with_driver(url))
+        return RDBStorage(with_driver(url), engine_kwargs=limits(url))
     journal().parent.mkdir(parents=True, exist_ok=True)
     return JournalStorage(JournalFileBackend(str(journal())))
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from flows.tracking.outbox import Item
 from flows.tracking.store import NUMBER, PARENT
+from flows.tracking.view import of_both_kinds
 from flows.tracking.whole_run import insert_run, new_artifact_uri
 
 if TYPE_CHECKING:
@@ -130,9 +131,9 @@ def _send_mark(store: Store, item: Item, again: bool) -> None:
 def _send_experiment(store: Store, item: Item, again: bool) -> None:
     """Tags of the experiment that are not there yet: what a person has written stays."""
     there = store.client.get_experiment(item["experiment_id"]).tags
-    for key, value in item["tags"].items():
-        if key not in there:
-            store.client.set_experiment_tag(item["experiment_id"], key, value)
+    new = {key: value for key, value in item["tags"].items() if key not in there}
+    for key, value in (new | of_both_kinds(item["tags"], there)).items():
+        store.client.set_experiment_tag(item["experiment_id"], key, value)
 
 
 def _sent_before(store: Store, item: Item) -> RunInfo | None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import re
 import sqlite3
 import time
 import urllib.error
@@ -17,15 +18,22 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 from aesi.errors import AesiError, InputError
 from aesi.numerics.files.whole import check_writable
 from flows.base import environment
+from flows.base.databases import limits, with_driver
 from flows.base.locks import ProcessLock
 from flows.tracking.relocation import artifact_folder, follow
 from flows.tracking.whole_run import read_runs
 
 SQLITE = "sqlite:///"
+SERVERS, DATABASES = ("http", "https"), ("sqlite", "postgresql", "mysql", "mssql")
+DATABRICKS = ("databricks", "databricks-uc", "uc")
+"""What an address may begin with; MLflow's folder of files, which is any other, takes no new runs."""
+MEANT_OTHERWISE = re.compile(r"%[0-9A-Fa-f]{2}|[?]")
+"""Parts of a path that the address of a database has for other things: the file would be another."""
 PARENT = "mlflow.parentRunId"
 NUMBER = "aesi.number"
 KIND = "aesi.kind"
@@ -54,21 +62,60 @@ def default_uri() -> str:
     return os.environ.get("MLFLOW_TRACKING_URI") or f"{SQLITE}{environment.workspace() / 'mlflow.db'}"
 
 
+def checked_address(uri: str | None = None) -> str:
+    """The address of a store as MLflow takes it; that of the workspace's where none is given.
+
+    Raises InputError for what is no address of one.
+    """
+    uri = with_driver(uri or default_uri())
+    scheme, _, rest = uri.partition("://")
+    kind = scheme.partition("+")[0]
+    if scheme in DATABRICKS or (kind in DATABASES[1:] and rest):
+        return uri
+    if not (uri.startswith(SQLITE) or (kind in SERVERS and _has_host(uri))):
+        raise InputError(
+            f"{without_login(uri)!r} is no address of a tracking store; give http://HOST:PORT, sqlite:///FILE or "
+            "postgresql://USER@HOST/DATABASE as tracking.uri, --uri or MLFLOW_TRACKING_URI, or leave it out."
+        )
+    if kind == "sqlite" and MEANT_OTHERWISE.search(rest):
+        raise InputError(
+            f"{rest.removeprefix('/')} cannot hold a tracking store, since ? and % with two digits mean something else "
+            f"in an address; give a path without them ({PLACE})."
+        )
+    return uri
+
+
+def _has_host(uri: str) -> bool:
+    try:
+        split = urlsplit(uri)
+        return bool(split.hostname) and (split.port is None or split.port > 0)
+    except ValueError:  # a port that is no number
+        return False
+
+
+def check_reached(uri: str | None = None) -> None:
+    """Raises as a `Store` would, before the work that leads to one; of a SQLite file only its address is looked at."""
+    if not checked_address(uri).startswith(SQLITE):
+        Store(uri)
+
+
 class Store:
     """One tracking store. `notes` : what was found when it was opened, one sentence each.  local : a SQLite file.
 
-    Raises StoreAway where it does not answer, with what to do.
+    Raises InputError for what is no address, StoreAway where it does not answer, with what to do.
     """
 
     def __init__(self, uri: str | None = None) -> None:
         # A database that fails reaches the caller as an exception, and need not be told twice, with a traceback.
         logging.getLogger("mlflow.store.db.utils").setLevel(logging.CRITICAL)
-        self.uri = uri or default_uri()
+        self.uri = checked_address(uri)
         self.local = self.uri.startswith(SQLITE)
         self._places: dict[str, str] = {}
         self.notes: tuple[str, ...] = ()
         if self.uri.startswith(("http://", "https://")):
             _reach(self.uri)
+        elif not self.local and not self.uri.startswith(DATABRICKS):
+            _reach_database(self.uri)
         with _alone(self.local):
             if self.local:
                 self.notes = _opened(self._path, self.uri)
@@ -86,7 +133,7 @@ class Store:
 
         Raises InputError for a SQLite file that is not there, or lies where nothing may be written.
         """
-        uri = uri or default_uri()
+        uri = checked_address(uri)
         if not uri.startswith(SQLITE):
             return cls(uri)
         database = _database(uri)
@@ -287,20 +334,45 @@ def _write_ahead(database: Path) -> None:
 def _reach(uri: str) -> None:
     """Raise StoreAway unless a server answers at the address within a few seconds."""
     try:
-        urllib.request.urlopen(f"{uri.rstrip('/')}/health", timeout=REACH_S).close()
+        place = without_login(uri).rstrip("/")  # urllib would take the login for a part of the host's name
+        urllib.request.urlopen(f"{place}/health", timeout=REACH_S).close()
     except urllib.error.HTTPError:
         return  # it answers, if not kindly; MLflow's own client says more
     except (OSError, ValueError) as error:
         raise _unusable(uri, error) from None
 
 
-def _unusable(uri: str, error: Exception) -> StoreAway:
+def _reach_database(uri: str) -> None:
+    """Raise StoreAway unless a database answers: MLflow tries it again for minutes.
+
+    Raises InputError where its driver is not installed.
+    """
+    import sqlalchemy as sa
+
+    try:
+        engine = sa.create_engine(uri, **limits(uri))
+    except ImportError as error:
+        package = "psycopg2-binary" if "psycopg2" in str(error) else "the driver that its address names"
+        raise InputError(f"the tracking store {without_login(uri)} needs {package}: {error}.") from None
+    except (sa.exc.ArgumentError, ValueError) as error:
+        raise _unusable(uri, error) from None
+    try:
+        engine.connect().close()
+    except sa.exc.SQLAlchemyError as error:
+        raise _unusable(uri, error.__cause__ or error) from None
+    finally:
+        engine.dispose()
+
+
+def _unusable(uri: str, error: BaseException) -> StoreAway:
     reason = (str(error).strip().splitlines() or [type(error).__name__])[0][:200]
     if uri.startswith("http"):
         advice = (
             "start the server, or leave out tracking.uri and MLFLOW_TRACKING_URI to track in the workspace's own "
             "SQLite file"
         )
+    elif not uri.startswith(SQLITE):
+        advice = "check the address, and that the database runs"
     elif "is full" in reason:
         advice = "free some space, then start again"
     else:
@@ -312,9 +384,8 @@ def _unusable(uri: str, error: Exception) -> StoreAway:
 
 def without_login(uri: str) -> str:
     """The address without the user and the password that may be in it, as it may be shown and written."""
-    from urllib.parse import urlsplit
-
-    login, at, _ = urlsplit(uri).netloc.rpartition("@")
+    place = re.split("[/?#]", uri.partition("//")[2], maxsplit=1)[0]
+    login, at, _ = place.rpartition("@")
     return uri.replace(f"{login}{at}", "", 1)
 
 

@@ -8,7 +8,7 @@ has written or saved is not overwritten.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 VIEW = "aesi"
 NOTE = "mlflow.note.content"
@@ -55,10 +55,25 @@ HOW_TO_READ_DISCOVERIES = (
 WHOLE_RUNS = "tags.`aesi.kind` = 'run'"
 
 
+VIEW_TAG = f"mlflow.sharedViewState.{VIEW}"
+
+
 def experiment_tags(note: str, columns: Sequence[str]) -> dict[str, str]:
     """Tags of an experiment: its description in Markdown, its kind, and the view that shows whole runs' columns."""
-    state = {"selectedColumns": list(columns), "searchFilter": WHOLE_RUNS}
-    return {NOTE: note, f"mlflow.sharedViewState.{VIEW}": json.dumps(state), **KIND_OF_EXPERIMENT}
+    return {NOTE: note, VIEW_TAG: _state(columns), **KIND_OF_EXPERIMENT}
+
+
+def of_both_kinds(tags: Mapping[str, str], there: Mapping[str, str]) -> dict[str, str]:
+    """The view of an experiment that has runs and discoveries: with the columns of both, where what is there is ours
+    for the other kind alone; else nothing."""
+    kinds = {_state(columns) for columns in (RUN_COLUMNS, DISCOVERY_COLUMNS)}
+    if {tags.get(VIEW_TAG), there.get(VIEW_TAG)} != kinds:
+        return {}
+    return {VIEW_TAG: _state((*RUN_COLUMNS, *DISCOVERY_COLUMNS))}
+
+
+def _state(columns: Sequence[str]) -> str:
+    return json.dumps({"selectedColumns": list(columns), "searchFilter": WHOLE_RUNS})
 
 
 def view_of(experiment_id: str) -> str:

@@ -32,6 +32,7 @@ MAY = {
     "aesi/tracer/report/outcome.py": "judges the finding",
     "flows/commands/cell.py": "takes --test from the command line",
     "flows/jobs/discovery.py": "logs their names",
+    "flows/results/compare.py": "tells by their digests which runs were judged on the same",
     "flows/tracking/experiment_log.py": "logs names and digests of the records",
 }
 

@@ -46,6 +46,7 @@ class ComparedRun:
     """One tracked run.
 
     settings : dotted key -> text.  metrics : by MLflow's names.  chosen : the model that a search ended with.
+    judged_on : the same text for runs whose errors are of the same test records.
     comparison : see `aesi.pipeline.experiment.comparison`.  discovery : content of discovery.json.
     """
 
@@ -56,6 +57,7 @@ class ComparedRun:
     settings: Mapping[str, str]
     metrics: Mapping[str, float]
     chosen: str = ""
+    judged_on: str = ""
     tags: Mapping[str, str] = field(default_factory=dict)
     comparison: Mapping[str, Any] = field(default_factory=dict)
     discovery: Mapping[str, Any] = field(default_factory=dict)
@@ -123,7 +125,12 @@ def _finding(runs: Sequence[ComparedRun]) -> str:
 
 
 def _least(runs: Sequence[ComparedRun]) -> str:
-    """The run that errs least, where the figures as shown tell it from the next."""
+    """The run that errs least, where all were judged on the same and the figures as shown tell it from the next."""
+    if not _judged_alike(runs):
+        count = sum(FREE_RUN_MV in run.metrics for run in runs)
+        return (
+            f"The {count} runs were not judged on the same test records, so that their errors do not compare."
+        )
     known = sorted((run.metrics[FREE_RUN_MV], run.label) for run in runs if FREE_RUN_MV in run.metrics)
     if len(known) < 2:
         return ""
@@ -142,7 +149,13 @@ def _harmed(runs: Sequence[ComparedRun]) -> str:
     if not worse:
         return ""
     who = "All" if worse == len(known) else f"{worse} of {len(known)}"
-    return f"{who} err{'s' if worse == 1 else ''} by more than the declared model alone."
+    where = "" if _judged_alike(runs) else f" on {'its' if worse == 1 else 'their'} own"
+    return f"{who} err{'s' if worse == 1 else ''} by more than the declared model alone{where}."
+
+
+def _judged_alike(runs: Sequence[ComparedRun]) -> bool:
+    """Whether the errors of those that have one are of the same test records."""
+    return len({run.judged_on for run in runs if FREE_RUN_MV in run.metrics}) < 2
 
 
 def _found(runs: Sequence[ComparedRun]) -> str:
@@ -185,7 +198,8 @@ def _metrics(runs: Sequence[ComparedRun]) -> PageTable | None:
         )
         for run in runs
     )
-    captions = ["On test records, of the model that a run chose." if chosen else "On test records."]
+    whose = "On test records" if _judged_alike(runs) else "On the test records of each run, which differ"
+    captions = [f"{whose}, of the model that a run chose." if chosen else f"{whose}."]
     if any("_mser_" in name for name in names):
         captions.append(MSER)
     if any(cell.range for row in rows for cell in row):

@@ -1,14 +1,19 @@
 """The shared store of outcomes: atomic, claimed by one process at a time, and by nobody who is dead."""
 
+import contextlib
+import os
+import socket
 import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import pytest
 from sqlalchemy.exc import OperationalError
 
 from aesi.errors import InputError
+from flows.base.databases import limits
 from flows.evaluation.outcome_database import DatabaseOutcomes, engine_of
 from flows.evaluation.outcome_files import FileOutcomes
 from flows.evaluation.outcome_store import open_outcomes
@@ -168,3 +173,44 @@ def test_a_database_that_is_not_there_is_one_sentence():
     with pytest.raises(InputError, match=r"runner\.storage .* cannot be used") as caught:
         DatabaseOutcomes("postgresql://me:secret@127.0.0.1:9/none")
     assert "secret" not in str(caught.value)
+
+
+@pytest.fixture
+def silent():
+    """Address of what accepts connections and never says a word."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        yield f"postgresql://me:secret@127.0.0.1:{listening.getsockname()[1]}/none"
+
+
+def test_a_database_that_accepts_and_never_answers_kept_a_command_for_ever(silent, monkeypatch):
+    from flows.search.published_study import study_storage
+
+    assert int(os.environ["PGCONNECT_TIMEOUT"]) <= 10
+    monkeypatch.setenv("PGCONNECT_TIMEOUT", "2")
+    started = time.monotonic()
+    with pytest.raises(InputError, match=r"runner\.storage .* cannot be used: .*timeout expired"):
+        DatabaseOutcomes(silent)
+    assert time.monotonic() - started < 4.0  # one wait, not one for each try
+    with pytest.raises(OperationalError, match="timeout expired"):
+        study_storage(silent)
+
+
+def test_a_statement_in_postgresql_waited_for_ever_for_a_lock():
+    class Connection:
+        def __init__(self):
+            self.executed = []
+
+        def cursor(self):
+            return contextlib.nullcontext(SimpleNamespace(execute=self.executed.append))
+
+        def commit(self):
+            self.executed.append("COMMIT")
+
+    options = limits("postgresql://127.0.0.1/none?tcp_user_timeout=5")
+    ((limit, when),) = options["pool_events"]
+    connection = Connection()
+    limit(connection, None)
+    assert (when, connection.executed) == ("connect", ["SET statement_timeout = '30s'", "COMMIT"])
+    assert "tcp_user_timeout" not in options["connect_args"]  # the address says it
+    assert "pool_events" not in limits("postgres://h/none?options=-c%20statement_timeout%3D5s")
+    assert limits("postgresql+pg8000://127.0.0.1/none") == {}

@@ -171,3 +171,51 @@ def test_a_worker_that_lives_on_evaluated_on_the_data_of_an_earlier_study(monkey
     ]
     dask_pool._scorer.cache_clear()
     assert outcomes == [[1, "x"], [1, "x"], [2, "x"]]
+
+
+def evaluate_slowly(content, base, study, genome):
+    """What runs on a worker of Dask in place of an evaluation: a genome says how long it takes."""
+    from flows.base import codec
+
+    time.sleep(codec.loads(genome))
+    return genome
+
+
+@pytest.fixture
+def dask_pool(monkeypatch):
+    """A pool of one Dask worker that lives in threads of this process, whose candidates sleep as they say."""
+    import distributed
+
+    from flows.evaluation import dask_pool
+
+    monkeypatch.setattr(dask_pool, "evaluate_bytes", evaluate_slowly)
+    monkeypatch.setattr(dask_pool, "_scorer", lambda *_: None)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, silence_logs=50
+    ) as cluster:
+        monkeypatch.setattr(
+            dask_pool, "connect", lambda *_: (distributed.Client(cluster, set_as_default=False), None)
+        )
+        made = []
+
+        def make(timeout_s):
+            made.append(dask_pool.DaskPool("{}", "", None, workers=1, timeout_s=timeout_s))
+            return made[-1]
+
+        yield make
+        for each in made:
+            each.close()
+
+
+def test_a_candidate_that_waited_behind_another_on_dask_failed_within_its_time(dask_pool):
+    pool = dask_pool(1.0)
+    assert outcomes(pool, [0.7] * 4) == [0.7] * 4
+
+
+def test_a_hang_on_dask_is_cut_off_on_its_own_worker(dask_pool, monkeypatch):
+    pool, restarted = dask_pool(1.5), []
+    monkeypatch.setattr(
+        pool._client, "restart_workers", lambda workers, raise_for_error: restarted.extend(workers)
+    )
+    assert outcomes(pool, [3.0, 0.1]) == [Failed("took longer than 1.5 s", of_machine=True), 0.1]
+    assert restarted == list(pool._client.scheduler_info()["workers"])

@@ -126,3 +126,23 @@ def test_two_dask_workers_do_at_least_1_6_times_the_work_of_one(tracked):
     smoke = Path(__file__).resolve().parents[3] / "experiments" / "smoke.yaml"
     (line,) = benchmarks.run("scale", experiment=str(smoke))
     assert line["ratio"] >= 1.6, line
+
+
+def test_a_dask_worker_that_was_restarted_twice_over_hung_candidates_was_gone_for_good():
+    """Two restarts 15 s apart, made one by a limit that the time of one exceeds."""
+    import dask
+
+    from flows.evaluation.dask_pool import connect
+
+    with dask.config.set({"distributed.deploy.lost-worker-timeout": "1s"}):
+        client, cluster = connect(None, 1)
+        try:
+            (worker,) = client.scheduler_info()["workers"]
+            hung = client.submit(time.sleep, 60, pure=False)
+            time.sleep(1)
+            client.cancel([hung], force=True)
+            told = client.restart_workers([worker], timeout=40, raise_for_error=False)
+        finally:
+            client.close()
+            cluster.close()
+    assert told == {worker: "OK"}

@@ -164,3 +164,47 @@ def test_a_worker_evaluated_what_it_could_hand_to_nobody(closed, call, workspace
     code, _, err = call("worker", path)
     assert code == 1
     assert "file: Not a directory; nobody could use the candidates that a worker evaluates here" in err
+
+
+@pytest.mark.parametrize(
+    ("uri", "code", "words"),
+    [
+        ("foo", 2, r"'foo' is no address of a tracking store; give http://HOST:PORT"),
+        ("http://", 2, "is no address"),
+        ("sqlite://runs.db", 2, "is no address"),
+        (
+            "http://me:secret@127.0.0.1:9",
+            1,
+            r"http://127\.0\.0\.1:9 cannot be used .*refused.* start the server",
+        ),
+        ("postgresql://me:secret@127.0.0.1:9/none", 1, "cannot be used .*refused.* that the database runs"),
+    ],
+)
+def test_a_tracking_address_that_is_none_or_away_was_told_after_a_server_had_been_started(
+    workspace, monkeypatch, uri, code, words
+):
+    from flows.jobs import start
+
+    def started():
+        raise AssertionError("Prefect's server is started")
+
+    monkeypatch.setattr(start, "start_server", started)
+    path = workspace / "refused.yaml"
+    path.write_text(EXPERIMENT.replace("CELL", str(CELL)))
+    for name in ("bad", "good"):
+        (workspace / f"{name}.csv").write_text("never read")
+    with pytest.raises(AesiError, match=words) as told:
+        start.start(path, [f"tracking.uri={uri}"])
+    assert told.value.exit_code == code
+    assert "secret" not in str(told.value)
+
+
+def test_a_workspace_with_an_escape_in_its_name_kept_its_runs_in_another_file(workspace, monkeypatch):
+    from flows.tracking.store import Store, checked_address
+
+    for name in ("a%20b", "a?b"):
+        monkeypatch.setenv("AESI_HOME", str(workspace / name))
+        with pytest.raises(InputError, match=r"cannot hold a tracking store.* AESI_HOME names"):
+            Store()
+    monkeypatch.setenv("AESI_HOME", str(workspace / "50% done"))
+    assert checked_address() == f"sqlite:///{workspace}/50% done/mlflow.db"

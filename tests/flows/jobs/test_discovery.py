@@ -91,7 +91,9 @@ def test_a_search_that_was_killed_is_told_from_others_and_closed_by_the_next(tra
     store.client.update_run(run_id, status="RUNNING")
     left[0].write()
     said = []
-    with discovery.tracked_job(discovery._subject(case, "discover"), "next", Said(said)) as tracker:
+    with discovery.tracked_job(
+        discovery._subject(case, discovery.TrackedUnder()), "next", Said(said)
+    ) as tracker:
         assert store.client.get_run(run_id).info.status == "KILLED"
     assert said == [f"run {run_id} had been killed; it is closed as such."]
     assert store.client.get_run(tracker.run_id).info.status == "FINISHED"
@@ -129,3 +131,46 @@ def test_under_prefect_the_finding_is_the_same(tracked, case):
     assert {task.name.rsplit("-", 1)[0] for task in tasks} == {"hypotheses", "report"}
     assert found["effects"] == plain["effects"] == ["series_resistance"]
     assert found["after"] == plain["after"]
+
+
+EXPERIMENT = f"""
+name: told_where
+seed: 3
+data: {{kind: files, train: [drive.csv], test: [drive.csv]}}
+cell: {{bpx: {CELL}}}
+discover: {{fit: [drive.csv]}}
+"""
+
+
+@pytest.mark.parametrize("prefect", [False, True])
+def test_a_discovery_of_an_experiment_was_not_tracked_where_its_file_says(
+    workspace, case, monkeypatch, empty_store, prefect
+):
+    """Prefect is asked as `flows.jobs.start` asks it: with the file beside the case."""
+    import shutil
+
+    from aesi.pipeline.discovery import cases
+    from flows.jobs import discovery, prefect_flows, start
+    from flows.jobs.stages import PlainStages
+    from flows.tracking.store import Store
+
+    shutil.copy(empty_store, workspace / "elsewhere.db")
+    (workspace / "told.yaml").write_text(EXPERIMENT)
+    uri = f"sqlite:///{workspace}/elsewhere.db"
+    monkeypatch.setattr(cases, "case_of_experiment", lambda config: case)
+    monkeypatch.setattr(discovery, "_trace", _only_tracked)
+    if prefect:
+        monkeypatch.setattr(start, "_with_or_without", lambda under_prefect, plainly, use: under_prefect())
+        monkeypatch.setattr(prefect_flows, "discovery", prefect_flows.discovery.fn)
+        monkeypatch.setattr(prefect_flows, "PrefectStages", PlainStages)
+    under = start.discover_experiment("told.yaml", [f"tracking.uri={uri}"], None, use_prefect=prefect)
+    assert (under.name, under.tracking.uri) == ("told_where", uri)
+    assert Store(uri).find_experiment("told_where") is not None
+    assert not (workspace / "mlflow.db").exists()
+
+
+def _only_tracked(case, out, run, console, under):
+    from flows.jobs import discovery
+
+    with discovery.tracked_job(discovery._subject(case, under), "title", console):
+        return under

@@ -8,7 +8,8 @@ import pytest
 
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, differing_settings, write_comparison
-from flows.results.compare import compare
+from flows.jobs.experiment import _uri_option
+from flows.results.compare import _judged_on, compare
 from flows.tracking.store import KIND, Store
 from flows.tracking.whole_run import insert_run
 
@@ -76,6 +77,27 @@ def test_the_first_sentence_of_a_page_counted_settings_and_not_what_came_of_them
         "<h1>Of 3 discoveries: 2 found, 1 unknown.</h1>"
         in write_comparison(tmp_path / "d.html", found).read_text()
     )
+
+
+def test_runs_that_were_judged_on_different_records_had_a_winner(tmp_path):
+    one = replace(run_of(1), judged_on="abc")
+    other = replace(run_of(2), judged_on="def", metrics=run_of(2).metrics | {"free_run/test_mser_pct": -20.0})
+    text = heading_of(tmp_path, one, other)
+    assert text == (
+        "The 2 runs were not judged on the same test records, so that their errors do not compare. "
+        "1 of 2 errs by more than the declared model alone on its own."
+    )
+    assert "On the test records of each run, which differ" in (tmp_path / "page.html").read_text()
+    assert "errs least" in heading_of(tmp_path, one, replace(other, judged_on="abc"))
+
+
+def test_what_a_run_was_judged_on_is_its_test_records_whatever_it_was_trained_on():
+    given = {"data_digest": "a, b, c", "data.train": '["1", "2"]', "data.test": '["3"]'}
+    more = {"data_digest": "d, c", "data.train": '["4"]', "data.test": '["renamed"]'}
+    other = {**given, "data_digest": "a, b, edited"}
+    assert _judged_on(given) == _judged_on(more) != _judged_on(other)
+    cut = {"data_digest": "a", "data.test": "[]", "data.repeats.test": "[3]"}
+    assert _judged_on(cut) != _judged_on(cut | {"data.repeats.test": "[4]"})
 
 
 def test_the_model_that_a_search_ended_with_is_no_setting(tracked):
@@ -170,3 +192,23 @@ def test_five_hundred_runs_make_one_page_of_a_size_that_opens(tracked, tmp_path)
     found = compare(["study"], tmp_path / "page.html")
     assert len(found) == 500
     assert (tmp_path / "page.html").stat().st_size < 20e6
+
+
+@pytest.mark.parametrize("command", ["compare", "candidate"])
+def test_what_waits_in_the_workspace_was_not_compared_nor_rebuilt(tracked, call, command):
+    store = Store()
+    experiment = store.experiment("two")
+    first, second = (store.create_run(experiment, "two", {KIND: "run"}) for _ in range(2))
+    waiting = {"kind": "end", "run_id": first, "status": "FINISHED", "at_ms": 2_000}
+    outbox = tracked / ".aesi" / "outbox" / first
+    outbox.mkdir(parents=True)
+    (outbox / "00000001.json").write_text(json.dumps(waiting))
+    more = [second] if command == "compare" else ["--out", "made"]
+    _, _, err = call(command, first, *more)
+    assert f"what run {first[:8]} had left over is delivered" in err
+    assert store.client.get_run(first).info.status == "FINISHED"
+
+
+def test_the_hints_at_the_end_of_a_run_did_not_find_it_on_a_server():
+    assert _uri_option(None) == ""
+    assert _uri_option("https://me:secret@host/my runs") == " --uri 'https://host/my runs'"

@@ -2,12 +2,13 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from flows.tracking.delivery import deliver
 from flows.tracking.store import KIND
-from flows.tracking.view import NOTE, RUN_COLUMNS, VIEW, experiment_tags
+from flows.tracking.view import DISCOVERY_COLUMNS, NOTE, RUN_COLUMNS, VIEW, experiment_tags
 
 CONTENT = {"bagging": {"T1(I)": 0.25}}
 
@@ -90,3 +91,32 @@ def test_what_a_person_wrote_about_an_experiment_stays(store):
     assert view["searchFilter"] == f"tags.`{KIND}` = 'run'"  # the candidates of one run would fill the table
     columns = view["selectedColumns"]
     assert "metrics.`free_run/test_rmse_mv`" in columns
+
+
+@pytest.mark.parametrize("kinds", [(RUN_COLUMNS, DISCOVERY_COLUMNS), (DISCOVERY_COLUMNS, RUN_COLUMNS)])
+def test_a_run_after_a_discovery_of_one_name_was_shown_with_the_columns_of_discoveries(store, kinds):
+    number = store.experiment("cells")
+
+    first, second = kinds
+    both = (*RUN_COLUMNS, *DISCOVERY_COLUMNS)
+    for kind, shown in [(first, first), (first, first), (second, both), (first, both)]:
+        item = {"kind": "experiment", "experiment_id": number, "tags": experiment_tags("", kind)}
+        deliver(store, item, again=False)
+        there = store.client.get_experiment(number).tags[f"mlflow.sharedViewState.{VIEW}"]
+        assert json.loads(there)["selectedColumns"] == list(shown)
+
+
+def test_the_client_told_on_stdout_where_a_run_is_amidst_the_tables_written_there(capsys, monkeypatch):
+    from mlflow.store.tracking.rest_store import RestStore
+    from mlflow.tracking import MlflowClient
+
+    info = SimpleNamespace(run_name="a run", experiment_id="1")
+    run = SimpleNamespace(info=info, data=SimpleNamespace(tags={}))
+    monkeypatch.setattr(RestStore, "get_run", lambda *_: run)
+    monkeypatch.setattr(RestStore, "update_run_info", lambda *_, **__: info)
+    client = MlflowClient("http://127.0.0.1:9")
+    client.set_terminated("ab" * 16)
+    assert capsys.readouterr().out == ""
+    monkeypatch.delenv("MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT")
+    client.set_terminated("ab" * 16)
+    assert "View run a run at" in capsys.readouterr().out  # else it is silenced in vain
