@@ -178,9 +178,7 @@ def resume_key(config: ExperimentConfig) -> str:
     from aesi.pipeline.experiment.sources import catalogue_files, named_files
 
     files = list(named_files(config).values())
-    with suppress(
-        InputError
-    ):  # there is nothing of a set that cannot be had, which is told when the data are loaded
+    with suppress(InputError):  # that a set cannot be had is told when the data are loaded
         files += catalogue_files(config)
     limits = f"{config.search.timeout_s:g} s, {config.search.memory_mb:g} MB"
     return fingerprint.key(config.digest, limits, source_digest(), *contents(files))
