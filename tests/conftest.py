@@ -1,5 +1,6 @@
 """Shared by all tests: one thread a process, no telemetry, and where measured data may be found."""
 
+import json
 import os
 
 for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS"):
@@ -41,3 +42,21 @@ def shared_data() -> Path:
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(20260)
+
+
+@pytest.fixture
+def dated_file(tmp_path):
+    """write(cell, share, day): the file of a cell that had its capacity on 1 January 2018, and a share of it on a later
+    day (YYYYMMDD)."""
+
+    def write(cell: Path, share: float, day: int) -> Path:
+        content = json.loads(cell.read_text())
+        content["Parameterisation"]["User-defined"] = {
+            "Capacity share by record": {"new": 1.0, "old": share},
+            "Day of test by record [YYYYMMDD]": {"new": 20180101, "old": day},
+        }
+        path = tmp_path / "dated.json"
+        path.write_text(json.dumps(content))
+        return path
+
+    return write

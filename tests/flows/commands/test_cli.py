@@ -461,15 +461,17 @@ def test_a_state_of_health_makes_the_same_charge_a_larger_share(call, cell, curr
     assert "a state of health of 80" in err
 
 
-def test_a_state_of_health_is_that_of_the_day_of_a_test(call, cell, current, tmp_path):
-    content = json.loads(cell.read_text())
-    content["Parameterisation"]["User-defined"] = {
-        "Capacity share by record": {"new": 1.0, "old": 0.8},
-        "Day of test by record [YYYYMMDD]": {"new": 20180101, "old": 20180131},
-    }
-    dated = tmp_path / "dated.json"
-    dated.write_text(json.dumps(content))
-    arguments = ("simulate", "--cell", dated, "--current", current, "--soc0", 0.6, "--out")
+def test_a_state_of_health_is_that_of_the_day_of_a_test(call, cell, dated_file, current, tmp_path):
+    arguments = (
+        "simulate",
+        "--cell",
+        dated_file(cell, 0.8, 20180131),
+        "--current",
+        current,
+        "--soc0",
+        0.6,
+        "--out",
+    )
     for name, soh in (("share", 0.9), ("day", "2018-01-16")):
         code, _, err = call(*arguments, tmp_path / name, "--soh", soh)
         assert code == 0, err

@@ -1,6 +1,5 @@
 """Cases of the tracer from experiment files."""
 
-import json
 from datetime import date
 from pathlib import Path
 
@@ -162,14 +161,8 @@ def test_an_experiment_has_a_cell_at_its_state_of_health(tmp_path):
     assert aged.capacity_ah == pytest.approx(0.9 * whole.capacity_ah)
 
 
-def test_an_experiment_has_a_cell_of_the_day_of_its_test(tmp_path):
-    content = json.loads(BPX.read_text())
-    content["Parameterisation"]["User-defined"] = {
-        "Capacity share by record": {"new": 1.0, "old": 0.9},
-        "Day of test by record [YYYYMMDD]": {"new": 20180101, "old": 20180111},
-    }
-    dated = tmp_path / "dated.json"
-    dated.write_text(json.dumps(content))
+def test_an_experiment_has_a_cell_of_the_day_of_its_test(tmp_path, dated_file):
+    dated = dated_file(BPX, 0.9, 20180111)
     case = case_of_files(dated, [write_record(tmp_path)], soh=date(2018, 1, 6))
     assert "the cell as of 2018-01-06: 0.950 of its file's capacity" in " ".join(case.notes)
     cell = {"bpx": str(dated), "soc0": SOC0, "start": "declared"}
