@@ -94,6 +94,7 @@ def calibrate(
             fitted_with=model.physics,
             capacity_shares=tuple(shares.items()),
             tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
+            fitted_at_k=tuple((r.name, round(_mean_kelvin(cell, r), 2)) for r in model.records),
         ),
         declared=cell,
         parameters=intervals(model, x, covariance),
@@ -234,5 +235,10 @@ def _degc(record: Prepared) -> float | None:
 
 def _span_k(cell: Cell, records: Sequence[Prepared]) -> float:
     """K between the coldest and the warmest record's mean."""
-    means = [cell.initial_temperature_k if r.mean_kelvin is None else r.mean_kelvin for r in records]
+    means = [_mean_kelvin(cell, r) for r in records]
     return max(means) - min(means)
+
+
+def _mean_kelvin(cell: Cell, record: Prepared) -> float:
+    """Of what a record is taken at: the file's temperature where it tells none."""
+    return cell.initial_temperature_k if record.mean_kelvin is None else record.mean_kelvin

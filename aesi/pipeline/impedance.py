@@ -17,7 +17,7 @@ from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.cell import Soh
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.simulation import model_with
-from aesi.pipeline.notes import of_another_model, of_day, without_energies
+from aesi.pipeline.notes import of_another_model, of_day, on_temperatures
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.simulation import SayNotes, write_table
 from aesi.records import Spectrum
@@ -66,7 +66,7 @@ def impedance_file(
     z = impedance(declared.cell, hz, soc, temperature_degc, active, model=model or declared.model)
     write_table(out, {"frequency_hz": hz, "z_real_ohm": z.real, "z_imag_ohm": z.imag})
     if say_notes is not None:
-        cold = without_energies(declared.cell, [temperature_degc])
+        cold = on_temperatures(declared.cell, [temperature_degc])
         told = (*of_another_model(declared, model), *of_day(declared.cell, soh), *cold, *_left_out(active))
         say_notes([*declared.cell.unread, *told])
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):

@@ -70,6 +70,38 @@ def without_energies(
     )
 
 
+def beyond_fitted(
+    cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
+) -> tuple[str, ...]:
+    """A sentence where records are colder or warmer in the mean than any that the cell's file was fitted to.
+
+    Arguments as of `without_energies`.
+    """
+    if not cell.fitted_at_k:
+        return ()
+    taken_k = model_with(cell, effects).cell.initial_temperature_k
+    means = [taken_k if t is None else float(np.mean(t)) + ZERO_CELSIUS_K for t in temperatures_degc]
+    out = []
+    for word, sign in (("colder", -1.0), ("warmer", 1.0)):
+        record, edge_k = max(cell.fitted_at_k, key=lambda one: sign * one[1])
+        farthest_k = max(means, key=lambda kelvin: sign * kelvin)
+        if sign * (farthest_k - edge_k) > TELLING_K:
+            out.append(
+                f"{farthest_k - ZERO_CELSIUS_K:.1f} degC in the mean is {abs(farthest_k - edge_k):.0f} K {word} than "
+                f"any record that the cell's file was fitted to ({record}, {edge_k - ZERO_CELSIUS_K:.1f} degC): what "
+                "the model says there is extrapolated."
+            )
+    return tuple(out)
+
+
+def on_temperatures(
+    cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
+) -> tuple[str, ...]:
+    """All that is to be said of the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`."""
+    given, active = list(temperatures_degc), list(effects)
+    return (*without_energies(cell, given, active), *beyond_fitted(cell, given, active))
+
+
 def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
     """A sentence on what a state of health that is a day stands for; none for a share."""
     if not isinstance(soh, date):

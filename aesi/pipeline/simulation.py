@@ -23,7 +23,7 @@ from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.start.open_circuit import GIVEN_SD
-from aesi.pipeline.notes import of_another_model, of_day, temperature_sentence, without_energies
+from aesi.pipeline.notes import of_another_model, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -178,7 +178,7 @@ def _placed(
             start.sentence,
             hold_sentence(record.name, model.hold, asked.hold is not None, saved=saved),
             temperature_sentence(model.cell, record, model.effects),
-            *without_energies(model.cell, [record.temperature_degc], model.effects),
+            *on_temperatures(model.cell, [record.temperature_degc], model.effects),
             *_with_effects(record, model),
             *([f"when this model was made: {model.finding}"] if model.finding else []),
         ]

@@ -35,6 +35,7 @@ def test_the_command_gives_the_file_again(name, file, data, tmp_path):
     subprocess.run(["sh", CELLS / "calibrate.sh", name, tmp_path], check=True, env=environment, timeout=3600)
     shipped, again = (Cell.from_bpx(folder / f"{file}.bpx.json") for folder in (CELLS, tmp_path))
     assert again.tested_on == shipped.tested_on
+    assert again.fitted_at_k == shipped.fitted_at_k
     time = np.arange(0.0, 2400.0)
     # At 5 degC the electrolyte of the Panasonic carries 1.3C for long.
     current = shipped.nominal_capacity_ah * (0.4 + 0.5 * np.sign(np.sin(time / 60.0)))

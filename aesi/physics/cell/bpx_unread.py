@@ -14,6 +14,7 @@ from aesi.physics.cell.parts import (
     DOUBLE_LAYERS,
     FILM_ENERGIES,
     FILM_RESISTANCES,
+    FITTED_AT,
     FITTED_WITH,
     RATE_FACTORS,
     TESTED_ON,
@@ -26,6 +27,7 @@ OWN_FIELDS = {
     CONTACT_RESISTANCE,
     CAPACITY_SHARES,
     TESTED_ON,
+    FITTED_AT,
     THERMAL_CONDUCTIVITY,
     *(
         field

@@ -17,6 +17,7 @@ from aesi.physics.cell.parts import (
     DOUBLE_LAYERS,
     FILM_ENERGIES,
     FILM_RESISTANCES,
+    FITTED_AT,
     HEAT_TRANSFER,
     RATE_FACTORS,
     TESTED_ON,
@@ -92,6 +93,7 @@ def check_values(cell: CellParameters, where: str) -> None:
         ("Reference temperature [K]", cell.reference_temperature_k),
         ("Initial temperature [K]", cell.initial_temperature_k),
         ("Ambient temperature [K]", cell.ambient_temperature_k),
+        *((f"User-defined: {FITTED_AT}: {record}", kelvin) for record, kelvin in cell.fitted_at_k),
     ):
         if not COLDEST_DEGC <= kelvin - ZERO_CELSIUS_K <= WARMEST_DEGC:
             raise CellError(f"{where}: {name} = {kelvin:g} is no temperature of a cell; 25 degC is 298.15 K.")

@@ -10,6 +10,7 @@ from aesi.physics.cell.parts import (
     DOUBLE_LAYERS,
     FILM_ENERGIES,
     FILM_RESISTANCES,
+    FITTED_AT,
     FITTED_WITH,
     HEAT_TRANSFER,
     NO_FILM,
@@ -88,6 +89,7 @@ def _own_fields(cell: CellParameters) -> dict[str, Any]:
         **{field: float(model == cell.fitted_with) for model, field in FITTED_WITH.items()},
         CAPACITY_SHARES: dict(cell.capacity_shares),
         TESTED_ON: {name: int(f"{day:%Y%m%d}") for name, day in cell.tested_on},
+        FITTED_AT: dict(cell.fitted_at_k),
     }
     for side, electrode in (("Negative", cell.negative), ("Positive", cell.positive)):
         if electrode.rate_factor != UNITY:

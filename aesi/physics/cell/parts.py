@@ -33,6 +33,8 @@ FITTED_WITH = {model: f"Fitted with {model}" for model in ("espm", "dfn")}
 CAPACITY_SHARES = "Capacity share by record"
 TESTED_ON = "Day of test by record [YYYYMMDD]"
 """The fields of `capacity_shares` and `tested_on` in the user-defined section; days as numbers, see `FITTED_WITH`."""
+FITTED_AT = "Mean temperature by record [K]"
+"""The field of `fitted_at_k` in the user-defined section."""
 FILM_RESISTANCES = {side: f"{side} electrode film resistance [Ohm.m2]" for side in ("Negative", "Positive")}
 FILM_ENERGIES = {
     side: f"{side} electrode film resistance activation energy [J.mol-1]" for side in ("Negative", "Positive")
@@ -135,7 +137,7 @@ class CellParameters:
     contact_resistance_ohm : in series with the whole cell; that of metal, the same at any temperature.
     fitted_with : "espm" or "dfn", the model that the parameters were fitted with, where they were.
     capacity_shares : (record, share of this capacity that the cell had then), of the records of that fit.
-    tested_on : (record, day of its test), of those that have one.
+    tested_on : (record, day of its test), of those that have one.  fitted_at_k : (record, its mean temperature).
     unread : sentences on what the file declares and no simulation takes, as a hysteresis or a state of ageing.
     """
 
@@ -161,6 +163,7 @@ class CellParameters:
     fitted_with: str = ""
     capacity_shares: tuple[tuple[str, float], ...] = ()
     tested_on: tuple[tuple[str, date], ...] = ()
+    fitted_at_k: tuple[tuple[str, float], ...] = ()
     name: str = "cell"
     description: str = ""
     references: str = ""

@@ -19,7 +19,7 @@ from aesi.physics.effects import CATALOGUE, Effect, known_effects, selected
 from aesi.physics.folded import folded
 from aesi.physics.simulation import ModelName
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.notes import of_day, temperature_sentence, together, without_energies
+from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence, together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
@@ -113,7 +113,7 @@ class Case:
         return (
             *given.cell.unread,
             *of_day(given.cell, self.soh),
-            *without_energies(given.cell, (m.temperature_degc for m in self.records), given.effects),
+            *on_temperatures(given.cell, (m.temperature_degc for m in self.records), given.effects),
             *left,
             *(temperature_sentence(given.cell, m, given.effects) for m in untold),
         )

@@ -30,7 +30,7 @@ from aesi.pipeline.experiment.sources import (
     sources_of,
     with_keys,
 )
-from aesi.pipeline.notes import of_day, temperature_sentence, without_energies
+from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Hold, LeftOutDrives, Split, hold_sentence
@@ -190,7 +190,7 @@ def _on_grid(
             *even.notes,
         ]
         records[name] = no_rows(even, start.soc)
-    notes += without_energies(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)
+    notes += on_temperatures(cell, (m.temperature_degc for m, _ in sources.records.values()), given.effects)
     return records, notes
 
 

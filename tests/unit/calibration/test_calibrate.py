@@ -239,6 +239,7 @@ def test_the_declared_cell_was_judged_on_a_record_of_another_day_with_a_loss_tha
 def test_a_cell_calibrated_in_python_did_not_say_which_model_it_was_fitted_with(found, start, records):
     assert found.cell.fitted_with == "espm"
     assert dict(found.cell.capacity_shares) == found.capacities
+    assert dict(found.cell.fitted_at_k) == {"at_25": 298.15, "at_0": 273.15}
     other = calibrate(replace(start, fitted_with="dfn"), records[:1], evaluations=1)
     assert other.cell.fitted_with == "espm"
 

@@ -88,6 +88,7 @@ def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
         "Fitted with dfn": 1.0,
         "Capacity share by record": {"march": 1.0, "july": 0.9},
         "Day of test by record [YYYYMMDD]": {"july": 20170731},
+        "Mean temperature by record [K]": {"march": 298.4, "july": 283.15},
     }
     cell = Cell.from_bpx(content)
     assert float(cell.negative.rate_factor(np.array([0.5]))[0]) == pytest.approx(1.25)
@@ -95,7 +96,15 @@ def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
     assert cell.fitted_with == "dfn"
     assert dict(cell.capacity_shares) == {"march": 1.0, "july": 0.9}
     assert cell.tested_on == (("july", date(2017, 7, 31)),)
+    assert cell.fitted_at_k == (("march", 298.4), ("july", 283.15))
+    assert not cell.unread
     assert Cell.from_bpx(cell.to_bpx()) == cell
+
+
+def test_a_record_at_celsius_is_told_that_it_is_in_kelvin(content):
+    content["Parameterisation"]["User-defined"] = {"Mean temperature by record [K]": {"july": 10.0}}
+    with pytest.raises(CellError, match=r"Mean temperature by record \[K\]: july = 10 is no temperature of a cell"):
+        Cell.from_bpx(content)
 
 
 def test_tables_are_accepted_for_every_function(content):

@@ -7,7 +7,7 @@ import numpy as np
 
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.notes import of_another_model, temperature_sentence, together, without_energies
+from aesi.pipeline.notes import beyond_fitted, of_another_model, temperature_sentence, together, without_energies
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 
@@ -40,6 +40,19 @@ def test_a_cold_record_of_a_cell_without_activation_energies_was_simulated_in_si
         "the cell's file declares no activation energy for electrolyte diffusivity: taken as at 25 degC, which is "
         "up to 15 K off."
     )
+
+
+def test_what_is_colder_or_warmer_than_all_that_a_file_was_fitted_to_is_said():
+    fitted = replace(Cell.from_bpx(NMC), fitted_at_k=(("pulses", 265.25), ("drive", 299.0)))
+    assert beyond_fitted(fitted, [np.array([-20.0, 5.0, 12.0]), 25.0, 30.0]) == ()
+    assert beyond_fitted(fitted, [None]) == ()  # the file's own 25 degC
+    assert beyond_fitted(fitted, [np.full(3, -18.0), 25.0]) == (
+        "-18.0 degC in the mean is 10 K colder than any record that the cell's file was fitted to (pulses, -7.9 degC): "
+        "what the model says there is extrapolated.",
+    )
+    (sentence,) = beyond_fitted(fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=15.0)])
+    assert sentence.startswith("40.0 degC in the mean is 14 K warmer than any record ")
+    assert beyond_fitted(Cell.from_bpx(NMC), [-30.0]) == ()  # published: nobody says what it was fitted to
 
 
 def test_two_effects_that_change_the_temperature_were_one():
