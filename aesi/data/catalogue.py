@@ -7,9 +7,10 @@ lie behind pages that a program cannot follow, so they are listed with their DOI
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from aesi.data.fetch import Remote, fetch
 from aesi.errors import DataAway, DataError, did_you_mean
@@ -33,6 +34,7 @@ class DataSet:
     """One cell and its tests.
 
     files : what `get` fetches; empty where a program cannot.  how : to get the set by hand, and to read it.
+    published : name of a record in the path of its file in the archive as published, its groups joined by `_`.
     """
 
     name: str
@@ -42,6 +44,12 @@ class DataSet:
     licence: str
     files: tuple[Remote, ...] = ()
     how: str = ""
+    published: str = ""
+
+    def record_of(self, path: PurePath) -> str | None:
+        """Record of a file of the unpacked archive, in lower case but for its `degC`; None of any other file."""
+        match = re.search(self.published, path.as_posix()) if self.published else None
+        return None if match is None else "_".join(match.groups()).lower().replace("degc", "degC")
 
 
 def _about_energy(name: str, path: str, sha256: str) -> Remote:
@@ -107,6 +115,7 @@ SETS = (
         how="Open the DOI, download the archive and unpack it. Each CSV has a preamble above its header and "
         "time as h:min:s: keep the rows below, with time in seconds, 'Current', 'Voltage' and 'Temperature' "
         "as time_s,current_a,voltage_v,temperature_degc, and read with --sign charge-positive.",
+        published=r"(n?\d+degC)/(\d+_\w+)\.csv$",
     ),
     DataSet(
         "panasonic_ncr18650pf",
@@ -117,6 +126,7 @@ SETS = (
         how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas` with "
         "Time (s), Current (A, positive on charge), Voltage (V) and Battery_Temp_degC: write these as a CSV "
         "with time_s,current_a,voltage_v,temperature_degc and read it with --sign charge-positive.",
+        published=r"[ _](n?\d+degC_\w+)_Pan18650PF\.mat$",
     ),
     DataSet(
         "lg_m50t_w8",
@@ -200,6 +210,9 @@ def _named_in_vain(name: str) -> str:
 def locate(name: str, file: str) -> Path:
     """A file of a data set, with or without its suffix, fetched where it is not on this machine.
 
+    Of a set whose archive is unpacked in its folder also a record by its name there: `n10degC_cycle_2`,
+    `n20degC_611_mixed3`.
+
     Raises DataError where there is none, naming those that are there, or where the set cannot be had.
     """
     folder = get(name)
@@ -208,6 +221,10 @@ def locate(name: str, file: str) -> Path:
     for suffix in SUFFIXES:
         path = folder / f"{file}{suffix}"
         if path.is_file():
+            return path
+    one = find_set(name)
+    for path in sorted(folder.rglob("*")) if one.published else ():
+        if one.record_of(path.relative_to(folder)) == file:
             return path
     there = ", ".join(sorted(path.name for path in folder.iterdir() if path.is_file()))
     raise DataError(f"{name} has no file {file!r} in {folder}; there are: {there}.")
@@ -235,7 +252,7 @@ def _complete(name: str, folder: Path) -> bool:
     wanted = [remote.name for remote in find_set(name).files]
     if wanted:
         return all((folder / file).is_file() for file in wanted)
-    return any(path.is_file() for path in folder.iterdir())
+    return any(path.is_file() for path in folder.rglob("*"))
 
 
 def _copy(source: Path, out: Path) -> Path:

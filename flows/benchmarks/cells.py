@@ -26,6 +26,7 @@ EXPERIMENTS = {
 """One whose experiment trains on repeats of a record is trained on all of it here."""
 HYBRID = "AESI I"
 BEGIN, END = "<!-- table of aesi bench cells -->", "<!-- end -->"
+BEGIN_ARCHIVE, END_ARCHIVE = "<!-- table of aesi bench cells, archive -->", "<!-- end of archive -->"
 
 
 def run(
@@ -33,20 +34,24 @@ def run(
     only: Sequence[str] | str = (),
     hybrid: bool = False,
     experiments: str = "experiments",
+    archive: bool = False,
+    porous: bool = False,
     write: str | None = None,
 ) -> Iterator[dict[str, Any]]:
     """One dict a record, and a last one with `summary`: true.
 
-    cells, only : see `aesi.bench.physics.cells.run`.  hybrid : add `hybrid_mv`, some minutes.  experiments : folder of
-    the experiment files.  write : a page whose part between the two marks becomes the table.
+    cells, only, archive, porous : see `aesi.bench.physics.cells.run`.  hybrid : add `hybrid_mv`, some minutes.
+    experiments : folder of the experiment files.  write : a page whose part between the two marks becomes the table.
     """
     rows = []
-    for row in physics.run(cells, only):
+    for row in physics.run(cells, only, archive, porous):
         if hybrid and not row.get("summary") and row["cell"] in EXPERIMENTS and "error" not in row:
             row |= _hybrid(Path(experiments), row["cell"], row["record"])
         rows.append(row)
         yield row
-    if write is not None:
+    if write is not None and archive:
+        write_between(write, BEGIN_ARCHIVE, END_ARCHIVE, physics.archive_table(rows[:-1]))
+    elif write is not None:
         write_between(write, BEGIN, END, physics.table(rows[:-1]))
 
 

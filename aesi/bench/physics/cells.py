@@ -10,6 +10,7 @@ tested for five months is not the same cell.
 A model that runs out (a surface or the electrolyte, see `aesi.physics.depletion`) is held at its edge to the end of the
 record and said in `ran_out`; its figure counts all rows. A record that entered the calibration of its file is marked:
 its figure is no test. What others print is beside ours with its protocol; none of it was run here.
+With `archive` it is the records of the published archives that chose nothing (`aesi.bench.physics.archive`).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench.physics.archive import ARCHIVE, chamber, degc_of
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import locate
@@ -28,7 +30,7 @@ from aesi.data.read import read_measurement
 from aesi.errors import AesiError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
-from aesi.physics import Cell, initial_state, simulate
+from aesi.physics import Cell, ModelName, initial_state, simulate
 from aesi.records import Measurement
 
 WINDOW_ROWS = 1024
@@ -87,17 +89,27 @@ RECORDS = (
 )  # fmt: skip
 
 
-def run(cells: str = "experiments/cells", only: Sequence[str] | str = ()) -> Iterator[dict[str, Any]]:
+ARCHIVED = tuple(MeasuredRecord(data, name) for data, days in ARCHIVE.items() for name in days)
+
+
+def run(
+    cells: str = "experiments/cells",
+    only: Sequence[str] | str = (),
+    archive: bool = False,
+    porous: bool = False,
+) -> Iterator[dict[str, Any]]:
     """One dict a record, and a last one with `summary`: true.
 
-    cells : folder of the cell files.  only : names of sets or records; all without it.
+    cells : folder of the cell files.  only : names of sets or records; all without it.  archive : of the records of the
+    published archives, in place of those of the sets.  porous : add `porous_mv`, the file at the measured temperature
+    with the porous electrode in place of the single particle, some seconds a record.
     """
     wanted = {only} if isinstance(only, str) else set(only)
     rows = []
-    for record in RECORDS:
+    for record in ARCHIVED if archive else RECORDS:
         if wanted and not wanted & {record.data, record.name}:
             continue
-        row = judged(Path(cells), record)
+        row = judged(Path(cells), record, porous)
         rows.append(row)
         yield row
     tests = [r for r in rows if not r["fitted"] and "error" not in r]
@@ -147,6 +159,46 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [*lines, "", *(f"[{k}] {text}.  " for k, text in enumerate(protocols, start=1))]
 
 
+JUDGED = {
+    "declared_mv": "declared",
+    "with_temperature_mv": "with temperature",
+    "porous_mv": "porous electrode",
+    "aged_mv": "aged",
+}
+"""Of a record of an archive: the start file, the calibrated one by both models, and at the state of its day."""
+
+
+def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Lines of Markdown: median and worst of the records of each chamber, mV, then each record in a block to open."""
+    there = sorted(
+        (row for row in rows if "error" not in row),
+        key=lambda row: (row["cell"], degc_of(row["record"]), row["record"]),
+    )
+    keys = [key for key in JUDGED if any(row.get(key) is not None for row in there)]
+    shown = " | ".join(JUDGED[key] for key in keys)
+    lines = [
+        f"| cell | chamber | records | {shown} | ran out |",
+        "|---|---|---:|" + "---:|" * (len(keys) + 1),
+    ]
+    for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in there):
+        ours = [row for row in there if (row["cell"], chamber(row["record"])) == (cell, place)]
+        figures = [[row[key] for row in ours] for key in keys]
+        told = " | ".join(f"{np.median(each):.1f} / {max(each):.1f}" for each in figures)
+        out = sum("with_temperature" in row["ran_out"] for row in ours)
+        lines.append(f"| {cell} | {place} | {len(ours)} | {told} | {out or ''} |")
+    lines += [
+        "",
+        '??? note "Each record of the archives"',
+        "",
+        f"    | cell | record | mean degC | {shown} |",
+    ]
+    lines.append("    |---|---|---:|" + "---:|" * len(keys))
+    for row in there:
+        told = " | ".join(_shown(row, key) for key in keys)
+        lines.append(f"    | {row['cell']} | {row['record']} | {row['mean_degc']:.1f} | {told} |")
+    return lines
+
+
 def _shown(row: Mapping[str, Any], key: str) -> str:
     if key == "hybrid_mv" and row.get("trained"):
         return "trained"
@@ -156,16 +208,20 @@ def _shown(row: Mapping[str, Any], key: str) -> str:
     return f"{row[key]:.1f}" + ("" if ran_out is None else f" (ran out at {ran_out:.0f} s)")
 
 
-def judged(cells: Path, record: MeasuredRecord) -> dict[str, Any]:
+def judged(cells: Path, record: MeasuredRecord, porous: bool = False) -> dict[str, Any]:
     """RMSE of one record, mV; a record that cannot be had or simulated says why."""
     head: dict[str, Any] = {"cell": record.data, "record": record.name, "fitted": record.fitted}
     try:
-        return head | _figures(cells, record) | {"others_mv": record.others_mv, "others": record.protocol}
+        return (
+            head
+            | _figures(cells, record, porous)
+            | {"others_mv": record.others_mv, "others": record.protocol}
+        )
     except AesiError as error:
         return head | {"error": str(error)}
 
 
-def _figures(cells: Path, record: MeasuredRecord) -> dict[str, Any]:
+def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any]:
     data = read_measurement(locate(record.data, record.name), stop_s=record.until_s)
     measured = data.temperature_degc
     bare = replace(data, temperature_degc=None)
@@ -178,6 +234,8 @@ def _figures(cells: Path, record: MeasuredRecord) -> dict[str, Any]:
         runs["calibrated"] = free_run(best_cell, bare)
         if measured is not None:
             runs["with_temperature"] = free_run(best_cell, data)
+            if porous:
+                runs["porous"] = free_run(best_cell, data, "dfn")
         soh = soh_on_its_day(best_cell, record.data, record.name)
         if soh is not None:
             out["soh"] = round(soh, 3)
@@ -213,9 +271,9 @@ class FreeRunError:
     ran_out_s: float | None
 
 
-def free_run(cell: Cell, data: Measurement) -> FreeRunError:
+def free_run(cell: Cell, data: Measurement, model: ModelName = "espm") -> FreeRunError:
     """A free run over all rows, held backward as loggers write, from the state of charge of the first."""
-    error, gone = _errors(cell, data, initial_state(cell, data).soc)
+    error, gone = _errors(cell, data, initial_state(cell, data).soc, model)
     out_s = float(data.time_s[int(np.argmax(gone))]) if gone.any() else None
     return FreeRunError(round(MV_PER_V * rms(error), 2), out_s)
 
@@ -231,9 +289,10 @@ def windows_mv(cell: Cell, data: Measurement, rows: int = WINDOW_ROWS) -> float:
     return round(MV_PER_V * rms(np.concatenate(errors)), 2)
 
 
-def _errors(cell: Cell, data: Measurement, soc0: float) -> tuple[Array, BoolArray]:
+def _errors(cell: Cell, data: Measurement, soc0: float, model: ModelName = "espm") -> tuple[Array, BoolArray]:
     """(n,) V measured less model, and whether the model is held at an edge there."""
+    measured = data.temperature_degc
     run = simulate(
-        cell, data.time_s, data.current_a, soc0, (), data.temperature_degc, "backward", on_depletion="clip"
+        cell, data.time_s, data.current_a, soc0, (), measured, "backward", on_depletion="clip", model=model
     )
     return data.voltage_v - run.voltage_v, run.series["depleted"] > 0.0

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from datetime import date
 
+from aesi.bench.physics.archive import ARCHIVE
 from aesi.physics import Cell
 
 TESTED = {
@@ -53,7 +54,7 @@ TESTED = {
 
 def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
     """State of health (1) of the cell of a set on the day of a record; None where no day or no share is known."""
-    day = TESTED.get(data, {}).get(record)
+    day = {**ARCHIVE.get(data, {}), **TESTED.get(data, {})}.get(record)
     known = [one for _, one in cell.tested_on]
     if day is None or not known:
         return None

@@ -1,0 +1,76 @@
+"""Records of the published archives: found by their names there, none of the sets, judged by chamber."""
+
+from pathlib import PurePath
+
+import pytest
+
+from aesi.bench.physics.archive import ARCHIVE, chamber, degc_of
+from aesi.bench.physics.cells import ARCHIVED, RECORDS, archive_table
+from aesi.bench.physics.tested import TESTED
+from aesi.data import catalogue
+
+PUBLISHED = {
+    ("panasonic_ncr18650pf", "-20degC Trise/06-30-17_19.27 n20degC_trise_Cycle_1_Pan18650PF.mat"): (
+        "n20degC_trise_cycle_1"
+    ),
+    (
+        "panasonic_ncr18650pf",
+        "Panasonic 18650PF Data/25degC/Drive cycles/03-20-17_19.27 25degC_HWFTb_Pan18650PF.mat",
+    ): ("25degC_hwftb"),
+    ("lg_18650hg2", "LG_HG2/n20degC/611_Mixed3.csv"): "n20degC_611_mixed3",
+    ("lg_18650hg2", "n10degC/602_Cap_1C.csv"): "n10degC_602_cap_1c",
+}
+
+
+@pytest.mark.parametrize(("data", "path"), PUBLISHED)
+def test_a_record_is_named_as_its_file_in_the_archive(data, path):
+    assert catalogue.find_set(data).record_of(PurePath(path)) == PUBLISHED[data, path]
+    assert PUBLISHED[data, path] in ARCHIVE[data]
+
+
+@pytest.mark.parametrize(
+    "path", ["0degC/5 pulse/05-20-17_12.07 3619_dis5_10p.mat", "README.md", "25degC_us06.csv.gz"]
+)
+def test_other_files_of_an_archive_are_no_records(path):
+    assert all(catalogue.find_set(data).record_of(PurePath(path)) is None for data in ARCHIVE)
+
+
+def test_a_record_is_found_in_an_unpacked_archive(tmp_path, monkeypatch):
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))
+    inside = tmp_path / "lg_18650hg2" / "LG_HG2" / "n20degC"
+    inside.mkdir(parents=True)
+    (inside / "611_Mixed3.csv").write_text("")
+    assert catalogue.locate("lg_18650hg2", "n20degC_611_mixed3") == inside / "611_Mixed3.csv"
+
+
+def test_no_record_of_an_archive_is_one_of_the_sets_or_entered_a_calibration():
+    known = {(record.data, record.name) for record in RECORDS}
+    assert not known & {(record.data, record.name) for record in ARCHIVED}
+    assert all(not set(days) & set(TESTED[data]) for data, days in ARCHIVE.items())
+
+
+def test_the_table_holds_median_and_worst_of_each_chamber_coldest_first():
+    def row(record, mv, **more):
+        figures = {"declared_mv": 10 * mv, "with_temperature_mv": mv, "aged_mv": mv - 1.0}
+        return {"cell": "c", "record": record, "mean_degc": -5.0, "ran_out": {}, **figures, **more}
+
+    rows = [
+        row("0degC_us06", 20.0),
+        row("n20degC_la92", 30.0, ran_out={"with_temperature": 7.0}),
+        row("n20degC_udds", 50.0),
+        row("n20degC_trise_cycle_1", 5.0),
+        {"cell": "c", "record": "n20degC_nn", "error": "not here"},
+    ]
+    lines = archive_table(rows)
+    assert lines[2:5] == [
+        "| c | n20degC | 2 | 400.0 / 500.0 | 40.0 / 50.0 | 39.0 / 49.0 | 1 |",
+        "| c | n20degC, rising | 1 | 50.0 / 50.0 | 5.0 / 5.0 | 4.0 / 4.0 |  |",
+        "| c | 0degC | 1 | 200.0 / 200.0 | 20.0 / 20.0 | 19.0 / 19.0 |  |",
+    ]
+    assert "    | c | n20degC_la92 | -5.0 | 300.0 | 30.0 (ran out at 7 s) | 29.0 |" in lines
+    assert not any("n20degC_nn" in line for line in lines)
+    assert (chamber("n20degC_trise_us06"), degc_of("n20degC_trise_us06"), degc_of("10degC_nn")) == (
+        "n20degC, rising",
+        -20.0,
+        10.0,
+    )
