@@ -104,9 +104,8 @@ SETS = (
         "C/20, 1C capacity, US06, LA92 and mixed cycles at 10 Hz, -20 to 40 degC; case temperature",
         "Kollmeyer, Vidal, Naguib, Skells 2020, doi:10.17632/cp3473x7xv.3",
         "CC BY 4.0",
-        how="Open the DOI, download the archive and unpack it. Each CSV has a preamble above its header and "
-        "time as h:min:s: keep the rows below, with time in seconds, 'Current', 'Voltage' and 'Temperature' "
-        "as time_s,current_a,voltage_v,temperature_degc, and read with --sign charge-positive.",
+        how="Open the DOI, download the archive and unpack it. Each CSV is an export of Digatron's, which every "
+        "command reads as it is.",
     ),
     DataSet(
         "panasonic_ncr18650pf",
