@@ -19,7 +19,7 @@ FOLDER_VARIABLE = "AESI_DATA"
 """Names a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""
 SHARED = Path("shared") / "data"
 """A group's copies, in the working folder or in one above it."""
-SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".bpx.json", ".json")
+SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".mat", ".bpx.json", ".json")
 
 ABOUT_ENERGY = (
     "https://raw.githubusercontent.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation/"
@@ -113,9 +113,9 @@ SETS = (
         "C/20, 1C, pulses (HPPC), US06, HWFET, LA92 and mixed cycles at 10 Hz; case temperature",
         "Kollmeyer 2018, doi:10.17632/wykht8y7tg.1",
         "CC BY 4.0",
-        how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas` with "
-        "Time (s), Current (A, positive on charge), Voltage (V) and Battery_Temp_degC: write these as a CSV "
-        "with time_s,current_a,voltage_v,temperature_degc and read it with --sign charge-positive.",
+        how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas`, "
+        "which every command reads as it is; those of pulses (HPPC) lack the discharges between these, and are read a "
+        "part at a time (--from-s, --to-s).",
     ),
     DataSet(
         "lg_m50t_w8",
@@ -124,8 +124,8 @@ SETS = (
         "Pozzato, Allam, Onori 2022, Data in Brief, doi:10.1016/j.dib.2022.107995",
         "CC BY 4.0",
         how="Open the DOI and follow its data link. The diagnostic tests come as .mat or Excel files with "
-        "time, current and voltage: write these as a CSV with the columns time_s,current_a,voltage_v in "
-        "seconds, amperes and volts, and check the sign of the current (--sign).",
+        "time, current and voltage: name their columns (--column), or write these as a CSV with the columns "
+        "time_s,current_a,voltage_v in seconds, amperes and volts, and check the sign of the current (--sign).",
     ),
 )
 
