@@ -115,7 +115,9 @@ SETS = (
         "CC BY 4.0",
         how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas`, "
         "which every command reads as it is; those of pulses (HPPC) lack the discharges between these, and are read a "
-        "part at a time (--from-s, --to-s).",
+        "part at a time (--from-s, --to-s). Its spectra hold ActFreq (Hz), Zreal1 and Zimg1 (mOhm, which they do not "
+        "say) and AhAccu (Ah, negative on discharge): write these as frequency_hz,z_real_mohm,z_imag_mohm and, with "
+        "its sign turned, discharged_ah, beside the chamber's temperature_degc.",
     ),
     DataSet(
         "lg_m50t_w8",
