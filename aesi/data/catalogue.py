@@ -20,7 +20,7 @@ FOLDER_VARIABLE = "AESI_DATA"
 """Names a folder of the user's own copies: `<folder>/<set>/` or `<folder>/measured/<set>/`."""
 SHARED = Path("shared") / "data"
 """A group's copies, in the working folder or in one above it."""
-SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".bpx.json", ".json")
+SUFFIXES = ("", ".csv", ".csv.gz", ".parquet", ".mat", ".bpx.json", ".json")
 
 ABOUT_ENERGY = (
     "https://raw.githubusercontent.com/About-Energy-OpenSource/About-Energy-BPX-Parameterisation/"
@@ -112,9 +112,8 @@ SETS = (
         "C/20, 1C capacity, US06, LA92 and mixed cycles at 10 Hz, -20 to 40 degC; case temperature",
         "Kollmeyer, Vidal, Naguib, Skells 2020, doi:10.17632/cp3473x7xv.3",
         "CC BY 4.0",
-        how="Open the DOI, download the archive and unpack it. Each CSV has a preamble above its header and "
-        "time as h:min:s: keep the rows below, with time in seconds, 'Current', 'Voltage' and 'Temperature' "
-        "as time_s,current_a,voltage_v,temperature_degc, and read with --sign charge-positive.",
+        how="Open the DOI, download the archive and unpack it. Each CSV is an export of Digatron's, which every "
+        "command reads as it is.",
         published=r"(n?\d+degC)/(\d+_\w+)\.csv$",
     ),
     DataSet(
@@ -123,9 +122,11 @@ SETS = (
         "C/20, 1C, pulses (HPPC), US06, HWFET, LA92 and mixed cycles at 10 Hz; case temperature",
         "Kollmeyer 2018, doi:10.17632/wykht8y7tg.1",
         "CC BY 4.0",
-        how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas` with "
-        "Time (s), Current (A, positive on charge), Voltage (V) and Battery_Temp_degC: write these as a CSV "
-        "with time_s,current_a,voltage_v,temperature_degc and read it with --sign charge-positive.",
+        how="Open the DOI, download the archive and unpack it. Each .mat file holds a structure `meas`, "
+        "which every command reads as it is; those of pulses (HPPC) lack the discharges between these, and are read a "
+        "part at a time (--from-s, --to-s). Its spectra hold ActFreq (Hz), Zreal1 and Zimg1 (mOhm, which they do not "
+        "say) and AhAccu (Ah, negative on discharge): write these as frequency_hz,z_real_mohm,z_imag_mohm and, with "
+        "its sign turned, discharged_ah, beside the chamber's temperature_degc.",
         published=r"[ _](n?\d+degC_\w+)_Pan18650PF\.mat$",
     ),
     DataSet(
@@ -135,8 +136,8 @@ SETS = (
         "Pozzato, Allam, Onori 2022, Data in Brief, doi:10.1016/j.dib.2022.107995",
         "CC BY 4.0",
         how="Open the DOI and follow its data link. The diagnostic tests come as .mat or Excel files with "
-        "time, current and voltage: write these as a CSV with the columns time_s,current_a,voltage_v in "
-        "seconds, amperes and volts, and check the sign of the current (--sign).",
+        "time, current and voltage: name their columns (--column), or write these as a CSV with the columns "
+        "time_s,current_a,voltage_v in seconds, amperes and volts, and check the sign of the current (--sign).",
     ),
 )
 

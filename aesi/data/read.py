@@ -10,9 +10,10 @@ from pathlib import Path
 from aesi.data.channels.checks import Columns, Context, check_alive, check_finite, check_ranges, check_time
 from aesi.data.channels.columns import QUANTITIES, REQUIRED, Mapped
 from aesi.data.channels.gaps import without_gaps
-from aesi.data.channels.implausible import check_scale, check_sign, check_signed, check_stuck
+from aesi.data.channels.implausible import check_scale, check_sign, check_signed
 from aesi.data.channels.load_columns import load_columns
 from aesi.data.channels.stamps import time_doubts
+from aesi.data.channels.stuck import check_stuck
 from aesi.data.channels.temperature import temperature_doubts
 from aesi.data.readers import open_table
 from aesi.data.readers.formats.format import Sign
@@ -127,11 +128,11 @@ def examined(record: Measurement) -> Measurement:
 def _examine(
     data: Columns, context: Context, notes: list[str], header: Sequence[str], sign_advice: str
 ) -> Columns:
-    """The columns without a lone last row, after all checks; `notes` is given what was dropped or is doubted."""
+    """The columns without a lone first or last row, after all checks; `notes` is given what was dropped or doubted."""
     check_finite(data, context)
     check_time(data["time_s"], context)
     check_ranges(data, context)
-    data = without_gaps(data, context, notes)
+    data, context = without_gaps(data, context, notes)
     check_alive(data, context)
     notes.extend(time_doubts(data))
     notes.extend(temperature_doubts(data, context))

@@ -14,7 +14,20 @@ from aesi.data.state import Direction
 from aesi.errors import DataError
 
 Duplicates = Literal["refuse", "first", "last"]
-SUFFIXES = (".gz", ".csv", ".txt", ".tsv", ".bdf", ".parquet", ".xlsx", ".mpt", ".mpr", ".nda", ".ndax")
+SUFFIXES = (
+    ".gz",
+    ".csv",
+    ".txt",
+    ".tsv",
+    ".bdf",
+    ".parquet",
+    ".xlsx",
+    ".mpt",
+    ".mpr",
+    ".nda",
+    ".ndax",
+    ".mat",
+)
 """Of files, not of what their records are called."""
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
+from aesi.data.channels.columns import columns_listed
+from aesi.data.channels.spectrum_columns import EXAMPLE, NEEDED, find_impedance
 from aesi.data.readers import open_table
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import record_name
@@ -17,7 +19,6 @@ from aesi.numerics.typing import AnyArray, Array
 from aesi.records import Spectrum
 
 LABEL = "spectrum"
-NEEDED = ("frequency_hz", "z_real_ohm", "z_imag_ohm")
 STATES = ("soc", "discharged_ah")
 MOST_AGAIN = 1
 """Frequencies of one spectrum that come again: one of 27 measured ones has one twice."""
@@ -27,8 +28,9 @@ DESCRIBED = ("voltage_v", "temperature_degc", *STATES)
 
 
 def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
-    """The spectra of a CSV with frequency_hz, z_real_ohm, z_imag_ohm, and soc or discharged_ah.
+    """The spectra of a table with frequency_hz, z_real_ohm, z_imag_ohm, and soc or discharged_ah.
 
+    The first three may have an instrument's names with their units (`freq/Hz`, `Re(Z)/Ohm`, `-Im(Z)/Ohm`).
     Rows belong to one spectrum as long as these states, and the names in a column `spectrum` where there is one, stay
     the same; the imaginary part is negative where capacitive. voltage_v and temperature_degc are kept where they are
     there, the temperature as the mean over the rows.
@@ -36,19 +38,22 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
     """
     table = open_table(path)
     file, header = table.path.name, list(table.header)
-    missing = [name for name in NEEDED if name not in header]
+    found = find_impedance(table)
+    missing = [name for name in NEEDED if name not in found]
     if missing or not any(name in header for name in STATES):
         wanted = ", ".join(missing) if missing else " or ".join(STATES)
         raise DataError(
-            f"{file} has no column {wanted}; a file of spectra needs {', '.join(NEEDED)}, and {' or '.join(STATES)}."
+            f"{file} has no column {wanted}; a file of spectra needs {', '.join(NEEDED)} (or as instruments name them, "
+            f"with units: {EXAMPLE}), and {' or '.join(STATES)}. It has: {columns_listed(table.header)}."
         )
-    twice = [name for name in (*NEEDED, *DESCRIBED, LABEL) if header.count(name) > 1]
+    twice = [name for name in (*DESCRIBED, LABEL) if header.count(name) > 1]
     if twice:
         raise DataError(
             f"{file} has {header.count(twice[0])} columns named {twice[0]!r}; rename all but one of them."
         )
-    names = [name for name in (*NEEDED, *DESCRIBED) if name in header]
-    columns = dict(zip(names, table.read(tuple(header.index(name) for name in names)), strict=True))
+    found |= {name: (header.index(name), 1.0) for name in DESCRIBED if name in header}
+    numbers = table.read(tuple(place for place, _ in found.values()))
+    columns = {name: factor * each for (name, (_, factor)), each in zip(found.items(), numbers, strict=True)}
     if not len(columns["frequency_hz"]):
         raise DataError(f"{file} has no row below its header; a spectrum needs at least one.")
     for name, values in columns.items():

@@ -120,7 +120,8 @@ def check_ranges(columns: Columns, context: Context) -> None:
         row = int(np.argmax(bad))
         raise DataError(
             f"{context.at('voltage_v', row)}: {voltage[row]:.6g} V is not the voltage of one cell (above 0 "
-            f"and at most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): check the column and its unit."
+            f"and at most {HIGHEST_VOLTAGE_V:g} V; rows like it: {int(np.sum(bad))}): check the column and its unit"
+            f"{_without_an_end(columns['time_s'], bad)}."
         )
     large = np.abs(current) > HIGHEST_CURRENT_A
     if np.any(large):
@@ -140,6 +141,18 @@ def check_ranges(columns: Columns, context: Context) -> None:
                 f"{COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; correct the column or leave it "
                 "out: --column temperature_degc=."
             )
+
+
+def _without_an_end(time_s: Array, bad: BoolArray) -> str:
+    """How to read all but the rows at fault, where these are the first or the last ones: a cell that was not, or no
+    longer, connected; from ', ' on."""
+    good = np.flatnonzero(~bad)
+    if good.size < 2 or bad[good[0] : good[-1]].any():
+        return ""
+    ends = [f"--from-s {time_s[good[0]]:.10g}"] * bool(bad[0]) + [f"--to-s {time_s[good[-1]]:.10g}"] * bool(
+        bad[-1]
+    )
+    return f", or leave out where the cell was not connected: {' '.join(ends)}"
 
 
 def check_alive(columns: Columns, context: Context) -> None:

@@ -1,4 +1,5 @@
-"""Rows that seem to be missing: a sparsely logged rest is passed over with a note, any other gap is refused."""
+"""Rows that seem to be missing: a sparsely logged rest and a lone row before or after the test are passed over with a
+note, any other gap is refused."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.channels.checks import Columns, Context
+from aesi.data.channels.load_columns import keep_rows
 from aesi.errors import DataError
 
 GAP_FLOOR_S = 5.0
@@ -24,23 +26,29 @@ FEW_RESTS = 3
 """Told one by one; more are told by their number."""
 
 
-def without_gaps(data: Columns, context: Context, notes: list[str]) -> Columns:
-    """Refuse gaps; pass over a rest logged sparsely and a lone row long after the test, with a note."""
+def without_gaps(data: Columns, context: Context, notes: list[str]) -> tuple[Columns, Context]:
+    """Refuse gaps; pass over a rest logged sparsely and a lone row long before or after the test, with a note."""
     n = len(data["time_s"])
+    kept = np.arange(n)
     rests: list[tuple[float, float]] = []
     for k in find_gaps(data):
         seconds = float(data["time_s"][k + 1] - data["time_s"][k])
         if is_rest(data, k):
             rests.append((float(data["time_s"][k]), seconds))
-        elif k == n - 2 and n > 2:
+        elif k == 0:
+            notes.append(
+                f"The first row, {seconds:.6g} s before the one after it, is not of this test and was dropped."
+            )
+            kept = kept[1:]
+        elif k == n - 2:
             notes.append(
                 f"The last row, {seconds:.6g} s after the one before it, is not of this test and was dropped."
             )
-            data = {q: v[:-1] for q, v in data.items()}
+            kept = kept[:-1]
         else:
             raise gap_error(data, k, context)
     notes += _rests_told(rests)
-    return data
+    return (data, context) if len(kept) == n else keep_rows(data, context, kept)
 
 
 def _rests_told(rests: Sequence[tuple[float, float]]) -> list[str]:

@@ -17,8 +17,15 @@ PARQUET_MAGIC = b"PAR1"
 XLSX_MAGIC = b"PK\x03\x04"
 XLS_MAGIC = b"\xd0\xcf\x11\xe0"
 JSON_MAGIC = b"{"
-MATLAB_MAGIC = (b"MATLAB", b"\x89HDF")
-PROMISES = {".xlsx": "workbook", ".xls": "workbook", ".parquet": "Parquet file", ".gz": "gzip file"}
+MATLAB_MAGIC = b"MATLAB"
+HDF_MAGIC = b"\x89HDF"
+PROMISES = {
+    ".xlsx": "workbook",
+    ".xls": "workbook",
+    ".parquet": "Parquet file",
+    ".gz": "gzip file",
+    ".mat": "MATLAB file",
+}
 """Suffixes of what is told by its first bytes, and what they promise."""
 
 
@@ -49,8 +56,16 @@ def open_table(path: str | Path, wanted: Collection[str] = ()) -> TableFile:
         return open_sheet(file, wanted)
     if magic.startswith(XLS_MAGIC):
         raise DataError(f"{file.name} is an old Excel workbook (.xls); save it as .xlsx or CSV.")
-    if magic.startswith(MATLAB_MAGIC):
-        raise DataError(f"{file.name} is a MATLAB or HDF5 file; export time, current and voltage as CSV.")
+    if magic.startswith(HDF_MAGIC):
+        raise DataError(
+            f"{file.name} is an HDF5 file, which is not read; export time, current and voltage as CSV."
+        )
+    if magic.startswith(MATLAB_MAGIC) or (
+        suffix == ".mat" and b"\x00" in magic
+    ):  # version 4 begins with numbers
+        from aesi.data.readers.matlab import open_mat
+
+        return open_mat(file, wanted)
     if magic.removeprefix(codecs.BOM_UTF8).lstrip().startswith(JSON_MAGIC):
         raise DataError(
             f"{file.name} is JSON, which holds no record: a table is read as CSV, Excel or Parquet, and a cell's file "

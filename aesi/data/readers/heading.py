@@ -18,7 +18,7 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?", r
 WITH_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?", re.ASCII)
 UNIT_CELL = re.compile(
     r"[\[(<]?\s*(s|sec|ms|min|h|hr|d|hh:mm:ss(\.\w+)?|h:m(in)?:s|[mkµu]?a|[mkµu]?v|°?c|degc|k|%|[mk]?ah|[mk]?wh|"
-    r"[mk]?w|[mµu]?ohm|[mµu]?ω|cnt|#|-|1)?\s*[\])>]?",
+    r"[mk]?w|[mµu]?ohm|[mµu]?ω|[mk]?hz|cnt|#|-|1)?\s*[\])>]?|\[[^\[\]]*\]",
     re.IGNORECASE,
 )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 import csv
 import io
+import re
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -28,6 +29,8 @@ BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
 )
+LONE_NUL = re.compile(rb"^\x00(?=\r?$)", re.MULTILINE)
+"""A line of one NUL, as Digatron's exports have it above the names of the columns: blank. Any other is binary."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ def decoded(head: bytes, name: str) -> tuple[str, str]:
                 return encoding, codecs.getincrementaldecoder(encoding)().decode(head)
             except UnicodeDecodeError:
                 raise DataError(f"{name} starts with a {encoding} mark but is not {encoding}.") from None
+    head = LONE_NUL.sub(b"", head)
     if b"\x00" in head:
         raise DataError(f"{name} holds binary data; give a text table (CSV) or a Parquet file.")
     try:

@@ -131,18 +131,27 @@ def neware_magnitudes() -> tuple[str, bytes]:
     return name, content.replace(b",-", b",")
 
 
-def digatron() -> tuple[str, bytes]:
-    lines = ["Digatron,Test,x", "Start Time,6/10/2018 1:36:45 PM", ""]
+def digatron(start_s: float = 0.0) -> tuple[str, bytes]:
+    """Blank lines, a block about the test and a line of one NUL stand above the names, each line ends in a comma."""
+    lines = [
+        "",
+        "",
+        "Measurement ID,575",
+        "Start Time,11/16/2018 6:36:11 PM",
+        "OrderNo,",
+        "Nominal Voltage, 3.7",
+    ]
+    lines += ["Maximum Voltage, 4.2", "", "\0"]
     lines.append(
         "Time Stamp,Step,Status,Prog Time,Step Time,Cycle,Cycle Level,Procedure,Voltage,Current,Temperature,Cnt,"
     )
     lines.append(",,,,,,,,[V],[mA],[C],[Cnt],")
-    times = [clock(t) for t in TIME]
+    times = [clock(t) for t in start_s + TIME]
     body = rows(
-        ["6/10/2018 1:36:45 PM"] * N, STEP, words("DCH", "CHA", "PAU"), times, times, STEP // 4, STEP, ["p"] * N,
+        ["11/17/2018 8:39:30 PM"] * N, STEP, words("DCH", "CHA", "PAU"), times, times, STEP // 4, STEP, ["p"] * N,
         VOLTAGE, -1e3 * CURRENT, TEMPERATURE, STEP,
     )  # fmt: skip
-    return "digatron.csv", "\n".join([*lines, *[f"{line}," for line in body], ""]).encode()
+    return "digatron.csv", "\r\n".join([*lines, *[f"{line}," for line in body], ""]).encode()
 
 
 def basytec() -> tuple[str, bytes]:
@@ -252,6 +261,18 @@ def test_a_binary_whose_time_begins_anew_with_each_step_is_put_together(tmp_path
     assert data.time_s[-1] == pytest.approx(6 * 140.0)
     assert any("begins anew" in note for note in data.notes)
     assert len(read(path, Reading(cycle="2", duplicates="first"))) == 43  # steps 4 to 6, less one stamp each
+
+
+def test_a_digatron_export_was_held_for_binary_by_the_line_above_its_names(tmp_path):
+    name, content = digatron(start_s=26.0 * 3600.0)
+    path = tmp_path / name
+    path.write_bytes(content)
+    record = read_measurement(path)
+    assert record.time_s == pytest.approx(26.0 * 3600.0 + TIME)
+    assert any("Recognised as an export of Digatron" in note for note in record.notes)
+    path.write_bytes(content.replace(b"PAU", b"P\0U", 1))
+    with pytest.raises(DataError, match="holds binary data"):
+        read_measurement(path)
 
 
 def test_many_sparsely_logged_rests_are_one_note(tmp_path):

@@ -80,12 +80,62 @@ def test_a_voltage_that_stood_still_from_the_middle_on_was_taken(tmp_path):
     assert "--to-s 3600 " in message
 
 
+def test_a_slow_fall_of_the_current_in_the_cold_was_held_for_a_charge(tmp_path):
+    """The drop of a cold cell comes back by more than 0.5 V, while no two rows differ by much."""
+    time = np.arange(0.0, 300.0, 0.1)
+    current = 3.0 + 2.8 * np.cos(2.0 * np.pi * time / 60.0)
+    cold = 4.1 - 0.15 * current - 1e-4 * np.cumsum(current)
+    read_measurement(written(tmp_path, time, current, cold))
+
+
+def test_what_comes_back_after_a_larger_current_was_held_for_a_charge(tmp_path):
+    time = np.arange(0.0, 600.0, 0.5)
+    current = np.where(time % 300.0 < 150.0, 10.0, 1.0)
+    cold = 4.1 - 0.02 * current - 5e-5 * np.cumsum(current)
+    since_s = time % 150.0
+    cold -= np.where(current > 5.0, 0.7 * (1.0 - np.exp(-since_s / 4.0)), 0.7 * np.exp(-since_s / 4.0))
+    read_measurement(written(tmp_path, time, current, cold))
+
+
 def test_a_voltage_that_is_held_is_no_sensor_that_stands_still(tmp_path):
     """The end of a charge: the cycler holds 4.2 V, and the current falls."""
     pulses = np.where(TIME < 3600.0, np.where((TIME % 400) < 40, 4.0, 0.0), 0.0)
     current = np.where(TIME < 3600.0, pulses, -3.0 * np.exp(-(TIME - 3600.0) / 900.0))
     volts = np.where(TIME < 3600.0, voltage(pulses), 4.2)
     read_measurement(written(tmp_path, TIME, current, np.round(volts, 3)))
+
+
+def held_charge():
+    """A drive, then a charge up to 4.1 V, which the cycler holds while the chamber warms and cools the cell."""
+    since_s, drive = TIME - 3600.0, 0.2 * DRIVE
+    falls = -1.5 * np.exp(-since_s / 900.0) * (1.0 + 0.04 * np.sin(since_s / 8.0))
+    current = np.where(since_s < 0.0, drive, np.where(since_s < 40.0, -1.5, falls))
+    volts = np.where(since_s < 0.0, voltage(drive), np.where(since_s < 40.0, 4.08 + 0.0005 * since_s, 4.1))
+    return current, np.round(volts, 5)
+
+
+def test_a_voltage_held_in_a_chamber_that_sways_was_a_sensor_that_stands_still(tmp_path):
+    read_measurement(written(tmp_path, TIME, *held_charge()))
+
+
+@pytest.mark.parametrize("shift_v", [-0.05, 0.0], ids=["below its highest", "at its highest"])
+def test_a_voltage_that_stands_still_on_charge_is_no_hold(tmp_path, shift_v):
+    """Below where the charge came before, or under a current that goes up and down by more than a hold's."""
+    current, volts = held_charge()
+    volts[TIME > 3640.0] += shift_v
+    if not shift_v:
+        later = TIME > 3640.0
+        current[later] = -1.0 - 0.4 * np.sign(np.sin(TIME[later] / 8.0))
+    assert "the voltage stands still at" in refusal(tmp_path, TIME, current, volts)
+
+
+def test_a_current_that_toggles_by_its_resolution_moves_no_voltage(tmp_path):
+    """Of a cold cell, whose resistance makes more than the voltage's resolution of one step of the current's."""
+    current = 0.0026 * np.round(0.4 * DRIVE / 0.0026)
+    volts = np.round(4.3 - 0.3 * current - 1e-5 * np.cumsum(current), 4)
+    current[900:960] = 0.0026 * np.tile([38, 39], 30)
+    volts[900:960] = volts[899]
+    read_measurement(written(tmp_path, TIME, current, volts))
 
 
 def test_a_short_record_in_milliseconds_was_taken(tmp_path):

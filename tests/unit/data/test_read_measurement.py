@@ -269,6 +269,27 @@ def test_a_lone_row_long_after_the_test_is_dropped_and_that_is_said(tmp_path):
     assert any("dropped" in note for note in measurement.notes)
 
 
+def test_a_lone_row_long_before_the_test_ended_it(tmp_path):
+    first = f"time_s,current_a,voltage_v\n{TIME[0] - 50000.0},0.0,3.1\n"
+    measurement = read_measurement(written(tmp_path, first + text().partition("\n")[2]))
+    np.testing.assert_array_equal(measurement.time_s, TIME)
+    assert any("The first row, 50000 s before the one after it" in note for note in measurement.notes)
+    stuck = np.array(VOLTAGE)
+    stuck[60:] = stuck[60]
+    message = refusal(tmp_path, first + text(voltage=stuck).partition("\n")[2])
+    assert "row 62 (line 63), column voltage_v: the voltage stands still" in message
+
+
+def test_a_cell_that_was_taken_off_at_the_end_is_told_how_to_be_read(tmp_path):
+    volts = np.array(VOLTAGE)
+    volts[-2:] = -0.0006
+    message = refusal(tmp_path, text(voltage=volts))
+    assert f"leave out where the cell was not connected: --to-s {TIME[-3]:g}." in message
+    read_measurement(written(tmp_path, text(voltage=volts)), stop_s=float(TIME[-3]))
+    volts[50] = -0.0006
+    assert "--to-s" not in refusal(tmp_path, text(voltage=volts))
+
+
 @pytest.mark.parametrize(
     ("columns", "words"),
     [

@@ -74,6 +74,38 @@ def test_spectra_of_two_files_were_called_alike_by_what_is_before_the_first_poin
     assert names == ["W8_0.2 1", "W8_0.5 1"]
 
 
+@pytest.mark.parametrize(
+    ("header", "rows"),
+    [
+        ("freq/Hz\tRe(Z)/Ohm\t-Im(Z)/Ohm\tsoc", ("100\t0.010\t0.001\t0.5", "10\t0.011\t0.002\t0.5")),
+        ("soc,Frequency (kHz),Z' (mOhm),Z'' (mOhm)", ("0.5,0.1,10,-1", "0.5,0.01,11,-2")),
+        ("frequency_hz,z_real_mohm,z_imag_mohm,soc", ("100,10,-1,0.5", "10,11,-2,0.5")),
+        ("Freq,Zreal,Zimag,soc", ("Hz,mOhm,mOhm,-", "100,10,-1,0.5", "10,11,-2,0.5")),
+    ],
+)
+def test_instruments_names_are_taken_with_their_units(tmp_path, header, rows):
+    (one,) = read_spectra(written(tmp_path, header, *rows))
+    assert one.frequency_hz.tolist() == pytest.approx([100.0, 10.0])
+    assert one.z_ohm.tolist() == pytest.approx([0.01 - 0.001j, 0.011 - 0.002j])
+
+
+@pytest.mark.parametrize("name", ["Zreal1", "Zreal1/MOhm"])
+def test_an_impedance_without_a_unit_is_told_where_it_belongs(tmp_path, name):
+    """As Digatron writes it, below a line of units that names the test."""
+    rows = ("[Hz];[EIS];[EIS];[1]", "100;10;-1;0.5", "10;11;-2;0.5")
+    with pytest.raises(DataError, match=f"'{name}', 'Zimg1' say no known unit; write it behind the name"):
+        read_spectra(written(tmp_path, f"ActFreq;{name};Zimg1;soc", *rows))
+
+
+def test_what_a_spectrum_lacks_is_told_with_what_is_there(tmp_path):
+    with pytest.raises(
+        DataError, match=r"no column frequency_hz; .* It has: 'Hertz', 'Re\(Z\)/Ohm', '-Im\(Z\)/Ohm'\."
+    ):
+        read_spectra(written(tmp_path, "Hertz,Re(Z)/Ohm,-Im(Z)/Ohm", *POINTS))
+    with pytest.raises(DataError, match=r"'freq/Hz' and 'Freq \(Hz\)'; rename all but one of them"):
+        read_spectra(written(tmp_path, "freq/Hz,Freq (Hz),Re(Z)/Ohm,-Im(Z)/Ohm", f"1,{POINTS[0]}"))
+
+
 def test_of_a_column_that_is_there_twice_the_first_was_taken_without_a_word(tmp_path):
     with pytest.raises(DataError, match="has 2 columns named 'soc'; rename all but one"):
         read_spectra(written(tmp_path, f"{COLUMNS},soc,soc", f"{POINTS[0]},0.5,0.6"))

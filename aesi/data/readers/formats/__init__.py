@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aesi.data.readers.formats import arbin, basytec, biologic, digatron, maccor, neware, novonix, pec
+from aesi.data.readers.formats import (
+    arbin,
+    basytec,
+    biologic,
+    digatron,
+    kollmeyer,
+    maccor,
+    neware,
+    novonix,
+    pec,
+)
 from aesi.data.readers.formats.format import Format
 
 FORMATS: tuple[Format, ...] = (
@@ -16,6 +26,7 @@ FORMATS: tuple[Format, ...] = (
     basytec.FORMAT,
     pec.FORMAT,
     neware.FORMAT,
+    kollmeyer.FORMAT,
 )
 
 

@@ -1,0 +1,81 @@
+"""Which column of a file holds frequency and impedance: under this project's name, or under one that says its unit."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Sequence
+
+from aesi.data.channels.headers import UNIT
+from aesi.data.readers.table import TableFile
+from aesi.errors import DataError
+
+NEEDED = ("frequency_hz", "z_real_ohm", "z_imag_ohm")
+STEMS = {
+    "frequency_hz": r"(act(ual)? ?)?freq(uency|\.)?",
+    "z_real_ohm": r"re ?\(z\)|real ?\(z\)|z ?re(al)?\d?|z'",
+    "z_imag_ohm": r"-? ?(im(ag)? ?\(z\)|z ?im?(a?g)?\d?|z'')",
+}
+"""What instruments call them, without the unit; behind a minus it is the negative."""
+UNITS = {
+    "frequency_hz": {"hz": 1.0, "khz": 1e3, "mhz": 1e-3},
+    "z_real_ohm": {"ohm": 1.0, "ohms": 1.0, "ω": 1.0, "mohm": 1e-3, "mω": 1e-3, "kohm": 1e3, "kω": 1e3},
+}
+UNITS["z_imag_ohm"] = UNITS["z_real_ohm"]
+"""In lower case, and what a value in it is multiplied by; none that begins with a capital M, for mega."""
+EXAMPLE = "freq/Hz, Re(Z)/Ohm, -Im(Z)/Ohm"
+
+
+def find_impedance(table: TableFile) -> dict[str, tuple[int, float]]:
+    """Position of each of NEEDED that is there, and the factor to Hz or ohm.
+
+    Raises DataError for one that is there twice, and for one under another name that says no unit.
+    """
+    found = {quantity: _found(table, quantity) for quantity in NEEDED}
+    without = [table.header[at[0]] for at in found.values() if at and at[1] is None]
+    if without:
+        say = "says" if len(without) == 1 else "say"
+        raise DataError(
+            f"{table.path.name}: {', '.join(map(repr, without))} {say} no known unit; write it behind the name, as in "
+            f"{EXAMPLE} (also kHz, mHz, mOhm, kOhm)."
+        )
+    return {quantity: (at[0], at[1]) for quantity, at in found.items() if at and at[1] is not None}
+
+
+def _found(table: TableFile, quantity: str) -> tuple[int, float | None] | None:
+    own = [place for place, name in enumerate(table.header) if name == quantity]
+    if own:
+        return _only(table, own), 1.0
+    read = [(place, *_stem_and_unit(table, place)) for place in range(len(table.header))]
+    alike = {place: (stem, unit) for place, stem, unit in read if re.fullmatch(STEMS[quantity], stem)}
+    if not alike:
+        return None
+    place = _only(table, list(alike))
+    stem, unit = alike[place]
+    factor = None if unit.startswith("M") else UNITS[quantity].get(_lower(unit))
+    return place, -factor if factor is not None and stem.startswith("-") else factor
+
+
+def _stem_and_unit(table: TableFile, place: int) -> tuple[str, str]:
+    """A column's name without its unit, in lower case, and the unit that stands in it or in the line of units."""
+    name = table.header[place]
+    at = UNIT.search(name)
+    inside = next((text for text in at.groups() if text), "") if at else ""
+    if at and any(_lower(inside) in known for known in UNITS.values()):
+        return _lower(name[: at.start()]), inside
+    return _lower(name), table.units[place] if table.units else ""
+
+
+def _lower(text: str) -> str:
+    """In lower case, underscores as blanks; unlike `plain` with the primes of Z' and Z''."""
+    return re.sub(r"[\s_]+", " ", unicodedata.normalize("NFKC", text)).strip().lower()
+
+
+def _only(table: TableFile, places: Sequence[int]) -> int:
+    if len(places) > 1:
+        names = list(dict.fromkeys(table.header[place] for place in places))
+        said = (
+            f"{len(places)} columns named {names[0]!r}" if len(names) == 1 else " and ".join(map(repr, names))
+        )
+        raise DataError(f"{table.path.name} has {said}; rename all but one of them.")
+    return places[0]

@@ -1,0 +1,70 @@
+"""A voltage that stands still while the current moves: a sensor that failed, or what a cycler holds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from aesi.data.channels.checks import Columns, Context
+from aesi.data.channels.implausible import ENOUGH_STEPS, STEP_SHARE, answer_to_steps
+from aesi.errors import DataError
+from aesi.numerics.typing import Array
+
+CLEAR_RESOLUTIONS = 3.0
+"""Of the smallest change of the voltage, and of the current where that is below STEP_SHARE of the largest: less may be
+lost in it. With ENOUGH_STEPS each way a voltage stands still. In 342 measured and virtual records, or parts of them, at
+most four steps each way have no answer at any multiple from 2 to 10, seven at 1. Of voltages of their 96 drives that
+were made to stand still for 60 rows 2, 3 and 5 find 34, 27 and 20 %, for 600 rows 91 %: the cell rests in most of the
+others."""
+HOLD_V = 0.005
+"""Below the highest voltage of a charge (above the lowest of a discharge) a cycler may hold it: the 84 of those charges
+that end so do at most 1.5 mV below."""
+HOLD_SHARE = 0.1
+"""By which share of its largest the current may come back while the voltage is held: by 0.034 in a chamber that sways
+by 3.5 K at -20 degC, and by 0.19 and more in long stretches of braking whose voltage stays within 10 mV."""
+
+
+def check_stuck(columns: Columns, context: Context) -> None:
+    """Refuse a voltage that stands still while the current goes up and down by what moves it elsewhere.
+
+    A voltage that a cycler holds is one value too: the current is then what answers.
+    """
+    voltage, time = columns["voltage_v"], columns["time_s"]
+    found, answer = answer_to_steps(columns), np.abs(np.diff(voltage))
+    if found is None or found[0] >= 0 or not answer.any():
+        return
+    expected = -found[0] * np.diff(columns["current_a"])
+    sizes = np.abs(expected)
+    of_current = min(CLEAR_RESOLUTIONS * _smallest(sizes), STEP_SHARE * float(np.max(sizes)))
+    least = max(CLEAR_RESOLUTIONS * _smallest(answer), of_current)
+    ends = np.concatenate([[-1], np.flatnonzero(answer > 0), [len(answer)]])
+    for k in np.flatnonzero(np.diff(ends) > 2 * ENOUGH_STEPS):
+        begin, end = int(ends[k]) + 1, int(ends[k + 1])
+        moves = expected[begin:end]
+        ways = [int(np.sum(way * moves > least)) for way in (1, -1)]
+        if min(ways) >= ENOUGH_STEPS and not _is_hold(columns, slice(begin, end + 1)):
+            raise DataError(
+                f"{context.at('voltage_v', begin)}: the voltage stands still at {voltage[begin]:.6g} V for "
+                f"{end - begin + 1:,} rows, up to {time[end]:.10g} s, while the current rises {ways[0]} times and "
+                f"falls {ways[1]} times by what moves it elsewhere; check the sensor, or read one side of it: --to-s "
+                f"{time[begin]:.10g} or --from-s {time[end]:.10g}."
+            )
+
+
+def _smallest(moves: Array) -> float:
+    """The smallest of (n,) moves, none below 0, that is none of 0."""
+    return float(np.min(moves[moves > 0]))
+
+
+def _is_hold(columns: Columns, rows: slice) -> bool:
+    """Whether a cycler holds the voltage that stands still over these rows: a current of one direction has brought it
+    as far as it came that way, and falls, but for what a chamber that warms and cools the cell makes of it."""
+    current, voltage = columns["current_a"][: rows.stop], columns["voltage_v"]
+    way = float(np.sign(current[rows.start]))
+    others = np.flatnonzero(way * current <= 0)
+    begin = int(others[-1]) + 1 if others.size else 0
+    if begin > rows.start:
+        return False
+    sizes, held = way * current[begin : rows.start + 1], way * current[rows]
+    came = -way * (voltage[begin : rows.start + 1] - voltage[rows.start])
+    back = held - np.minimum.accumulate(held)
+    return bool(np.max(came) <= HOLD_V and np.max(back) <= HOLD_SHARE * np.max(sizes))
