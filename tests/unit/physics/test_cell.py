@@ -103,7 +103,9 @@ def test_what_bpx_has_no_field_for_travels_in_the_user_section(content):
 
 def test_a_record_at_celsius_is_told_that_it_is_in_kelvin(content):
     content["Parameterisation"]["User-defined"] = {"Mean temperature by record [K]": {"july": 10.0}}
-    with pytest.raises(CellError, match=r"Mean temperature by record \[K\]: july = 10 is no temperature of a cell"):
+    with pytest.raises(
+        CellError, match=r"Mean temperature by record \[K\]: july = 10 is no temperature of a cell"
+    ):
         Cell.from_bpx(content)
 
 

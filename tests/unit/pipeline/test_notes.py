@@ -7,7 +7,13 @@ import numpy as np
 
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.notes import beyond_fitted, of_another_model, temperature_sentence, together, without_energies
+from aesi.pipeline.notes import (
+    beyond_fitted,
+    of_another_model,
+    temperature_sentence,
+    together,
+    without_energies,
+)
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
 
