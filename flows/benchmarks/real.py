@@ -20,6 +20,7 @@ from flows.benchmarks.page import write_between
 
 SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
 BEGIN, END = "<!-- table of aesi bench real -->", "<!-- end of real -->"
+BEGIN_ARCHIVE, END_ARCHIVE = "<!-- table of aesi bench real, archive -->", "<!-- end of real, archive -->"
 
 
 def run(
@@ -28,6 +29,7 @@ def run(
     only: str | None = None,
     development: bool | None = None,
     every: PositiveInt = 1,
+    archive: bool = False,
     limit_s: PositiveFloat | None = LIMIT_S,
     workers: PositiveInt = 1,
     address: str | None = None,
@@ -37,13 +39,13 @@ def run(
 ) -> Iterator[dict[str, Any]]:
     """One dict a case as it is judged, and a last one with `summary`: true.
 
-    cells : folder of the declared cell files.  cases, only, development, every : which cases, see `chosen`.
+    cells : folder of the declared cell files.  cases, only, development, every, archive : which cases, see `chosen`.
     limit_s : processor seconds a case.  workers, address : processes here, or a Dask scheduler.
     report : an HTML file to write.  write : a page whose part between the two marks becomes the table.  keep : a folder
     for what each case gave; a case that is in it is not judged again by the same program, as it was asked, so that an
     interrupted run goes on.
     """
-    specs = chosen(cases, only, development, every)
+    specs = chosen(cases, only, development, every, archive)
     judge = partial(
         judged_once,
         judge=partial(judged, cells=cells, limit_s=limit_s),
@@ -61,7 +63,8 @@ def run(
             yield {key: value for key, value in row.items() if key != "residual"}
     if write is not None:
         order = {spec.name: k for k, spec in enumerate(specs)}
-        write_between(write, BEGIN, END, table(sorted(rows, key=lambda row: order[row["case"]])))
+        marks = (BEGIN_ARCHIVE, END_ARCHIVE) if archive else (BEGIN, END)
+        write_between(write, *marks, table(sorted(rows, key=lambda row: order[row["case"]])))
 
 
 def _files(case: RealCase, cells: str) -> tuple[Path, ...]:

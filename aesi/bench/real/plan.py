@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from aesi.bench.physics.archive import ARCHIVE
 from aesi.bench.real.case import Fault, RealCase, Take
 from aesi.bench.real.faults import FaultKind
 from aesi.bench.real.good import beside_good
@@ -81,10 +82,23 @@ SPECTRA = {"25degC": "25degC_eis", "10degC": "10degC_eis"}
 """Of the Panasonic: start of a record's name -> the spectra of the same month."""
 
 
-def plan() -> tuple[RealCase, ...]:
-    """All cases in a fixed order; every other one of a group is for development."""
-    cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing(), *_witnesses()]
-    cases += beside_good(cases)
+DRIVES = ("cycle", "us06", "mixed", "la92")
+RESTS_FIRST = {(PANASONIC, "us06"), (PANASONIC, "la92")}
+"""Drives of the archives that begin with an hour or two of rest, which the first hour would be."""
+WARM = ("25degC", "40degC_562")
+"""Chambers at which nothing is withheld: that of the files, and what the archive of the HG2 has at 24 degC under 40."""
+
+
+def plan(archive: bool = False) -> tuple[RealCase, ...]:
+    """All cases in a fixed order; every other one of a group is for development.
+
+    archive : those of the published archives, other drives at other temperatures of the same cells.
+    """
+    if archive:
+        cases = list(_archived())
+    else:
+        cases = [*_controls(), *_withheld(), *_faults(), *_physics(), *_ageing(), *_witnesses()]
+        cases += beside_good(cases)
     there = {case.name for case in cases}
     seen: dict[str, int] = {}
     out = []
@@ -96,14 +110,18 @@ def plan() -> tuple[RealCase, ...]:
 
 
 def chosen(
-    cases: int | None = None, only: str | None = None, development: bool | None = None, every: int = 1
+    cases: int | None = None,
+    only: str | None = None,
+    development: bool | None = None,
+    every: int = 1,
+    archive: bool = False,
 ) -> list[RealCase]:
-    """Cases of the plan.
+    """Cases of the plan; of that of the archives with `archive`.
 
     cases : the first so many.  only : a group, or a substring of names.  development : only those that choose, or only
     those that do not.  every : take each n-th.
     """
-    found = [c for c in plan() if only is None or only == c.group or only in c.name]
+    found = [c for c in plan(archive) if only is None or only == c.group or only in c.name]
     found = [c for c in found if development is None or c.development == development]
     return found[::every][:cases]
 
@@ -123,36 +141,51 @@ def _spectra(cell: str, file: str) -> str | None:
     return SPECTRA.get(file.partition("_")[0]) if cell == PANASONIC else None
 
 
+def _archived() -> Iterator[RealCase]:
+    for cell, days in ARCHIVE.items():
+        for record in sorted(days):
+            drive = next((word for word in DRIVES if word in record), None)
+            if drive is not None and (cell, drive) not in RESTS_FIRST and not record.startswith(WARM):
+                yield _withheld_from(cell, record)
+                yield _control(cell, record)
+
+
 def _controls() -> Iterator[RealCase]:
     for given in (CONTROLS, COLDER_CONTROLS):
         for cell, files in given.items():
-            for file in files:
-                yield RealCase(
-                    name=f"control-{cell}-{file}",
-                    group="control",
-                    cell=CELLS[cell],
-                    take=Take(cell, file, _stop(file)),
-                    soc0=_soc0(cell, file),
-                    answers=(),
-                    source="the same cell at the temperature given, nothing put in",
-                    spectra=_spectra(cell, file),
-                )
+            yield from (_control(cell, file) for file in files)
+
+
+def _control(cell: str, file: str) -> RealCase:
+    return RealCase(
+        name=f"control-{cell}-{file}",
+        group="control",
+        cell=CELLS[cell],
+        take=Take(cell, file, _stop(file)),
+        soc0=_soc0(cell, file),
+        answers=(),
+        source="the same cell at the temperature given, nothing put in",
+        spectra=_spectra(cell, file),
+    )
+
+
+def _withheld_from(cell: str, file: str) -> RealCase:
+    return RealCase(
+        name=f"withheld-{cell}-{file}",
+        group="withheld",
+        cell=CELLS[cell],
+        take=Take(cell, file, _stop(file), temperature=False),
+        soc0=1.0,
+        answers=("ambient_temperature",),
+        source=THERMOCOUPLE,
+        measured="temperature",
+        matched=f"control-{cell}-{file}",
+    )
 
 
 def _withheld() -> Iterator[RealCase]:
     for cell, files in COLD_AND_HOT.items():
-        for file in files:
-            yield RealCase(
-                name=f"withheld-{cell}-{file}",
-                group="withheld",
-                cell=CELLS[cell],
-                take=Take(cell, file, _stop(file), temperature=False),
-                soc0=1.0,
-                answers=("ambient_temperature",),
-                source=THERMOCOUPLE,
-                measured="temperature",
-                matched=f"control-{cell}-{file}",
-            )
+        yield from (_withheld_from(cell, file) for file in files)
     for cell, files in WARMING.items():
         for file in files:
             yield RealCase(

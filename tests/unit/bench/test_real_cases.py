@@ -42,6 +42,18 @@ def test_the_plan_has_what_a_benchmark_on_measured_cells_needs():
     assert {case.take.temperature for case in cases if case.group == "withheld"} == {False}
 
 
+def test_of_the_archives_a_temperature_is_withheld_wherever_it_is_given_beside_it():
+    cases = plan(archive=True)
+    names = {case.name for case in cases}
+    assert Counter(case.group for case in cases) == {"withheld": 37, "control": 37}
+    assert not names & {case.name for case in plan()}
+    for group in ("withheld", "control"):
+        ours = [case for case in cases if case.group == group]
+        assert [case.development for case in ours[:4]] == [True, False, True, False]
+        assert all(case.take.temperature == (group == "control") for case in ours)
+        assert not any(case.take.file.startswith("25degC") for case in ours)
+
+
 def test_cases_are_chosen_by_group_and_by_what_they_are_for():
     assert {case.group for case in chosen(only="ageing")} == {"ageing"}
     assert {case.development for case in chosen(development=False)} == {False}
