@@ -149,7 +149,7 @@ def _check_capacity(cell: Cell, record: Measurement) -> None:
     coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
     if record.temperature_degc is None and _capacity_fault(cell, coldest) is None:
         fault += (
-            f". Or it was far colder than the {_declared_degc(cell):.4g} degC at which the cell's file has it: give its "
+            f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
             "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
         )
     raise DataError(f"{fault}.")
