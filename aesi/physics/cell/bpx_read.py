@@ -92,7 +92,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         capacity_shares=_by_record(user, CAPACITY_SHARES, where),
         tested_on=_tested_on(user, where),
         fitted_with=_fitted_with(user, where),
-        name=str(header.get("Title") or "cell"),
+        name=str(header.get("Title") or "cell").rstrip(". ") or "cell",  # it stands within sentences
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
         unread=unread(v1),
