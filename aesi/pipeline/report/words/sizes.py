@@ -182,7 +182,8 @@ def _part(key: str, value: Mapping[str, Any], parameter: Parameter | None) -> st
     if parameter is not None and _is_share(parameter):
         percent = _with_ends(value, PERCENT, 0.0, "%")
         return f"{quantity(percent)} {parameter.description.removeprefix('share ')}"
-    times = " times" if parameter is not None and parameter.neutral == 1.0 else ""
+    factor = key.endswith("_factor") or (parameter is not None and parameter.neutral == 1.0)
+    times = " times" if factor else ""
     return f"{name_words(key, value['unit'])} {quantity(value)}{times}"
 
 
