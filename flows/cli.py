@@ -13,6 +13,7 @@ from typing import NoReturn
 import typer
 
 from aesi.errors import AesiError, OwnEffectError
+from aesi.numerics.files.first_use import tell_compiling
 from flows.base import environment
 from flows.base.interrupt import INTERRUPTED, ending_soon_on_interrupt, tell_interrupted
 from flows.commands import batch, bench, cell, data, effects, experiment
@@ -57,6 +58,7 @@ def _version(version: bool = typer.Option(False, "--version", help="Print the ve
 def main() -> NoReturn:
     """Entry point of the `aesi` script."""
     environment.prepare_process()
+    tell_compiling(_say_compiling)
     try:
         with ending_soon_on_interrupt():
             app(args=repeated(sys.argv[1:]))
@@ -79,6 +81,14 @@ def main() -> NoReturn:
             raise
         _fail(f"unexpected {type(error).__name__}: {_first_line(error)} (AESI_DEBUG=1 shows where).", 1)
     raise SystemExit(0)
+
+
+def _say_compiling() -> None:
+    print(
+        "Compiling the models for this machine, once after each installation or update: about a minute ...",
+        file=sys.stderr,
+        flush=True,
+    )
 
 
 LISTS = ("--data", "--test", "--good", "--impedance", "--effect-file")

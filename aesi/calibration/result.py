@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 NINETY_FIVE = 1.96
 """Standard deviations either side of a 95 % interval."""
+ROUND_OFF = 1e-9
+"""Of its interval: a value nearer to nought is nought. A convention."""
 BOUND_SHARE = 0.02
 """A parameter closer to a bound than this share of its range is reported to have ended there."""
 
@@ -92,7 +94,8 @@ class Calibration:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why the cell may be bent to what is not its own, a sentence each: a state of charge that was given against
-        the voltage, and records on which the fit errs by more than the start file, which one cell's seldom do."""
+        the voltage, and records on which the fit errs by more than the start file, which one cell's seldom do, or the
+        file that is written."""
         against = (r.start for r in self.model.records if r.start.against_voltage)
         return (
             *(
@@ -105,6 +108,13 @@ class Calibration:
                 "same age and at the temperature that it was taken at?"
                 for e in self.errors
                 if e.after_v > e.before_v
+            ),
+            *(
+                f"{e.name}: the file that is written errs by {MV_PER_V * e.simulated_v:.2f} mV there, the start file "
+                f"by {MV_PER_V * e.before_v:.2f} mV: what the fit has of this record alone (its capacity, its start, "
+                "its cycler's zero) is not in the file."
+                for e in self.errors
+                if e.after_v <= e.before_v < e.simulated_v
             ),
         )
 
@@ -155,10 +165,10 @@ def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:
     out = {}
     for j, free in enumerate(model.free):
         reach = NINETY_FIVE * float(np.sqrt(covariance[j, j]))
-        out[free.name] = Interval(
-            free.value(float(x[j])), free.value(float(x[j]) - reach), free.value(float(x[j]) + reach),
-            free.unit, free.source,
-        )  # fmt: skip
+        value, low, high = (free.value(float(x[j]) + away) for away in (0.0, -reach, reach))
+        if abs(value) < ROUND_OFF * (high - low):  # on a bound of nought
+            value = 0.0
+        out[free.name] = Interval(value, low, high, free.unit, free.source)
     return out
 
 

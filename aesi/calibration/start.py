@@ -39,9 +39,11 @@ def sized(cell: Cell, measurements: Sequence[Measurement]) -> tuple[Cell, tuple[
     if known is None:
         return cell, (size_assumed(cell, measurements),)
     factor = known / cell.capacity_ah
-    note = f"capacity {known:.3f} Ah by a full discharge, {cell.capacity_ah:.3f} Ah declared"
     scaled = replace(cell, electrode_area_m2=cell.electrode_area_m2 * factor, nominal_capacity_ah=known)
-    return scaled, (f"{note}; the electrode area is scaled by {factor:.3f}.",)
+    return scaled, (
+        f"a full discharge took {known:.3f} Ah, and {cell.capacity_ah:.3f} Ah are declared: the fit starts from an "
+        f"electrode area scaled by {factor:.3f}; what the cell holds is its state of health.",
+    )
 
 
 def size_assumed(cell: Cell, measurements: Sequence[Measurement]) -> str:

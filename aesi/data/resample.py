@@ -110,8 +110,9 @@ def decimate(measurement: Measurement, max_rows: int) -> Measurement:
         raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")
     run = -(-(n - 1) // (max_rows - 1))
     left = (n - 1) % run
+    last = "the last row, no whole run, was" if left == 1 else f"the last {left} rows, no whole run, were"
     note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}" + (
-        f"; the last {left} rows, no whole run, were left out." if left else "."
+        f"; {last} left out." if left else "."
     )
     return _onto(measurement, measurement.time_s[::run], note, "backward")
 

@@ -21,8 +21,10 @@ from typing import Any
 
 import numba
 from numba import njit
+from numba.core import event
 
 from aesi.numerics.files.cache_folder import cache_folder
+from aesi.numerics.files.first_use import compiling
 
 SETTINGS: Any = numba.config
 CHOOSING = threading.Lock()
@@ -31,6 +33,19 @@ working folder."""
 ROOT = Path(__file__).resolve().parents[2]
 IMPORT = re.compile(rb"^from (aesi[\w.]*) import", re.MULTILINE)
 COMPILED = re.compile(rb"^@(njit|compiled|kept_njit)\b", re.MULTILINE)
+
+
+class _Compiling(event.Listener):
+    """Hears when numba compiles; what it finds on disk it does not compile."""
+
+    def on_start(self, event: Any) -> None:
+        compiling()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call]
 
 
 def kept_njit(**options: Any) -> Callable[[Any], Any]:

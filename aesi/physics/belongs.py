@@ -9,10 +9,11 @@ another unit.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError
 from aesi.numerics.typing import Array, IntArray
 from aesi.over_time import stamp
@@ -31,10 +32,11 @@ TELLING_SHARE = 0.3
 TELLING_SOC, FEWEST_SOC = 0.25, 0.02
 DROP_V = 0.06
 DROP_V_PER_C = 0.25
-COLD_DEGC, COLD_SPAN_K, COLD_FACTOR = 15.0, 25.0, 4.0
+COLD_DEGC, COLD_SPAN_K, COLD_FACTOR, MOST_SPANS = 15.0, 25.0, 4.0, 2.0
 AFTER_S, AFTER_SHARE = 1800.0, 0.3
 """Drops that no cell exceeds, DROP_V and DROP_V_PER_C when warm: the measured records stay within
-0.05 V + 0.2 V a C-rate above 15 degC, and within four times that at -10 degC."""
+0.05 V + 0.2 V a C-rate above 15 degC, and within four times that at -10 degC. A record without a temperature is as
+warm as the cell's file declares."""
 TOO_LARGE, TOO_SMALL = 2.0, 1.25
 """By how much the declared capacity may exceed, or fall short of, what the record allows: a cell may have lost half of
 it, and batches differ by less. The measured records want at most 1.05 times the capacity of their own cell's file, the
@@ -141,18 +143,33 @@ def _check_window(cell: Cell, record: Measurement) -> None:
 
 
 def _check_capacity(cell: Cell, record: Measurement) -> None:
+    fault = _capacity_fault(cell, record)
+    if fault is None:
+        return
+    coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
+    if record.temperature_degc is None and _capacity_fault(cell, coldest) is None:
+        fault += (
+            f". Or it was far colder than the {_declared_degc(cell):.4g} degC that the cell's file declares: give its "
+            "temperature in a column temperature_degc, or declare another in that file (Initial temperature [K])"
+        )
+    raise DataError(f"{fault}.")
+
+
+def _capacity_fault(cell: Cell, record: Measurement) -> str | None:
+    """What is moved between two voltages and which capacity that is of, where it is not the cell's, and why."""
     bounds = capacity_bounds(cell, record)
     declared = max(cell.nominal_capacity_ah, cell.capacity_ah)
     if bounds.low_rows is not None and bounds.low_ah > TOO_SMALL * declared:
-        raise DataError(
+        return (
             f"{_moved(record, bounds.low_rows)}, as in a cell of {bounds.low_ah:.3g} Ah or more, but {cell.name} has "
-            f"{declared:.3g} Ah: {_cause(bounds.low_ah / declared, record)}."
+            f"{declared:.3g} Ah: {_cause(bounds.low_ah / declared, record)}"
         )
     if bounds.high_rows is not None and declared > TOO_LARGE * bounds.high_ah:
-        raise DataError(
+        return (
             f"{_moved(record, bounds.high_rows)}, as in a cell of {bounds.high_ah:.3g} Ah or less, but {cell.name} has "
-            f"{declared:.3g} Ah: {_cause(bounds.high_ah / declared, record)}."
+            f"{declared:.3g} Ah: {_cause(bounds.high_ah / declared, record)}"
         )
+    return None
 
 
 def _moved(record: Measurement, rows: tuple[int, int]) -> str:
@@ -209,10 +226,14 @@ def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray) -> Array:
     before = np.array([np.max(size[first : row + 1]) for first, row in zip(since, rows, strict=True)])
     rate = np.maximum(size[rows], AFTER_SHARE * before) / cell.nominal_capacity_ah
     drop = DROP_V + DROP_V_PER_C * rate
-    if record.temperature_degc is None:
-        return drop
-    cold = np.clip((COLD_DEGC - record.temperature_degc[rows]) / COLD_SPAN_K, 0.0, 2.0)
+    measured = record.temperature_degc
+    degc = np.asarray(_declared_degc(cell)) if measured is None else measured[rows]
+    cold = np.clip((COLD_DEGC - degc) / COLD_SPAN_K, 0.0, MOST_SPANS)
     return drop * (1.0 + (COLD_FACTOR - 1.0) * cold)
+
+
+def _declared_degc(cell: Cell) -> float:
+    return cell.initial_temperature_k - ZERO_CELSIUS_K
 
 
 def _soc_of(cell: Cell, voltage_v: Array) -> Array:

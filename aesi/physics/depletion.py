@@ -41,7 +41,7 @@ def sentence(
         )
     else:
         told = _surface_left(model, kelvin, amperes, rows[:, at], what, where)
-    return f'{head}{told}, or, in Python, let it run on with on_depletion="clip".'
+    return f'{head}{told}, or let it run on: aesi simulate --run-on, in Python on_depletion="clip".'
 
 
 def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:

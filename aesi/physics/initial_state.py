@@ -160,7 +160,10 @@ class _Start:
         begun = first + drops[0]
         said = f"starts under {self.current_a:.3g} A at {self.record.voltage_v[0]:.3f} V"
         if self.open_circuit.charged(begun, drops[0]):
-            return self._full(begun, f"{said}, at rest {begun:.3f} V", None, drops[0])
+            words = (
+                f"{said}, and with the {1e3 * drops[0]:.0f} mV that the model drops at once at {begun:.3f} V"
+            )
+            return self._full(begun, words, None, drops[0])
         soc, sd, began_there = self.load.state_of_charge(first, drops)
         likelier = "as if the current began there" if began_there else "as if it had flowed before"
         words = (
@@ -179,10 +182,7 @@ class _Start:
             near = f"{1e3 * above_v:.0f} mV above"
             doubt = "; check the voltage's sensor, and the cell file, which may be another cell's"
             if above_v - drop_v <= CHARGED_V:  # as it was read, the voltage is a full cell's
-                doubt = (
-                    f"; {1e3 * drop_v:.0f} mV of that are the drop that the model has at once, of which the cell may "
-                    "have had less by the first row"
-                )
+                doubt = "; by its first row the cell may have dropped by less than the model does"
         words = (
             f"{self.record.name} {how}, {near} the upper cut-off "
             f"({self.cell.upper_voltage_v:g} V): a full charge, state of charge 1 +/- {sd:.4f} "

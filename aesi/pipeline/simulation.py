@@ -21,6 +21,7 @@ from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
+from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.start.open_circuit import GIVEN_SD
 from aesi.pipeline.notes import of_another_model, of_day, on_temperatures, temperature_sentence
@@ -48,6 +49,7 @@ class ProfileRequest:
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
+    run_on : of `simulate_file` alone: where a surface or the electrolyte runs empty or full, it is held there.
     """
 
     soc0: float | None = None
@@ -55,6 +57,7 @@ class ProfileRequest:
     reading: Reading | None = None
     self_heating: bool = False
     soh: Soh | None = None
+    run_on: bool = False
 
 
 def simulate_file(
@@ -69,7 +72,8 @@ def simulate_file(
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
     Beside `temperature_k` stands `temperature_degc`, which files are read by: the case's as the profile has it, else
-    the model's, unless that is the cell file's all along.
+    the model's, unless that is the cell file's all along. `depleted`, where it is asked to run on, is 1 from where the
+    model ran out.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     effects : added to those.
@@ -102,6 +106,7 @@ def simulate_file(
         used.effects,
         profile.temperature_degc,
         used.hold,
+        on_depletion="clip" if asked.run_on else "raise",
         model=used.model,
     )
     degc = profile.temperature_degc
@@ -110,6 +115,9 @@ def simulate_file(
     columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
     write_table(out, columns_out if degc is None else columns_out | {"temperature_degc": degc})
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
+    if asked.run_on and np.any(run.series["depleted"]):
+        at = int(np.argmax(run.series["depleted"]))
+        say([ran_out(placed.record.name, {"this model": float(run.time_s[at])})])
     return run
 
 

@@ -15,6 +15,7 @@ from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.initial_state import REST_C_RATE
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
@@ -94,7 +95,8 @@ class Discovery:
     experiments : (group of look-alikes, what would tell them apart).  choice : of the model of the cell.
     notes : what was assumed, and what a reader should know of the records and the search.
     contradicted : whether what explains the data leaves more of the test part than a right explanation may.
-    warnings : that, and where the written model does worse on the test part than another one.
+    warnings : that, where the written model does worse on the test part than another one, or on what was fitted than
+    the declared one, and where the test part has no load.
     seconds : spent.  simulations : of the hypotheses that were tried, without what judges them.
     """
 
@@ -274,7 +276,7 @@ def _told(
         choice=choice,
         notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
-        warnings=warnings(files, verdict),
+        warnings=warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
         written={name: (evidence.after.values or {})[name] for name in evidence.after.hypothesis},
         own={state: own_parameters(states[state]) for state in ("recalibrated", "after")},
         tried=problem.competing(),

@@ -1,4 +1,4 @@
-"""Ctrl-C ends a command within two seconds, whatever is running.
+"""Ctrl-C ends a command within two seconds, whatever is running; so does a scheduler that ends it, or `timeout`.
 
 What is worth keeping is on disk at every moment, and the next command closes a run that was cut off. So Prefect and
 MLflow get TIDY_S seconds to end by themselves, and then the process and its children are ended.
@@ -20,12 +20,16 @@ TIDY_S = 1.2
 0.1 to 0.5 s longer than this to stop their children and end."""
 INTERRUPTED = 130
 """What shells return for a process that Ctrl-C ended."""
+BY_SIGNAL = INTERRUPTED - signal.SIGINT
+"""What they add to the number of the signal."""
+HEARD = (signal.SIGINT, signal.SIGTERM)
 
 
 _asked = threading.Event()
 _told = threading.Event()
 _ending = threading.Lock()
 _kept: list[str] = []
+_code = [INTERRUPTED]
 
 
 @contextmanager
@@ -40,17 +44,19 @@ def kept_on_interrupt(sentence: str) -> Iterator[None]:
 
 @contextmanager
 def ending_soon_on_interrupt() -> Iterator[None]:
-    """Within, the first Ctrl-C interrupts and, after a moment, ends the process; a second one ends it at once."""
+    """Within, the first Ctrl-C, or SIGTERM, interrupts and, after a moment, ends the process; a second one ends it at
+    once."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.signal(signal.SIGINT, _interrupt)
+    before = {number: signal.signal(number, _interrupt) for number in HEARD}
     try:
         yield
     finally:
         if _asked.is_set():
             end_now()
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager
@@ -89,6 +95,7 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     if _asked.is_set():
         end_now()
     _asked.set()
+    _code[0] = BY_SIGNAL + number
     tell_interrupted()
     threading.Thread(target=_end_later, daemon=True).start()
     raise KeyboardInterrupt
@@ -112,7 +119,7 @@ def end_now() -> None:
     psutil.wait_procs(children, timeout=0.3)
     for child in children:
         _signal(child, signal.SIGKILL)
-    os._exit(INTERRUPTED)
+    os._exit(_code[0])
 
 
 def _signal(child: object, number: int) -> None:

@@ -28,12 +28,20 @@ def simulate(
     hold: options.HoldOption = None,
     model: options.ModelOption = None,
     self_heating: options.SelfHeating = False,
+    run_on: Annotated[
+        bool,
+        typer.Option(
+            "--run-on",
+            help="Where a particle's surface or the electrolyte runs empty or full, hold it there and go on; from when "
+            "is said.",
+        ),
+    ] = False,
 ) -> None:
     """The physics model alone, under a current profile."""
     outputs.check_table(out, [cell, current])
     from aesi.pipeline.simulation import ProfileRequest, simulate_file
 
-    asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh))
+    asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh), run_on)
     added = options.added_effects(effect, effect_file)
     run = simulate_file(cell, current, out, asked, added, model, options.say_notes)
     from aesi.over_time import extent

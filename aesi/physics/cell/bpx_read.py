@@ -94,7 +94,7 @@ def _cell(v1: dict[str, Any], where: str) -> CellParameters:
         tested_on=_tested_on(user, where),
         fitted_at_k=_by_record(user, FITTED_AT, where),
         fitted_with=_fitted_with(user, where),
-        name=str(header.get("Title") or "cell"),
+        name=str(header.get("Title") or "cell").rstrip(". ") or "cell",  # it stands within sentences
         description=str(header.get("Description") or ""),
         references=str(header.get("References") or ""),
         unread=unread(v1),

@@ -77,7 +77,11 @@ def finding(content: Mapping[str, Any]) -> str:
         _range([row[f"{key}_rmse_mv"] for row in files]) for key in ("after", "before", "as_simulated")
     )
     on = files[0]["name"] if len(files) == 1 else f"the {len(files)} records that it was fitted to"
-    worse = [row["name"] for row in files if row["after_rmse_mv"] > row["before_rmse_mv"]]
+    worse = [
+        row["name"]
+        for row in files
+        if max(row["after_rmse_mv"], row["as_simulated_rmse_mv"]) > row["before_rmse_mv"]
+    ]
     against = f" On {', '.join(worse)} the start file errs by less." if worse else ""
     return (
         f"In free run the calibrated model errs by {after} mV RMSE on {on}, where the start file erred by {before} mV. "

@@ -101,6 +101,11 @@ class FreeParameter:
         low, high = self.bounds
         return x - low < TINY, high - x < TINY
 
+    def told(self, value: float) -> float:
+        """A value as it is written down: the bound itself where it counts as on it, without what round-off leaves."""
+        lowest, highest = self.ends(self.coordinate(value))
+        return self.low if lowest else self.high if highest else value
+
     def on_bound(self, x: float) -> bool:
         """True where an effect's parameter ended on the bound of what is plausible. Its neutral point is no such bound,
         nor is the end of what can be meant at all (a share of 0 or 1)."""

@@ -46,7 +46,8 @@ def let_stand(problem: InverseProblem, shift_v: float) -> InverseProblem:
 class Reduction:
     """What the single particle leaves out of the porous electrode of one cell.
 
-    shift_v : root mean square over what fits see, V.  noise_v : of the sensors there.  of : which cell, in words.
+    shift_v : root mean square over what fits see, V.  noise_v : of the rows there, with what thinning left open.
+    of : which cell, in words.
     """
 
     shift_v: float
@@ -60,10 +61,12 @@ class Reduction:
 
     @property
     def sentence(self) -> str:
-        """By how much the two models differ."""
+        """By how much the two models differ, beside the noise that decides what is notable."""
+        times = self.shift_v / self.noise_v
         return (
             f"the porous electrode (dfn) and the single particle (espm) of {self.of} differ by "
-            f"{1e3 * self.shift_v:.2f} mV RMS here, {self.shift_v / self.noise_v:.2g} times the noise"
+            f"{1e3 * self.shift_v:.2f} mV RMS here, {f'{times:.0f}' if times >= 10.0 else f'{times:.2g}'} times the "
+            f"noise of the rows that are fitted ({1e3 * self.noise_v:.2f} mV)"
         )
 
 

@@ -97,8 +97,7 @@ def with_model(
         by_single = search(single, archive, max_effects, by_single)
     by_full = search(full, full_archive, most_names(by_single, max_effects))
     if believed((by_full.path, by_full.verdict), (by_single.path, by_single.verdict)):
-        why = ", which explains the data with fewer or more usual effects"
-        return _chosen(_of_both(by_single, by_full), "espm", reduction, why)
+        return _chosen(_of_both(by_single, by_full), "espm", reduction, _likelier(by_single))
     return _chosen(_of_both(by_full, by_single), "dfn", reduction)
 
 
@@ -114,6 +113,13 @@ def _chosen(
     differ = "" if reduction is None else f"; {reduction.sentence}"
     words = f"all hypotheses use {MODEL_WORDS[name]}{why}{differ}."
     return answer.settled(answer.verdict), ModelChoice(name, words, reduction)
+
+
+def _likelier(answer: Answer) -> str:
+    """Why the single particle is believed where both models were searched."""
+    if answer.verdict.word == "unknown":  # and so is that of the porous electrode, else it would be believed
+        return ", which says as much with fewer or more usual effects, though neither model explains the data"
+    return ", which explains the data with fewer or more usual effects"
 
 
 def _notable(reduction: Reduction | None) -> bool:

@@ -93,7 +93,8 @@ def estimates(path: Path, one: Explanation, effect: str) -> dict[str, Estimate]:
             out[free.name] = estimates(path, _parent(path, one), effect)[free.name]
             continue
         x, (below, above) = free.coordinate(placed[free.key]), reach[free.key]
-        out[free.name] = Estimate(placed[free.key], free.value(x - below), free.value(x + above), free.unit)
+        value, low, high = map(free.told, (placed[free.key], free.value(x - below), free.value(x + above)))
+        out[free.name] = Estimate(value, low, high, free.unit)
     return out
 
 

@@ -28,9 +28,12 @@ def contradicted_by_v(files: Sequence[FileOutcome], verdict: Verdict) -> float |
     return over_v if over_v > verdict.tolerance_v else None
 
 
-def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
-    """Where the test part contradicts a verdict that explains the data, and where the written model does worse there
-    than another one."""
+def warnings(files: Sequence[FileOutcome], verdict: Verdict, rest_a: float = 0.0) -> tuple[str, ...]:
+    """Where the test part contradicts a verdict that explains the data, where the written model does worse there than
+    another one, or on what was fitted than the declared one, and where the test part has no load.
+
+    rest_a : A, below which the cell rests.
+    """
     out = []
     over_v = contradicted_by_v(files, verdict)
     if over_v is not None:
@@ -51,6 +54,18 @@ def warnings(files: Sequence[FileOutcome], verdict: Verdict) -> tuple[str, ...]:
         harms = same != "before" and after_mv > AS_GOOD * min(less.values())
         advice = ": do not use it there." if harms else "."
         out.append(f"on the test part {model} leaves {after_mv:.2f} mV, {others}{advice}")
+    fitted = [f for f in files if f.part == "fit"]
+    before_mv, after_mv = (_left_mv(fitted, state) for state in ("before", "after"))
+    if after_mv > before_mv:
+        out.append(
+            f"on the part that was fitted {NAMES['after']} leaves {after_mv:.2f} mV of the rows as measured, "
+            f"{NAMES['before']} {before_mv:.2f} mV."
+        )
+    if tests and max(float(np.max(np.abs(f.current_a))) for f in tests) < rest_a:
+        out.append(
+            "the cell rests throughout the test part, which says nothing of a load: keep back more (--holdout), or "
+            "give a test record (--test)."
+        )
     return tuple(out)
 
 
@@ -72,8 +87,8 @@ def _same(tests: Sequence[FileOutcome], state: State) -> bool:
     return all(np.array_equal(f.voltages["after"], f.voltages[state]) for f in tests)
 
 
-def _left_mv(tests: Sequence[FileOutcome], state: State) -> float:
-    """To the hundredth of a mV that is shown; 0 where there is no test part."""
-    if not tests:
+def _left_mv(files: Sequence[FileOutcome], state: State) -> float:
+    """To the hundredth of a mV that is shown; 0 where there are none."""
+    if not files:
         return 0.0
-    return round(MV_PER_V * rms(np.concatenate([f.residual_v(state) for f in tests])), 2)
+    return round(MV_PER_V * rms(np.concatenate([f.residual_v(state) for f in files])), 2)

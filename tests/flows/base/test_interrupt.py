@@ -37,6 +37,14 @@ CLOSINGS = {
 
 @pytest.mark.parametrize("closing", CLOSINGS.values(), ids=CLOSINGS)
 def test_it_ends_within_seconds_with_its_children(closing, tmp_path):
+    ended_by(signal.SIGINT, 130, closing, tmp_path)
+
+
+def test_a_command_that_a_scheduler_ended_left_its_server_running(tmp_path):
+    ended_by(signal.SIGTERM, 143, CLOSINGS["a tidy end"], tmp_path)
+
+
+def ended_by(number, code, closing, tmp_path):
     busy = subprocess.Popen(
         [sys.executable, "-c", BUSY.format(closing=closing), str(tmp_path / "closing")],
         stdout=subprocess.PIPE,
@@ -46,9 +54,12 @@ def test_it_ends_within_seconds_with_its_children(closing, tmp_path):
     )
     child = psutil.Process(int(busy.stdout.readline()))
     started = time.monotonic()
-    os.killpg(busy.pid, signal.SIGINT)
+    if number == signal.SIGINT:  # of a terminal: it reaches the whole group
+        os.killpg(busy.pid, number)
+    else:
+        busy.send_signal(number)
     out, err = busy.communicate(timeout=30)
-    assert busy.returncode == 130
+    assert busy.returncode == code
     assert time.monotonic() - started < 10  # 2 s on a machine that does nothing else
     assert out == ""
     assert (tmp_path / "closing").exists()

@@ -410,6 +410,23 @@ def test_simulate_writes_voltage_and_states(call, cell, current, tmp_path):
     assert table["soc"][0] == pytest.approx(0.6, abs=1e-3)
 
 
+def test_a_record_that_the_model_cannot_follow_left_the_command_line_with_nothing(
+    call, cell, current, tmp_path
+):
+    simulate = ("simulate", "--cell", cell, "--current", tmp_path / "i.csv", "--out", tmp_path / "o.csv")
+    hard = 40.0 * pd.read_csv(current).current_a.abs()
+    pd.read_csv(current).assign(current_a=hard).to_csv(tmp_path / "i.csv", index=False)
+    code, _, err = call(*simulate, "--soc0", 0.6)
+    assert code == 1
+    assert "let it run on: aesi simulate --run-on" in err
+    code, _, err = call(*simulate, "--soc0", 0.6, "--run-on")
+    assert code == 0, err
+    table = pd.read_csv(tmp_path / "o.csv")
+    ran_out_s = table.time_s[table.depleted.to_numpy().argmax()]
+    assert 0.0 < ran_out_s < table.time_s.iloc[-1]
+    assert f"runs empty or full in this model at {ran_out_s:g} s, and is held there" in err
+
+
 def test_the_temperature_of_a_simulated_file_was_not_read_again(call, cell, current, tmp_path):
     warm, own, plain, again = (tmp_path / f"{name}.csv" for name in ("warm", "own", "plain", "again"))
     pd.read_csv(current).assign(temperature_degc=40.0).to_csv(tmp_path / "i.csv", index=False)

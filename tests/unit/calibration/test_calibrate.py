@@ -14,6 +14,7 @@ from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import free_parameters
 from aesi.calibration.posterior import sampled
 from aesi.calibration.records.conditions import Conditions, Prior
+from aesi.calibration.result import intervals
 from aesi.calibration.start import size_assumed, sized
 from aesi.errors import DataError, InputError
 from aesi.physics import simulate
@@ -242,6 +243,25 @@ def test_a_cell_calibrated_in_python_did_not_say_which_model_it_was_fitted_with(
     assert dict(found.cell.fitted_at_k) == {"at_25": 298.15, "at_0": 273.15}
     other = calibrate(replace(start, fitted_with="dfn"), records[:1], evaluations=1)
     assert other.cell.fitted_with == "espm"
+
+
+def test_a_file_that_is_worse_than_the_start_file_as_it_is_simulated_was_not_warned_of(found):
+    first = found.errors[0]
+    worse = replace(first, before_v=20e-3, after_v=10e-3, simulated_v=40e-3)
+    (warning,) = replace(found, errors=(worse,)).warnings
+    assert warning.startswith(
+        f"{first.name}: the file that is written errs by 40.00 mV there, the start file by 20.00"
+    )
+    assert replace(found, errors=(replace(worse, simulated_v=20e-3),)).warnings == ()
+
+
+def test_a_resistance_of_nought_was_written_as_what_round_off_left(found):
+    at = [free.name for free in found.model.free].index("contact.resistance")
+    x = found.x.copy()
+    x[at] = found.model.free[at].bounds[0] * (1.0 - 1e-15)
+    told = intervals(found.model, x, found.covariance)["contact.resistance"]
+    assert told.value == 0.0
+    assert told.low == 0.0 < told.high
 
 
 def test_a_start_given_against_the_voltage_bent_the_file_with_no_more_than_a_note(start, records):

@@ -81,6 +81,8 @@ def test_rows_behind_the_last_whole_run_are_said_to_be_left_out():
     few = decimate(measurement(np.arange(600.0), np.ones(600)), 10)
     assert few.time_s[-1] == 536.0
     assert few.notes[-1].endswith("the last 63 rows, no whole run, were left out.")
+    one = decimate(measurement(np.arange(11.0), np.ones(11)), 5)
+    assert one.notes[-1].endswith("the last row, no whole run, was left out.")
     whole = decimate(measurement(np.arange(601.0), np.ones(601)), 11)
     assert whole.time_s[-1] == 600.0
     assert "left out" not in whole.notes[-1]

@@ -48,7 +48,12 @@ def package(tmp_path):
     """A small package in place of ours, with its compiler."""
     home = tmp_path / "aesi"
     (home / "numerics" / "files").mkdir(parents=True)
-    for name in ("numerics/compiled.py", "numerics/files/cache_folder.py", "errors.py"):
+    for name in (
+        "numerics/compiled.py",
+        "numerics/files/first_use.py",
+        "numerics/files/cache_folder.py",
+        "errors.py",
+    ):
         shutil.copy(ROOT / "aesi" / name, home / name)
     for name in ("__init__.py", "numerics/__init__.py", "numerics/files/__init__.py"):
         (home / name).touch()
@@ -69,6 +74,22 @@ def ask(package, home="layout", **environment):
     assert done.returncode == 0, done.stderr
     value, hits = done.stdout.split()
     return float(value), int(hits)
+
+
+def test_a_command_that_compiled_for_a_minute_said_nothing(package):
+    told = (
+        "from aesi.numerics.files.first_use import tell_compiling\ntell_compiling(lambda: print('compiling'))"
+    )
+    settings = {k: v for k, v in os.environ.items() if not k.startswith("NUMBA")}
+    words = []
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", f"{told}\n{ASK.format(home='layout')}"],
+            env=settings | {"PYTHONPATH": str(package.parent)},
+            cwd=package.parent, capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        words.append(done.stdout.split())
+    assert words == [["compiling", "30.0", "0"], ["30.0", "1"]]
 
 
 def test_an_update_that_changes_another_file_or_moves_a_class_is_compiled_again(package):

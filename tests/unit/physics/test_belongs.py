@@ -44,6 +44,19 @@ def test_a_drop_that_only_a_cold_cell_has_is_no_other_cells_in_the_cold(m50, rec
             check_belongs(m50, [replace(dropping, temperature_degc=degc)])
 
 
+def test_a_cold_record_without_its_temperature_was_called_another_cells_and_nothing_else(m50, record):
+    dropping = replace(record, voltage_v=record.voltage_v - 0.09 * record.current_a)
+    with pytest.raises(DataError, match=r"another's\. Or it was far colder than the 25 degC") as caught:
+        check_belongs(m50, [dropping])
+    assert "\n" not in str(caught.value)
+    check_belongs(replace(m50, initial_temperature_k=263.15), [dropping])  # as declared
+    milliamperes = replace(record, current_a=1000 * record.current_a)
+    for told in (milliamperes, replace(dropping, temperature_degc=np.full(len(record), 25.0))):
+        with pytest.raises(DataError) as caught:
+            check_belongs(m50, [told])
+        assert "colder" not in str(caught.value)
+
+
 def test_a_voltage_that_is_still_low_after_a_discharge_says_of_no_smaller_cell(m50):
     """Two thirds discharged at 1C, and then at rest 0.12 V below its open-circuit voltage for twenty minutes."""
     time_s = np.arange(0.0, 3720.0, 2.0)

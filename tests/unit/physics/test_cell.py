@@ -475,6 +475,11 @@ def test_a_file_that_is_no_text_is_refused_in_one_sentence(tmp_path):
         Cell.from_bpx(tmp_path / "record.mpr")
 
 
+def test_a_title_that_ends_in_a_full_stop_ended_the_sentences_that_it_stands_in(content):
+    content["Header"]["Title"] = "Parameterisation example of an LFP|graphite 2 Ah cell."
+    assert Cell.from_bpx(content).name == "Parameterisation example of an LFP|graphite 2 Ah cell"
+
+
 def test_a_cell_file_in_latin_1_was_taken_for_a_record(content, tmp_path):
     content["Header"]["Title"] = "Zelle für Prüfstand 3"
     path = tmp_path / "cell.json"

@@ -1,5 +1,6 @@
 """One rule for the state of charge at the first row: given, full charge, rest, load."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -70,10 +71,17 @@ def test_a_cold_start_under_load_was_told_to_be_of_another_cell():
     found = initial_state(LG_M50, data)
     assert found.basis == "full charge"
     assert "mV above the upper cut-off" in found.sentence
-    assert found.sentence.endswith(
-        "drop that the model has at once, of which the cell may have had less by the first row."
-    )
+    assert found.sentence.endswith("by its first row the cell may have dropped by less than the model does.")
     assert "another cell's" not in found.sentence
+
+
+def test_a_start_under_load_was_told_to_rest_at_a_voltage_that_no_cell_has():
+    """The model's drop stands beside what was read, not behind a sum of both that is called a rest voltage."""
+    time, current = np.arange(0.0, 60.0), np.full(60, 2.0 * LG_M50.capacity_ah)
+    said = initial_state(LG_M50, record(time, current, np.full(60, LG_M50.upper_voltage_v - 0.05))).sentence
+    drop_mv = round(1e3 * (float(re.search(r"at once at (\S+) V", said)[1]) - LG_M50.upper_voltage_v + 0.05))
+    assert f"at 4.150 V, and with the {drop_mv} mV that the model drops at once" in said
+    assert "at rest" not in said
 
 
 def test_a_rest_as_far_above_full_as_below_leaves_the_same_doubt():

@@ -138,6 +138,11 @@ def test_a_record_that_the_fit_made_worse_is_named_first(content):
     assert finding(content).endswith(" On pulses the start file errs by less.")
 
 
+def test_a_record_that_the_written_file_is_worse_on_was_not_named(content):
+    content["files"][1] |= {"before_rmse_mv": 5.0, "after_rmse_mv": 2.0, "as_simulated_rmse_mv": 6.0}
+    assert finding(content).endswith(" On slow the start file errs by less.")
+
+
 def test_no_knots_are_no_figure():
     assert courses([{"name": "contact.resistance", **parameter()}]) == {}
 

@@ -1,5 +1,8 @@
 """What a refit moved, beside the verdict."""
 
+import pytest
+
+from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.report.words.moved import moved_findings, moved_summary, parameter_words
 from aesi.pipeline.report.words.sizes import refit_does_as_well
 
@@ -74,6 +77,22 @@ def test_a_parameter_that_is_named_by_its_effect_is_not_named_twice():
         parameter_words(row("resistance_ohm", 8e-3, 2.0, effect="series_resistance")) == "series resistance"
     )
     assert parameter_words(FAR) == "solid diffusivity (negative)"
+
+
+@pytest.mark.parametrize(
+    ("effect", "name", "words"),
+    [
+        ("ocp_shape", "a1_v", "ocp shape (a1)"),
+        ("clock_skew", "lag_s", "clock skew (lag)"),
+        ("double_layer", "negative_f_m2", "double layer (negative)"),
+        ("film_growth", "per_throughput_ohm_ah", "film growth (per throughput)"),
+        ("film_growth", "per_root_time_ohm", "film growth (per root time)"),
+        ("lithium_plating", "rate_m_s", "lithium plating (rate)"),
+    ],
+)
+def test_a_parameter_was_told_with_the_letters_of_its_unit(effect, name, words):
+    unit = CATALOGUE[effect].parameters[name].unit
+    assert parameter_words(row(name, 1.0, 2.0, effect=effect) | {"unit": unit}) == words
 
 
 def estimate(value, low, high, unit):

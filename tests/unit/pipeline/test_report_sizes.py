@@ -95,3 +95,13 @@ def test_the_line_of_a_verdict():
     unknown = finding_line({**found, "verdict": "unknown", "effects": []})
     assert unknown.startswith("unknown: something real is left")
     assert "%" not in unknown
+
+
+def test_a_heat_capacity_was_told_as_a_bare_number():
+    values = {
+        "heat_transfer_w_k": value(0.05, 0.03, 0.07, "W/K"),
+        "heat_capacity_factor": value(1.13, 0.85, 1.51, "dimensionless"),
+    }
+    assert with_size("self_heating", discovery("self_heating", "physics", values)) == (
+        "self heating (heat transfer 0.050 W/K [0.030, 0.070], heat capacity 1.13 [0.85, 1.51] times)"
+    )

@@ -360,3 +360,12 @@ def test_the_closest_rival_of_a_finding_is_named_with_its_distance(views):
     rows = [row for row in view.discovery["candidates"] if row["effect"] == "self_heating"]
     alone = replace(view, discovery=view.discovery | {"candidates": [*rows, beside]})
     assert discoveries.closest_finding(alone) == "No other hypothesis explains these data as well."
+
+
+def test_a_noise_of_half_a_tenth_of_a_millivolt_was_shown_as_twice_as_much(views, tmp_path):
+    view = views.discovery_view(400)
+    quiet = replace(view, discovery=view.discovery | {"noise_floor_mv": 0.05})
+    assert discoveries.discovery_consequence(quiet).endswith("the noise floor is 0.05 mV.")
+    write_discovery_report(tmp_path / "report.html", quiet)
+    page = (tmp_path / "report.html").read_text()
+    assert page.count("0.05") >= 3  # the tile and two sentences

@@ -43,6 +43,14 @@ def test_what_is_even_moves_by_its_square(x):
     assert spread.coordinate(spread.value(x)) == pytest.approx(x)
 
 
+def test_what_stood_on_its_bound_was_told_as_what_round_off_left():
+    for parameter in (OHM, FACTOR, SPREAD):
+        (free,) = of_effect("effect", {"parameter": parameter}, 5.0)
+        assert free.told(free.low + 1e-12) == free.low
+        assert free.told(free.high - 1e-12) == free.high
+        assert free.told(0.3 * free.high) == 0.3 * free.high
+
+
 def test_what_is_even_has_no_negative_values():
     with pytest.raises(ParameterError, match="bounds from nought"):
         Parameter(0.3, "1", bounds=(-0.1, 0.8), source="test", even=True)

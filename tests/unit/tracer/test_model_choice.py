@@ -13,8 +13,9 @@ from aesi.physics.effects import CATALOGUE
 from aesi.pipeline.discovery.discover import discovery_content, found_model
 from aesi.records import Measurement
 from aesi.tracer import discover
+from aesi.tracer.case.reduction import Reduction
 from aesi.tracer.decide.evidence import believed
-from aesi.tracer.decide.model_choice import most_names
+from aesi.tracer.decide.model_choice import _likelier, most_names
 
 from .conftest import CELLS, NOISE_V, steps
 
@@ -95,6 +96,17 @@ def test_the_porous_electrode_is_tried_with_as_many_names_as_could_be_believed()
     assert most_names(explained((), 100.0, word="none"), 3) == 0
     assert most_names(explained(("a",), 100.0, 2e-4), 3) == 3  # there is more to explain
     assert most_names(explained(("a",), 100.0, word="unknown"), 3) == 3
+
+
+def test_a_difference_far_above_the_noise_was_told_as_a_power_of_ten():
+    said = Reduction(8.18e-3, 6.8e-5, "the declared cell").sentence
+    assert said.endswith("8.18 mV RMS here, 120 times the noise of the rows that are fitted (0.07 mV)")
+    assert "1.5 times" in Reduction(4.29e-3, 2.86e-3, "the declared cell").sentence
+
+
+def test_a_model_of_an_unknown_was_said_to_explain_the_data():
+    assert _likelier(explained(("a",), 100.0)) == ", which explains the data with fewer or more usual effects"
+    assert "neither model explains the data" in _likelier(explained(("a",), 100.0, word="unknown"))
 
 
 def test_both_kinds_of_evidence_have_to_speak_for_a_further_name():

@@ -77,6 +77,25 @@ def test_a_written_model_that_does_worse_than_others_is_told_with_each_of_them()
     assert hardly == "on the test part the written model leaves 5.02 mV, the recalibrated model 5.00 mV."
 
 
+def test_a_written_model_that_is_worse_than_declared_on_what_was_fitted_was_not_told_of():
+    fitted = outcome(9.4e-3, part="fit")
+    (sentence,) = warnings([fitted, outcome(4e-3)], verdict("unknown"))
+    assert sentence == (
+        "on the part that was fitted the written model leaves 9.40 mV of the rows as measured, the declared model "
+        "9.00 mV."
+    )
+    assert warnings([outcome(9e-3, part="fit"), outcome(4e-3)], verdict("unknown")) == ()
+
+
+def test_a_test_part_at_rest_was_taken_for_one_that_says_something_of_a_load():
+    resting = outcome(4e-3)
+    (sentence,) = warnings([resting], verdict("unknown"), rest_a=0.05)
+    assert "the cell rests throughout the test part" in sentence
+    loaded = replace(resting, current_a=np.full(400, 1.0))
+    assert warnings([resting, loaded], verdict("unknown"), rest_a=0.05) == ()
+    assert warnings([replace(resting, part="fit")], verdict("unknown"), rest_a=0.05) == ()
+
+
 def test_resampled_blocks_of_steady_errors_have_the_gain_of_all_rows():
     time = np.arange(2000.0)
     first, second = 3e-3 * np.where(time % 2, 1.0, -1.0), np.full(len(time), 1e-3)

@@ -216,13 +216,13 @@ def discovery_consequence(view: DiscoveryView) -> str:
         return (
             f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, and with its "
             f"own parameters refitted by {values['recalibrated']:.1f} mV; the noise floor is "
-            f"{view.discovery['noise_floor_mv']:.1f} mV."
+            f"{view.discovery['noise_floor_mv']:.2f} mV."
         )
     return (
         f"On data that chose nothing the model as declared errs by {values['before']:.1f} mV RMSE, the "
         f"same model with its own parameters refitted by {values['recalibrated']:.1f} mV, and the model "
         f"{after} by {values['after']:.1f} mV; the noise floor is "
-        f"{view.discovery['noise_floor_mv']:.1f} mV."
+        f"{view.discovery['noise_floor_mv']:.2f} mV."
     )
 
 

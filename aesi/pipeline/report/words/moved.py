@@ -7,7 +7,7 @@ from typing import Any
 
 from aesi.pipeline.report.views import Row
 from aesi.pipeline.report.words.discoveries import WITH_FINDING, states_of
-from aesi.pipeline.report.words.sizes import TELLING, resized, rounded
+from aesi.pipeline.report.words.sizes import TELLING, name_words, resized, rounded
 
 MOST_NAMED = 3
 """Parameters that one sentence names."""
@@ -90,7 +90,7 @@ def parameter_words(row: Row) -> str:
     effect, name = row["effect"].replace("_", " "), row["parameter"]
     if name.rpartition("_")[0] in row["effect"]:  # 'resistance_ohm' of 'series_resistance' says nothing more
         return str(effect)
-    return f"{effect} ({name.removesuffix('_factor').replace('_', ' ')})"
+    return f"{effect} ({name_words(name, row['unit'])})"
 
 
 def moved_summary(rows: Iterable[Row]) -> str:

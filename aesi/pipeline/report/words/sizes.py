@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from math import floor, log10
 from typing import Any
@@ -20,6 +21,8 @@ PREFIXES = {"ohm": ("mohm", 1e3), "V": ("mV", 1e3), "A": ("mA", 1e3), "m": ("um"
 PERCENT = 100.0
 SMALL = 0.5
 """In its own unit; what is less is written in thousandths."""
+ENDINGS = {"ohm/(A*hour)": "_ohm_ah", "ohm/hour**0.5": "_ohm"}
+"""Of names that do not spell their unit out."""
 
 
 def with_size(effect: str, discovery: Mapping[str, Any], title: str | None = None) -> str:
@@ -60,7 +63,7 @@ def resized(effect: str, discovery: Mapping[str, Any]) -> list[tuple[str, str, s
         shown = _with_ends(value, times, declared, unit)
         unit, (there, found) = _digits_of(shown, [declared + times * written[key], shown["value"]])
         if there != found:
-            words = name if len(told) == 1 else f"{name} ({_words(key)})"
+            words = name if len(told) == 1 else f"{name} ({name_words(key, value['unit'])})"
             out.append((words, f"{there}{unit}", f"{found}{unit}"))
     return out
 
@@ -179,13 +182,15 @@ def _part(key: str, value: Mapping[str, Any], parameter: Parameter | None) -> st
     if parameter is not None and _is_share(parameter):
         percent = _with_ends(value, PERCENT, 0.0, "%")
         return f"{quantity(percent)} {parameter.description.removeprefix('share ')}"
-    times = " times" if parameter is not None and parameter.neutral == 1.0 else ""
-    return f"{_words(key)} {quantity(value)}{times}"
+    factor = key.endswith("_factor") or (parameter is not None and parameter.neutral == 1.0)
+    times = " times" if factor else ""
+    return f"{name_words(key, value['unit'])} {quantity(value)}{times}"
 
 
-def _words(key: str) -> str:
-    """A parameter's name without its unit."""
-    words = key.rsplit("_", 1)[0] if key.endswith(("_v", "_a", "_k", "_s", "_ohm")) else key
+def name_words(key: str, unit: str) -> str:
+    """A parameter's name without its unit: 'negative' of 'negative_f_m2', in F/m**2."""
+    ending = "_" + re.sub(r"[^a-z0-9]+", "_", unit.lower().replace("**", "")).strip("_")
+    words = key.removesuffix(ENDINGS.get(unit, ending))
     return words.replace("_factor", "").replace("_", " ")
 
 
