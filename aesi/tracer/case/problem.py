@@ -77,7 +77,8 @@ class InverseProblem:
     declared model, which every hypothesis moves.  trust : by how much.
     fixed : effects in every simulation.  model : that every hypothesis uses.
     approximated_v : RMS, V, by which approximations of that model that were let stand move the voltage: no effect is
-    named for less.  ages : whether the records say that they are of several ages.
+    named for less.  reduced_v : RMS, V, by which the other model of the cell differs where it may be asked, too: what
+    is left may be that.  ages : whether the records say that they are of several ages.
     """
 
     cell: Cell
@@ -87,6 +88,7 @@ class InverseProblem:
     trust: Trust = "tight"
     model: ModelName = "espm"
     approximated_v: float = 0.0
+    reduced_v: float = 0.0
     ages: bool = False
 
     @property

@@ -73,7 +73,9 @@ def with_model(
         why = ", as asked" if wanted else ", with which the parameters of the cell were fitted"
         return _chosen(search(one, archive_of(one, None), max_effects), one.model, declared, why)
     single = fine("espm")
-    if declared is not None and not declared.notable:
+    if declared is not None and declared.notable:
+        single = replace(single, reduced_v=declared.shift_v)
+    elif declared is not None:
         single = let_stand(single, declared.shift_v)
     archive = archive_of(single, None)
     if problem.has_good:

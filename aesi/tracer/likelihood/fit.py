@@ -27,7 +27,7 @@ from aesi.tracer.likelihood.gaussian import (
 from aesi.tracer.likelihood.model_error import PRIORS, Size, SplitTable, off_within_seconds, whitened
 
 GAIN_NATS = 0.05
-"""A descent stops when a step gains less than this."""
+"""A descent stops when a step gains less than this, by an error as large as what is left (`beyond_expected`)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +139,9 @@ class HypothesisFitter:
         """
         whitened_one = _Whitened(self, size, ~np.isin(self.blocks.of_row, without))
         begin = None if slopes_v is None else whitened_one.columns(slopes_v)
-        return descend(whitened_one, x, self.low, self.high, rounds, GAIN_NATS, begin).known_x
+        e = self.residual(x)
+        tolerance = GAIN_NATS * (1.0 if e is None else beyond_expected(whitened_one.errors(e)))
+        return descend(whitened_one, x, self.low, self.high, rounds, tolerance, begin).known_x
 
     def finished(self, x: Array) -> FittedHypothesis | None:
         """The fit at a point, scored."""
@@ -151,6 +153,12 @@ class HypothesisFitter:
         point = Linearised(x, e, jacobian, np.column_stack([self.low, self.high]), off_v)
         score = scored(self.problem, self.blocks, point)
         return FittedHypothesis(self.hypothesis, self.free, point, score, self.simulations)
+
+
+def beyond_expected(white: Array) -> float:
+    """Mean square of whitened errors (n,), none below 1: by how much a difference of two squared errors overstates what
+    it is worth where they are larger than the noise and the model error that they were whitened by."""
+    return max(float(np.mean(white**2)), 1.0)
 
 
 def scored(problem: InverseProblem, blocks: Blocks, point: Linearised) -> PredictiveScore:
@@ -183,9 +191,13 @@ class _Whitened:
         off = self._seen(off_within_seconds(fitter.problem, fitter.blocks, fitter.hypothesis))
         return np.asarray(np.linalg.qr(np.vstack([off, np.eye(off.shape[1])]))[0])
 
+    def errors(self, error_v: Array) -> Array:
+        """Whitened (n,) V, and what of it the file may be off by."""
+        return np.asarray(self._white(error_v[:, None])[:, 0])
+
     def residual(self, x: Array) -> Array | None:
         e = self.fitter.residual(x)
-        return None if e is None else np.concatenate([self._white(e[:, None])[:, 0], x])
+        return None if e is None else np.concatenate([self.errors(e), x])
 
     def slopes(self, x: Array, residual: Array) -> Array | None:
         e = self.fitter.residual(x)

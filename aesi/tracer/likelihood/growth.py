@@ -25,7 +25,7 @@ from aesi.tracer.case.free_parameter import (
     values_of,
 )
 from aesi.tracer.case.problem import STEP, InverseProblem, ValuesByOwner
-from aesi.tracer.likelihood.fit import GAIN_NATS, FittedHypothesis
+from aesi.tracer.likelihood.fit import GAIN_NATS, FittedHypothesis, beyond_expected
 from aesi.tracer.likelihood.gaussian import (
     Linearised,
     PredictiveScore,
@@ -227,7 +227,14 @@ class EffectGrowth:
         start = self._most_promising()
         if start is None:
             return None
-        return descend(self, start, self.low, self.high, ROUNDS, GAIN_NATS).known_x
+        left = self.projected(self._parent_error_v, -self.parent.fit.point.x[self.rest][:, None])
+        tolerance = GAIN_NATS * beyond_expected(left[: len(self._parent_error_v)])
+        return descend(self, start, self.low, self.high, ROUNDS, tolerance).known_x
+
+    @property
+    def _parent_error_v(self) -> Array:
+        """(n, 1) V."""
+        return self.parent.fit.point.residual_v[:, None]
 
     def _most_promising(self) -> Array | None:
         """Of the starts the one from which a step promises most; None where none can be simulated."""

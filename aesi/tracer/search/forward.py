@@ -65,8 +65,9 @@ def searched(
     first = growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and not taken_over else []
     # Fewer effects than that are fitted in the time that looking would spare.
     if len(first) > FINALISTS and np.isfinite(allowed_v):
-        least_v, first = within_reach(problem, base, first, REACH * allowed_v, archive)
-        if least_v > REACH * allowed_v:
+        reach_v = REACH * allowed_v + problem.reduced_v
+        least_v, first = within_reach(problem, base, first, reach_v, archive)
+        if least_v > reach_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
     first, slopes = promising_first(first, archive)
     steps: list[Step] = []

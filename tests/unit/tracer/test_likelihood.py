@@ -8,7 +8,7 @@ from aesi.physics.effects import CATALOGUE
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import prepare_all
-from aesi.tracer.likelihood.fit import HypothesisFitter
+from aesi.tracer.likelihood.fit import HypothesisFitter, beyond_expected
 from aesi.tracer.likelihood.gaussian import LOG_2PI, Posterior, block_sums, held_at_bounds, score_at
 from aesi.tracer.likelihood.model_error import Size
 from aesi.tracer.likelihood.surrogates import _gains, _Sums
@@ -128,3 +128,8 @@ def test_a_gain_on_a_surrogate_is_what_its_score_gains():
             for m in (2, 3)
         ]
         assert gain == pytest.approx(total[1] - total[0], rel=1e-9)
+
+
+def test_a_gain_is_worth_less_where_more_is_left_than_was_expected():
+    assert beyond_expected(np.full(10, 0.3)) == 1.0
+    assert beyond_expected(np.array([3.0, -5.0])) == 17.0

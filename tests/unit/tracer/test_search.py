@@ -177,6 +177,16 @@ def test_nothing_is_fitted_where_all_effects_together_leave_far_more_than_a_righ
     assert paths[1].beyond_reach_v == pytest.approx(5e-3 / np.sqrt(2.0), rel=0.2)
 
 
+def test_what_the_other_model_may_account_for_is_not_out_of_reach_of_this_one(cell, few, make):
+    many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "current_sensor_offset")}
+    data = make((CATALOGUE["series_resistance"].activate(resistance_ohm=ADDED_OHM),))
+    strange = replace(data, voltage_v=data.voltage_v + 5e-3 * np.sin(data.time_s / 30.0))
+    problem = inverse_problem(cell, [strange], 0.9, effects=many)
+    for reduced_v, begun in ((1e-3, False), (4e-3, True)):  # 3.5 mV are left by all effects together
+        path = searched(replace(problem, reduced_v=reduced_v), 1, Archive(None, ""), allowed_v=ALLOWED_V)
+        assert bool(path.steps) == begun
+
+
 def test_what_moves_the_voltage_far_is_followed_before_it_is_called_out_of_reach(cell, few, make):
     many = {name: CATALOGUE[name] for name in (*few, "leakage_current", "clock_skew")}
     data = make((CATALOGUE["clock_skew"].activate(lag_s=2.0),))
