@@ -14,8 +14,10 @@ from aesi.pipeline.discovery.discover import discovery_content, found_model
 from aesi.records import Measurement
 from aesi.tracer import discover
 from aesi.tracer.case.reduction import Reduction
+from aesi.tracer.decide import model_choice
 from aesi.tracer.decide.evidence import believed
-from aesi.tracer.decide.model_choice import _likelier, most_names
+from aesi.tracer.decide.model_choice import _likelier, most_names, with_model
+from aesi.tracer.discovery import inverse_problem
 
 from .conftest import CELLS, NOISE_V, steps
 
@@ -122,3 +124,32 @@ def test_both_kinds_of_evidence_have_to_speak_for_a_further_name():
     assert believed(searched(("b", "c"), 110.0, 49.0), one)
     assert believed(one, searched(("d",), 110.0, 49.0))
     assert believed(searched((), 120.0, 70.0, "unknown"), one)
+
+
+def test_the_porous_electrode_is_not_searched_where_the_single_particle_ends_far_beyond_what_they_differ_by(
+    m50,
+):
+    """What is out of the single particle's reach may be what the two models differ by; by a search it is not."""
+    reduction = Reduction(2e-3, 1e-4, "the declared cell")
+    asked = []
+
+    def answer(model, left_v, beyond_v):
+        path = SimpleNamespace(beyond_reach_v=beyond_v, problem=SimpleNamespace(noise_v=1e-4), chosen=left_v)
+        verdict = SimpleNamespace(word="unknown")
+        return SimpleNamespace(
+            path=path, verdict=verdict, paths={"tight": path}, settled=lambda verdict: model
+        )
+
+    def search(problem, archive, most, shallower=None):
+        asked.append((problem.model, problem.reduced_v))
+        return answer(problem.model, 12e-3, None if problem.reduced_v else 1.5e-3)
+
+    problem = inverse_problem(m50, [record(m50, "espm")], 0.85, effects={n: CATALOGUE[n] for n in FEW})
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(model_choice, "reduction_of", lambda *_: reduction)
+        patch.setattr(model_choice, "structured_v", lambda path, chosen: chosen)
+        patch.setattr(model_choice, "with_fine_numerics", lambda problem: problem)
+        _, choice = with_model(problem, None, search, lambda problem, other: None, 3)
+    assert asked == [("espm", 0.0), ("espm", 2e-3)]
+    assert choice.model == "espm"
+    assert "which leaves far more than the two differ by" in choice.sentence
