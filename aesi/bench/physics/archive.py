@@ -99,9 +99,9 @@ ARCHIVE: Mapping[str, Mapping[str, str]] = {
 
 
 def chamber(record: str) -> str:
-    """What a record's name says of its chamber: `n20degC`, and `n20degC, rising` where that warms up on the way."""
-    place, _, test = record.partition("_")
-    return f"{place}, rising" if test.startswith("trise") else place
+    """What a record's name says of its chamber: `-20 degC`, and `-20 degC, rising` where that warms up on the way."""
+    rising = ", rising" if record.partition("_")[2].startswith("trise") else ""
+    return f"{degc_of(record):g} degC{rising}"
 
 
 def degc_of(record: str) -> float:

@@ -63,14 +63,14 @@ def test_the_table_holds_median_and_worst_of_each_chamber_coldest_first():
     ]
     lines = archive_table(rows)
     assert lines[2:5] == [
-        "| c | n20degC | 2 | 400.0 / 500.0 | 40.0 / 50.0 | 39.0 / 49.0 | 1 |",
-        "| c | n20degC, rising | 1 | 50.0 / 50.0 | 5.0 / 5.0 | 4.0 / 4.0 |  |",
-        "| c | 0degC | 1 | 200.0 / 200.0 | 20.0 / 20.0 | 19.0 / 19.0 |  |",
+        "| c | -20 degC | 2 | 400.0 / 500.0 | 40.0 / 50.0 | 39.0 / 49.0 | 1 |",
+        "| c | -20 degC, rising | 1 | 50.0 / 50.0 | 5.0 / 5.0 | 4.0 / 4.0 |  |",
+        "| c | 0 degC | 1 | 200.0 / 200.0 | 20.0 / 20.0 | 19.0 / 19.0 |  |",
     ]
     assert "    | c | n20degC_la92 | -5.0 | 300.0 | 30.0 (ran out at 7 s) | 29.0 |" in lines
     assert not any("n20degC_nn" in line for line in lines)
     assert (chamber("n20degC_trise_us06"), degc_of("n20degC_trise_us06"), degc_of("10degC_nn")) == (
-        "n20degC, rising",
+        "-20 degC, rising",
         -20.0,
         10.0,
     )
