@@ -224,10 +224,11 @@ def locate(name: str, file: str) -> Path:
         if path.is_file():
             return path
     one = find_set(name)
-    for path in sorted(folder.rglob("*")) if one.published else ():
-        if one.record_of(path.relative_to(folder)) == file:
-            return path
-    there = ", ".join(sorted(path.name for path in folder.iterdir() if path.is_file()))
+    published = {one.record_of(path.relative_to(folder)): path for path in sorted(folder.rglob("*"))}
+    if file in published:
+        return published[file]
+    files = [path.name for path in folder.iterdir() if path.is_file()]
+    there = ", ".join(sorted([*files, *(record for record in published if record is not None)]))
     raise DataError(f"{name} has no file {file!r} in {folder}; there are: {there}.")
 
 
@@ -261,9 +262,10 @@ def _copy(source: Path, out: Path) -> Path:
         out.mkdir(parents=True, exist_ok=True)
         if out.samefile(source):
             return out
-        for path in source.iterdir():
-            if path.is_file():
-                shutil.copyfile(path, out / path.name)
+        for path in [path for path in source.rglob("*") if path.is_file()]:
+            copy = out / path.relative_to(source)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, copy)
     except OSError as error:
         raise DataError(f"{out} cannot be written: {error.strerror}.") from None
     return out

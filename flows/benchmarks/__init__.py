@@ -61,7 +61,8 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
             raise InputError(f"--set {option}={value}: it {wanted(error.errors()[0])}.") from None
     _check_places({option: str(options[option]) for option in PLACES if options.get(option) is not None})
     if options.get("write") is not None:
-        check_page(str(options["write"]), module.BEGIN, module.END)
+        marks = module.ARCHIVE_MARKS if options.get("archive") else (module.BEGIN, module.END)
+        check_page(str(options["write"]), *marks)
     yield from module.run(**options)
 
 

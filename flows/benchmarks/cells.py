@@ -26,7 +26,7 @@ EXPERIMENTS = {
 """One whose experiment trains on repeats of a record is trained on all of it here."""
 HYBRID = "AESI I"
 BEGIN, END = "<!-- table of aesi bench cells -->", "<!-- end -->"
-BEGIN_ARCHIVE, END_ARCHIVE = "<!-- table of aesi bench cells, archive -->", "<!-- end of archive -->"
+ARCHIVE_MARKS = "<!-- table of aesi bench cells, archive -->", "<!-- end of archive -->"
 
 
 def run(
@@ -50,7 +50,7 @@ def run(
         rows.append(row)
         yield row
     if write is not None and archive:
-        write_between(write, BEGIN_ARCHIVE, END_ARCHIVE, physics.archive_table(rows[:-1]))
+        write_between(write, *ARCHIVE_MARKS, physics.archive_table(rows[:-1]))
     elif write is not None:
         write_between(write, BEGIN, END, physics.table(rows[:-1]))
 

@@ -20,7 +20,7 @@ from flows.benchmarks.page import write_between
 
 SHOWN = ("group", "cell", "record", "put_in", "answer", "verdict", "effects", "source", "error")
 BEGIN, END = "<!-- table of aesi bench real -->", "<!-- end of real -->"
-BEGIN_ARCHIVE, END_ARCHIVE = "<!-- table of aesi bench real, archive -->", "<!-- end of real, archive -->"
+ARCHIVE_MARKS = "<!-- table of aesi bench real, archive -->", "<!-- end of real, archive -->"
 
 
 def run(
@@ -63,7 +63,7 @@ def run(
             yield {key: value for key, value in row.items() if key != "residual"}
     if write is not None:
         order = {spec.name: k for k, spec in enumerate(specs)}
-        marks = (BEGIN_ARCHIVE, END_ARCHIVE) if archive else (BEGIN, END)
+        marks = ARCHIVE_MARKS if archive else (BEGIN, END)
         write_between(write, *marks, table(sorted(rows, key=lambda row: order[row["case"]])))
 
 

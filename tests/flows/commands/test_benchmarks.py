@@ -176,6 +176,14 @@ def test_a_place_that_cannot_be_written_was_told_after_all_the_work(
         next(benchmarks.run("real", **{name: place}))
 
 
+@pytest.mark.parametrize("name", ["real", "cells"])
+def test_a_page_without_the_marks_of_the_archives_table_was_told_after_all_the_work(tmp_path, name):
+    page = tmp_path / "page.md"
+    page.write_text(f"<!-- table of aesi bench {name} -->\n<!-- end -->\n<!-- end of {name} -->\n")
+    with pytest.raises(InputError, match=f"has no lines <!-- table of aesi bench {name}, archive -->"):
+        next(benchmarks.run(name, archive=True, write=str(page)))
+
+
 @pytest.mark.slow
 def test_blind_cases_spread_over_processes(tracked):
     cells = Path(__file__).resolve().parents[3] / "experiments" / "cells"

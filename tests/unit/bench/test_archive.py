@@ -8,6 +8,7 @@ from aesi.bench.physics.archive import ARCHIVE, chamber, degc_of
 from aesi.bench.physics.cells import ARCHIVED, RECORDS, archive_table
 from aesi.bench.physics.tested import TESTED
 from aesi.data import catalogue
+from aesi.errors import DataError
 
 PUBLISHED = {
     ("panasonic_ncr18650pf", "-20degC Trise/06-30-17_19.27 n20degC_trise_Cycle_1_Pan18650PF.mat"): (
@@ -41,6 +42,10 @@ def test_a_record_is_found_in_an_unpacked_archive(tmp_path, monkeypatch):
     inside.mkdir(parents=True)
     (inside / "611_Mixed3.csv").write_text("")
     assert catalogue.locate("lg_18650hg2", "n20degC_611_mixed3") == inside / "611_Mixed3.csv"
+    with pytest.raises(DataError, match="there are: n20degC_611_mixed3"):
+        catalogue.locate("lg_18650hg2", "n20degC_611_mixed4")
+    out = catalogue.get("lg_18650hg2", tmp_path / "out")
+    assert (out / "LG_HG2" / "n20degC" / "611_Mixed3.csv").is_file()
 
 
 def test_no_record_of_an_archive_is_one_of_the_sets_or_entered_a_calibration():
