@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from aesi.constants import COLDEST_DEGC, WARMEST_DEGC
-from aesi.data.channels.columns import columns_listed
 from aesi.data.channels.spectrum_columns import EXAMPLE, NEEDED, find_impedance
 from aesi.data.readers import open_table
-from aesi.data.readers.table import TableFile
+from aesi.data.readers.table import TableFile, names_listed
 from aesi.data.reading import record_name
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
@@ -44,7 +43,7 @@ def read_spectra(path: str | Path) -> tuple[Spectrum, ...]:
         wanted = ", ".join(missing) if missing else " or ".join(STATES)
         raise DataError(
             f"{file} has no column {wanted}; a file of spectra needs {', '.join(NEEDED)} (or as instruments name them, "
-            f"with units: {EXAMPLE}), and {' or '.join(STATES)}. It has: {columns_listed(table.header)}."
+            f"with units: {EXAMPLE}), and {' or '.join(STATES)}. It has: {names_listed(table.header)}."
         )
     twice = [name for name in (*DESCRIBED, LABEL) if header.count(name) > 1]
     if twice:

@@ -2,8 +2,7 @@
 
 An archive as its authors publish it has more tests than the sets of the catalogue: other drives and other chamber
 temperatures of the same two cells. None was looked at when the shipped files, the rules of a calibration and their
-constants were made. `data.locate` finds them in an unpacked archive by the names below. Those that are not on this
-machine are told as not run.
+constants were made. `aesi.data.catalogue.locate` finds them in an unpacked archive by the names below.
 
 Days are the first time stamps of the published files.
 """

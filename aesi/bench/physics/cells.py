@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from aesi.bench.physics.archive import ARCHIVE, chamber, degc_of
+from aesi.bench.physics.archive import ARCHIVE, HG2, NCR, chamber, degc_of
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
 from aesi.data.catalogue import locate
@@ -35,7 +35,7 @@ from aesi.records import Measurement
 
 WINDOW_ROWS = 1024
 """As ECM-UDE judges."""
-NCR, HG2, NMC, M50T = "panasonic_ncr18650pf", "lg_18650hg2", "about_energy_nmc", "lg_m50t_w8"
+NMC, M50T = "about_energy_nmc", "lg_m50t_w8"
 START = "lg_m50_chen2020"
 ECM_UDE = (
     "circuit + neural ODE, trained on UDDS at 25 degC, windows of 1,024 rows with the state of charge given"
@@ -159,12 +159,8 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [*lines, "", *(f"[{k}] {text}.  " for k, text in enumerate(protocols, start=1))]
 
 
-JUDGED = {
-    "declared_mv": "declared",
-    "with_temperature_mv": "with temperature",
-    "porous_mv": "porous electrode",
-    "aged_mv": "aged",
-}
+HEADINGS = COLUMNS | {"porous_mv": "porous electrode"}
+JUDGED = ("declared_mv", "with_temperature_mv", "porous_mv", "aged_mv")
 """Of a record of an archive: the start file, the calibrated one by both models, and at the state of its day."""
 
 
@@ -175,7 +171,7 @@ def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         key=lambda row: (row["cell"], degc_of(row["record"]), row["record"]),
     )
     keys = [key for key in JUDGED if any(row.get(key) is not None for row in there)]
-    shown = " | ".join(JUDGED[key] for key in keys)
+    shown = " | ".join(HEADINGS[key] for key in keys)
     lines = [
         f"| cell | chamber | records | {shown} | ran out |",
         "|---|---|---:|" + "---:|" * (len(keys) + 1),

@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 from pydantic import NonNegativeInt, PositiveInt
 
-from aesi.bench.physics.cells import HG2, NCR, cell_of
+from aesi.bench.physics.archive import HG2, NCR
+from aesi.bench.physics.cells import cell_of
 from aesi.data.catalogue import locate
 from aesi.data.read import read_measurement
 from aesi.errors import AesiError, DataError

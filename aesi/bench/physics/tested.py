@@ -54,7 +54,7 @@ TESTED = {
 
 def soh_on_its_day(cell: Cell, data: str, record: str) -> float | None:
     """State of health (1) of the cell of a set on the day of a record; None where no day or no share is known."""
-    day = {**ARCHIVE.get(data, {}), **TESTED.get(data, {})}.get(record)
+    day = TESTED.get(data, {}).get(record) or ARCHIVE.get(data, {}).get(record)
     known = [one for _, one in cell.tested_on]
     if day is None or not known:
         return None

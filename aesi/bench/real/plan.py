@@ -188,15 +188,11 @@ def _withheld() -> Iterator[RealCase]:
         yield from (_withheld_from(cell, file) for file in files)
     for cell, files in WARMING.items():
         for file in files:
-            yield RealCase(
+            yield replace(
+                _withheld_from(cell, file),
                 name=f"warming-{cell}-{file}",
-                group="withheld",
-                cell=CELLS[cell],
-                take=Take(cell, file, _stop(file), temperature=False),
-                soc0=1.0,
                 answers=("self_heating", "ambient_temperature"),
-                source=THERMOCOUPLE,
-                matched=f"control-{cell}-{file}",
+                measured=None,
             )
 
 

@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from aesi.data import units
 from aesi.data.channels import headers
 from aesi.data.readers.formats.format import Sign
-from aesi.data.readers.table import TableFile
+from aesi.data.readers.table import TableFile, names_listed
 from aesi.errors import DataError
 
 REQUIRED = ("time_s", "current_a", "voltage_v")
@@ -147,7 +147,7 @@ class _Finder:
             options = " ".join(f"--column {q}=NAME" for q in quantities)
             return DataError(
                 f"{self._file} has no column {' and no column '.join(quantities)}; say which is meant: {options}. "
-                f"It has: {columns_listed(header)}."
+                f"It has: {names_listed(header)}."
             )
         sign = (
             ", and --sign charge-positive if charging is positive there" if "current_a" in quantities else ""
@@ -156,7 +156,7 @@ class _Finder:
         words = f', or --state "{state}" if the current is a magnitude' if sign and state else ""
         return DataError(
             f"{self._file} has no column {' and no column '.join(quantities)}{found}. "
-            f"Say which is meant: {headers.options(quantities, header)}{sign}{words}. It has: {columns_listed(header)}."
+            f"Say which is meant: {headers.options(quantities, header)}{sign}{words}. It has: {names_listed(header)}."
         )
 
     def check(self) -> None:
@@ -205,7 +205,7 @@ class _Finder:
             near = get_close_matches(name, header, n=1, cutoff=0.4)
             hint = f"; the nearest is {near[0]!r}" if near else ""
             raise DataError(
-                f"{self._file} has no column {name!r} for {quantity}{hint}. It has: {columns_listed(header)}."
+                f"{self._file} has no column {name!r} for {quantity}{hint}. It has: {names_listed(header)}."
             )
         return found
 
@@ -303,9 +303,3 @@ class _Finder:
 
 def _plain(name: str) -> str:
     return re.sub(r"\s+", "", name).lower()
-
-
-def columns_listed(header: tuple[str, ...]) -> str:
-    """The names of columns for a sentence: the first dozen, and how many more there are."""
-    shown = ", ".join(repr(name[:40]) for name in header[:12])
-    return shown + (f" and {len(header) - 12} more" if len(header) > 12 else "")

@@ -5,7 +5,7 @@ Where a file holds several such structures, the name of a column with the struct
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,11 @@ import numpy as np
 
 from aesi.data.readers.formats import recognise
 from aesi.data.readers.frame import FrameTable, of_mapping
+from aesi.data.readers.table import names_listed
 from aesi.errors import DataError
 
 NO_STRUCTURE = ""
 """Stands for its name where vectors are in none."""
-SHOWN = 8
-"""Names in a sentence at most."""
 
 
 def open_mat(path: Path, wanted: Collection[str] = ()) -> FrameTable:
@@ -36,7 +35,7 @@ def open_mat(path: Path, wanted: Collection[str] = ()) -> FrameTable:
     notes = [f"Read from the structure {name!r}."] if name else []
     left_out = sorted(({*_fields(content[name])} if name else {*content}) - {*columns})
     if left_out:
-        notes.append(f"Not read, for they are no vectors: {_listed(left_out)}.")
+        notes.append(f"Not read, for they are no vectors: {names_listed(left_out)}.")
     shown = {
         f"{name}.{column}" if f"{name}.{column}" in wanted else column: one for column, one in columns.items()
     }
@@ -119,14 +118,14 @@ def _chosen(
     if not tables:
         raise DataError(
             f"{path.name} holds no table: no structure whose fields are vectors, and no vectors by themselves (it has "
-            f"{_listed(content) or 'no variable'}); save time, current and voltage as vectors of one structure. In "
-            "MATLAB, S = table2struct(T, 'ToScalar', true) makes it of a table."
+            f"{names_listed(content) or 'no variable'}); save time, current and voltage as vectors of one structure. "
+            "In MATLAB, S = table2struct(T, 'ToScalar', true) makes it of a table."
         )
     named = {name for name in tables if any(each.startswith(f"{name}.") for each in wanted)}
     if len(tables) > 1 and len(named) != 1:
         raise DataError(
-            f"{path.name} holds {len(tables)} tables, the structures {_listed(tables)}; choose one by naming a column "
-            f'with its structure: --column time_s="{next(iter(tables))}.NAME".'
+            f"{path.name} holds {len(tables)} tables, the structures {names_listed(tables)}; choose one by naming a "
+            f'column with its structure: --column time_s="{next(iter(tables))}.NAME".'
         )
     return next(iter(named or tables))
 
@@ -140,9 +139,3 @@ def _check_lengths(path: Path, name: str, columns: Mapping[str, Any]) -> None:
             f"{path.name}: the vectors{f' of {name!r}' * bool(name)} are not equally long ({first!r} has {rows:,} "
             f"rows, {other!r} {len(columns[other]):,}); save those of one test, and no other, in a structure."
         )
-
-
-def _listed(names: Iterable[str]) -> str:
-    every = list(names)
-    more = f" and {len(every) - SHOWN} more" if len(every) > SHOWN else ""
-    return ", ".join(repr(name) for name in every[:SHOWN]) + more

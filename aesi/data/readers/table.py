@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Protocol
 
@@ -37,3 +38,14 @@ class TableFile(Protocol):
     def where(self, row: int) -> str:
         """How to find a row (counted from 0) in the file: 'row 5 (line 6)'."""
         ...
+
+
+SHOWN = 12
+"""Names in a sentence at most."""
+
+
+def names_listed(names: Iterable[str]) -> str:
+    """Names of a file's columns, or of what else it holds, for a sentence: a dozen, and how many more there are."""
+    every = list(names)
+    more = f" and {len(every) - SHOWN} more" if len(every) > SHOWN else ""
+    return ", ".join(repr(name[:40]) for name in every[:SHOWN]) + more
