@@ -91,7 +91,7 @@ def _say_compiling() -> None:
     )
 
 
-LISTS = ("--data", "--test", "--good", "--impedance", "--effect-file")
+LISTS = ("--data", "--test", "--good", "--impedance", "--fit-impedance", "--effect-file")
 """Options that take several files."""
 
 

@@ -17,6 +17,7 @@ from aesi.calibration.parameters import free_parameters, with_interfaces, with_p
 from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
+from aesi.calibration.records.spectra import degc_of, fitted_ones
 from aesi.calibration.records.zero import zero_of
 from aesi.calibration.result import (
     Calibration,
@@ -37,7 +38,7 @@ from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
 from aesi.physics.cell.health import day_of
 from aesi.physics.depletion import ran_out
-from aesi.records import Measurement
+from aesi.records import Measurement, Spectrum
 
 EVALUATIONS = 100
 """At most: the descents to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end before."""
@@ -82,10 +83,8 @@ def calibrate(
         x = descended(model, evaluations, x)
         found = rewound(model, x)
     states = model.states(cell, x)
-    jacobian, errors = model.jacobian(x), model.errors(x)
-    weights = np.concatenate([*(information_weights(model, errors)), np.ones(model.layout.size)])
-    scaled = jacobian * weights[:, None]
-    covariance = np.linalg.inv(scaled.T @ scaled)
+    scaled = model.jacobian(x) * information_weights(model, x)[:, None]
+    covariance: Array = np.asarray(np.linalg.inv(scaled.T @ scaled), dtype=float)
     left_v = {name: [rms(error) for error in model.errors_of(*state)] for name, state in states.items()}
     shares, days = capacities(model, x), conditions.dates
     return Calibration(
@@ -141,7 +140,8 @@ def problem(
         told = (*told, *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut))
     for one in ready:
         check_charge(start, one)
-    span = _span_k(start, ready)
+    spectra, of_spectra = fitted_ones(start, conditions.spectra)
+    span = _span_k(start, ready, spectra)
     if span <= SPAN_K:
         apart = (
             f"the mean temperatures of the records are {span:.1f} K apart, less than {SPAN_K:g} K"
@@ -160,9 +160,10 @@ def problem(
         zero,
         ageing,
         physics,
+        spectra,
     )
     starts = (r.start.sentence for r in ready if not r.start.against_voltage)  # those are warnings
-    taken = (*starts, *map(hold_told, ready), *ageing.sentences)
+    taken = (*starts, *of_spectra, *map(hold_told, ready), *ageing.sentences)
     return model, (*notes, *zero.sentences, *(n for _, more in kept for n in more), *told, *typical, *taken)
 
 
@@ -233,9 +234,9 @@ def _degc(record: Prepared) -> float | None:
     return None if record.mean_kelvin is None else record.mean_kelvin - ZERO_CELSIUS_K
 
 
-def _span_k(cell: Cell, records: Sequence[Prepared]) -> float:
-    """K between the coldest and the warmest record's mean."""
-    means = [_mean_kelvin(cell, r) for r in records]
+def _span_k(cell: Cell, records: Sequence[Prepared], spectra: Sequence[Spectrum]) -> float:
+    """K between the coldest and the warmest record's mean, or spectrum."""
+    means = [_mean_kelvin(cell, r) for r in records] + [degc_of(s) + ZERO_CELSIUS_K for s in spectra]
     return max(means) - min(means)
 
 

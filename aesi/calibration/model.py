@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -10,6 +11,7 @@ import numpy as np
 from aesi.calibration.ageing import LOADED_SD, SLOW_SD, Ageing
 from aesi.calibration.parameters import Free, moved
 from aesi.calibration.records.prepared import Prepared
+from aesi.calibration.records.spectra import FittedSpectra
 from aesi.calibration.records.zero import Zero
 from aesi.calibration.shapes import Shapes
 from aesi.calibration.silicon import SILICON_SD, silicon_edge, stretched, with_silicon
@@ -17,6 +19,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.model import EspmModel
 from aesi.physics.simulation import ModelName, solver
+from aesi.records import Spectrum
 
 SOLID_ORDER = 8
 """Modes of solid diffusion: eight are 0.02 mV RMS off under the pulses to 1.4C of the calibrated files at 10 degC."""
@@ -112,8 +115,10 @@ class Model:
         zero: Zero,
         ageing: Ageing,
         physics: ModelName = "espm",
+        spectra: Sequence[Spectrum] = (),
     ) -> None:
         self.physics = physics
+        self.spectra = FittedSpectra(tuple(spectra), physics)
         self.cell, self.records, self.free, self.shapes, self.zero = cell, records, free, shapes, zero
         self.ageing = ageing
         silicon = sum(r.slow for r in records) >= TELL_SILICON
@@ -222,20 +227,27 @@ class Model:
         return [w * saturated(e) for w, e in zip(self.weights, self.errors(x), strict=True)]
 
     def residual(self, x: Array) -> Array:
-        """All misfits, and the priors."""
-        return np.concatenate([*self.misfits(x), x])
+        """All misfits, of records and of spectra, and the priors."""
+        return np.concatenate([*self.misfits(x), self.spectra.misfits(self.cell_at(x)), x])
 
     def jacobian(self, x: Array) -> Array:
-        """(rows + n, n) slopes of `residual`: one-sided differences, and in closed form for the knots of potentials."""
+        """(rows + frequencies + n, n) slopes of `residual`: one-sided differences, and for records in closed form those
+        over the knots of potentials."""
         cell = self.cell_at(x)
         runs = [self.run(i, cell, x) for i in range(len(self.records))]
         blocks = [np.zeros((len(r.rows), self.layout.size)) for r in self.records]
         closed = slice(self.layout.shapes.start, self.layout.shapes.start + self.shapes.closed)
-        for j in (*range(closed.start), *range(closed.stop, self.layout.shapes.stop)):
+        off = self.spectra.misfits(cell)
+        of_spectra = np.zeros((len(off), self.layout.size))
+        for j in range(self.layout.shapes.stop):
             h = STEP if x[j] + STEP <= self.high[j] else -STEP
             there = x.copy()
             there[j] += h
             changed = cell if j == self.layout.zero else self.cell_at(there)
+            if len(off) and j != self.layout.zero:
+                of_spectra[:, j] = (self.spectra.misfits(changed) - off) / h
+            if closed.start <= j < closed.stop:
+                continue
             for i, record in enumerate(self.records):
                 if j != self.layout.zero or record.slow:
                     blocks[i][:, j] = (self.run(i, changed, there)[0] - runs[i][0]) / h
@@ -247,7 +259,7 @@ class Model:
         for block, run, record, w in zip(blocks, runs, self.records, self.weights, strict=True):
             lenient = w * leniency(record.rows.voltage_v - run[0])
             parts.append(-lenient[:, None] * block)
-        return np.vstack([*parts, np.eye(self.layout.size)])
+        return np.vstack([*parts, of_spectra, np.eye(self.layout.size)])
 
     def _set_own_slopes(self, index: int, cell: Cell, x: Array, voltage_v: Array, block: Array) -> None:
         """Set the slopes of a record's voltage over what records have of their own: records of one course of ageing

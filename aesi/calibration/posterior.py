@@ -76,9 +76,8 @@ def sampled(found: Calibration, steps: int, seed: int = 0) -> PosteriorSamples:
     import emcee
 
     model, n = found.model, len(found.model.free)
-    jacobian, errors = model.jacobian(found.x), model.errors(found.x)
-    weights = np.concatenate([*information_weights(model, errors), np.ones(model.layout.size)])
-    linear = weights[:, None] * jacobian[:, n:]
+    weights = information_weights(model, found.x)
+    linear = weights[:, None] * model.jacobian(found.x)[:, n:]
     hessian = linear.T @ linear
     inverse, (_, log_det) = np.linalg.inv(hessian), np.linalg.slogdet(hessian)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
@@ -144,20 +144,22 @@ class Calibration:
         return Figure(bars, {"barmode": "group", "yaxis": {"title": {"text": "error, mV RMSE"}}})
 
 
-def information_weights(model: Model, errors: Sequence[Array]) -> list[Array]:
-    """Factor on each row's weight that makes a record count as many rows as say something of their own.
+def information_weights(model: Model, x: Array) -> Array:
+    """(rows + frequencies + n,) factors on `Model.residual` that make it count as much as it says of its own.
 
-    What is left after the fit repeats itself: n rows of first autocorrelation rho are n (1 - rho)/(1 + rho).
+    What is left of a record after the fit repeats itself: n rows of first autocorrelation rho are as many as
+    n (1 - rho)/(1 + rho).
     """
     out = []
-    for record, error, weight in zip(model.records, errors, model.weights, strict=True):
+    for record, error, weight in zip(model.records, model.errors(x), model.weights, strict=True):
         seen = error[record.trusted]
         scale = max(rms(seen), 1e-6)
         centred = seen - seen.mean()
         rho = float(np.dot(centred[1:], centred[:-1]) / max(float(np.dot(centred, centred)), 1e-30))
         share = (1.0 - np.clip(rho, 0.0, 0.999)) / (1.0 + np.clip(rho, 0.0, 0.999))
         out.append(np.sqrt(share) / scale / np.where(weight > 0.0, weight, 1.0))
-    return out
+    of_spectra = model.spectra.information_weights(model.cell_at(x))
+    return np.concatenate([*out, of_spectra, np.ones(model.layout.size)])
 
 
 def intervals(model: Model, x: Array, covariance: Array) -> dict[str, Interval]:

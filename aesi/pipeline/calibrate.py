@@ -14,6 +14,7 @@ from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
+from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
@@ -22,7 +23,7 @@ from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct
-from aesi.pipeline.impedance import BAND_HZ, SpectrumError, check_spectra, held_against
+from aesi.pipeline.impedance import SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
@@ -42,7 +43,8 @@ class Request:
 
     conditions : of the records; where they name no model, that of a saved model is fitted, or that the file was fitted
     with, else "espm".
-    impedance : spectra to hold the result against.  posterior : steps of each walker, 0 for none; seed : of these.
+    impedance : spectra to hold the result against, beside those that the conditions have to be fitted.
+    posterior : steps of each walker, 0 for none; seed : of these.
     title : name of the cell that is written.
     """
 
@@ -74,12 +76,12 @@ def calibrate_files(
     declared, model = given.cell, conditions.physics or given.model
     start = sized(declared, measurements)[0]  # the start file may be of another size
     check_measured(start, measurements)
-    check_spectra(start, asked.impedance)
+    check_spectra(start, (*conditions.spectra, *asked.impedance))
     found = calibrate(declared, measurements, replace(conditions, physics=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
-    spectra, told = held_against(found.cell, asked.impedance, model=model)
+    spectra, told = held_against(found.cell, asked.impedance, model=model, fitted=conditions.spectra)
     read = [note for m in measurements for note in m.notes]
     content = calibration_content(found, [*effects_left(given), *read, *told], posterior, spectra)
     write_whole(out, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
@@ -220,6 +222,7 @@ def calibration_content(
                 "temperature_degc": s.measured.temperature_degc,
                 "rms_pct": None if s.off is None else 100.0 * s.off,
                 "band_hz": list(BAND_HZ),
+                "fitted": s.fitted,
             }
             for s in spectra
         ],

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.data.channels.implausible import HIGHEST_CHARGE_RESISTANCE_OHM_AH
+from aesi.calibration.records.spectra import degc_of, in_band, state_of, usable
 from aesi.data.readers import open_table
 from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
@@ -22,9 +22,6 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.simulation import SayNotes, write_table
 from aesi.records import Spectrum
 
-BAND_HZ = (0.01, 100.0)
-"""Between them spectra are judged: above, leads and sensors; below, an open-circuit potential's slope."""
-
 INSTANT_HZ = 10.0
 """Above it a note says that a model has no double layers. A convention: at half charge and 25 degC the effect of that
 name lowers |Z| at 10 Hz by a factor of 1.08 (Panasonic NCR18650PF) to 6.4 (the virtual NMC cell), at 1 Hz of 1.01 to
@@ -37,8 +34,6 @@ NO_DOUBLE_LAYER = (
 MOST_FREQUENCIES, HIGHEST_HZ = 100_000, 1e9
 """Of `--frequencies`: sweeps have some tens to hundreds and end at some megahertz, beyond which leads are seen and no
 cell. Conventions: far more rows than these fill the memory, and take hours."""
-ASSUMED_DEGC = 25.0
-"""Of a spectrum whose temperature was not measured; it is said."""
 
 
 def impedance_file(
@@ -129,34 +124,14 @@ class SpectrumError:
     """A measured spectrum beside the model's.
 
     soc : at which the model was taken.  z_ohm : (n,) the model's.  off : root mean square of |Z_model|/|Z| - 1 within
-    `BAND_HZ`, None where no frequency lies in it.
+    `BAND_HZ`, None where no frequency lies in it.  fitted : whether the cell was fitted to it.
     """
 
     measured: Spectrum
     soc: float
     z_ohm: ComplexArray
     off: float | None
-
-
-def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
-    """Raises DataError, before anything is fitted, for spectra that are no such cell's, and where none could be used.
-
-    cell : whose capacity may be off by what a fit moves it, so that a state in Ah is not judged by it.
-    A spectrum in milliohm is told as a current in mA is, by capacity times resistance: that of its smallest |Z|.
-    """
-    for spectrum in spectra:
-        least_ohm = float(np.min(np.abs(spectrum.z_ohm)))
-        if least_ohm * cell.nominal_capacity_ah > HIGHEST_CHARGE_RESISTANCE_OHM_AH:
-            raise DataError(
-                f"{spectrum.name}: |Z| is {least_ohm:.3g} ohm and more, as of no cell of "
-                f"{cell.nominal_capacity_ah:.3g} A.h; z_real_ohm and z_imag_ohm are in ohm, so that 30 mOhm is 0.03."
-            )
-    beyond = [s for s in spectra if s.soc is not None and not 0.0 <= s.soc <= 1.0]
-    if spectra and len(beyond) == len(spectra):
-        raise DataError(
-            f"{beyond[0].name}: its state of charge of {beyond[0].soc:.4g} is not between 0 and 1 (50 % is 0.5), and "
-            "there is no other spectrum to be held against the cell."
-        )
+    fitted: bool = False
 
 
 def held_against(
@@ -164,34 +139,19 @@ def held_against(
     spectra: Sequence[Spectrum],
     effects: Sequence[ActiveEffect] = (),
     model: ModelName = "espm",
+    fitted: Sequence[Spectrum] = (),
 ) -> tuple[tuple[SpectrumError, ...], tuple[str, ...]]:
     """Each spectrum beside the cell's, and sentences on those below empty or above full, which are left out, and on
-    those whose temperature is not known."""
-    out, told = [], []
-    for spectrum in spectra:
-        soc = _soc(cell, spectrum)
-        if not 0.0 <= soc <= 1.0:
-            told.append(
-                f"{spectrum.name}: left out, since its state of charge of {soc:.4g} is not between 0 and 1 (50 % is "
-                "0.5)."
-            )
-            continue
-        degc = spectrum.temperature_degc
-        if degc is None:
-            degc = ASSUMED_DEGC
-            told.append(f"{spectrum.name}: no temperature; the model is taken at {degc:g} degC.")
-        z = impedance(cell, spectrum.frequency_hz, soc, degc, effects, model=model)
-        seen = (spectrum.frequency_hz >= BAND_HZ[0]) & (spectrum.frequency_hz <= BAND_HZ[1])
+    those whose temperature is not known.
+
+    fitted : those that the cell was fitted to, which come first.
+    """
+    kept, told = usable(cell, [*fitted, *spectra])
+    out = []
+    for spectrum in kept:
+        soc, seen = state_of(cell, spectrum), in_band(spectrum)
+        z = impedance(cell, spectrum.frequency_hz, soc, degc_of(spectrum), effects, model=model)
         ratio = np.abs(z[seen]) / np.abs(spectrum.z_ohm[seen]) - 1.0
         off = rms(ratio) if seen.any() else None
-        out.append(SpectrumError(spectrum, soc, z, off))
-    return tuple(out), tuple(told)
-
-
-def _soc(cell: Cell, spectrum: Spectrum) -> float:
-    """The state that the spectrum gives.  Raises DataError where it gives none."""
-    if spectrum.soc is not None:
-        return spectrum.soc
-    if spectrum.discharged_ah is None:
-        raise DataError(f"{spectrum.name}: the state of the cell is not known; give soc or discharged_ah.")
-    return 1.0 - spectrum.discharged_ah / cell.capacity_ah
+        out.append(SpectrumError(spectrum, soc, z, off, any(spectrum is one for one in fitted)))
+    return tuple(out), told

@@ -120,6 +120,12 @@ def calibrate(
             "--impedance", help="Measured spectra to hold the result against; nothing is fitted to them."
         ),
     ] = None,
+    fit_impedance: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--fit-impedance", help="Measured spectra of this very cell to fit beside the measurements."
+        ),
+    ] = None,
     posterior: Annotated[
         int,
         typer.Option("--posterior", min=0, help="Samples of each walker to draw from the posterior (emcee)."),
@@ -134,14 +140,15 @@ def calibrate(
     temperatures = options.by_file("--temperature", temperature, data)
     days, day = options.dates(dates, data), options.day("--as-of", as_of)
     ends = options.by_file("--until", until, data)
-    spectra, priors = options.spectra(impedance), options.priors(prior)
+    witnesses, spectra = options.spectra(impedance), options.spectra(fit_impedance)
+    priors = options.priors(prior)
     options.say_reading(data)
     from aesi.calibration import Conditions
     from aesi.pipeline.calibrate import Request, check_request
     from flows.jobs.calibration import calibrate as flow
 
-    conditions = Conditions(soc0, temperatures, days, day, model, priors=priors)
-    request = Request(conditions, spectra, posterior, seed, title)
+    conditions = Conditions(soc0, temperatures, days, day, model, spectra=spectra, priors=priors)
+    request = Request(conditions, witnesses, posterior, seed, title)
     check_request(cell, request)
     records = options.measurements(data, reading, hold, ends)
     flow(cell, records, out, request)

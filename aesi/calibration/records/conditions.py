@@ -8,6 +8,7 @@ from datetime import date
 from typing import NamedTuple
 
 from aesi.physics.simulation import ModelName
+from aesi.records import Spectrum
 
 
 class Prior(NamedTuple):
@@ -32,6 +33,7 @@ class Conditions:
     same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
     charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
     of a full discharge.
+    spectra : impedance of this very cell, fitted beside the records.
     priors : of parameters as the report names them, in place of those that every cell has; a `Prior` or its two values.
     """
 
@@ -41,4 +43,5 @@ class Conditions:
     as_of: date | None = None
     physics: ModelName | None = None
     same_cell: bool = False
+    spectra: tuple[Spectrum, ...] = ()
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -22,7 +22,10 @@ def nyquist(spectra: Sequence[SpectrumError], title: str) -> Figure:
     from plotly.colors import sample_colorscale
 
     shown = spectra[:: max(1, -(-len(spectra) // SHOWN))]
-    caption = "Points are measured, lines the model's; nothing was fitted to them."
+    fitted = sum(spectrum.fitted for spectrum in spectra)
+    of_all = f"{fitted} of {len(spectra)} spectra"
+    how = f"the model was fitted to {of_all}" if fitted else "nothing was fitted to them"
+    caption = f"Points are measured, lines the model's; {how}."
     if len(shown) < len(spectra):
         caption += f" {len(shown)} of {len(spectra)} spectra are drawn."
     figure = style.figure(title, caption, 560)

@@ -115,14 +115,19 @@ def test_spectra_are_drawn_by_temperature(tmp_path, content):
     z = 1e-3 * np.exp(1j * np.linspace(0.0, -1.0, 5))
     hz = np.geomspace(0.01, 100.0, 5)
     spectra = tuple(
-        SpectrumError(Spectrum(name, hz, z, soc=0.5, temperature_degc=degc), 0.5, 1.1 * z, 0.1)
+        SpectrumError(Spectrum(name, hz, z, soc=0.5, temperature_degc=degc), 0.5, 1.1 * z, 0.1, name == "a")
         for name, degc in (("a", 25.0), ("b", 25.2), ("c", 10.0))
     )
     row = {"name": "a", "soc": 0.5, "temperature_degc": 25.0, "rms_pct": 10.0, "band_hz": [0.01, 100.0]}
-    content["impedance"] = [row, row | {"temperature_degc": None, "rms_pct": None}]
+    row["fitted"] = True
+    content["impedance"] = [row, row | {"temperature_degc": None, "rms_pct": None, "fitted": False}]
     html = page(tmp_path, CalibrationView(content, "", traces(["pulses"]), HEALTH, spectra=spectra))
     assert "Nyquist plot at 25 degC" in html
     assert "Nyquist plot at 10 degC" in html
+    assert "the model was fitted to 1 of 2 spectra" in html
+    assert "nothing was fitted to them" in html
+    assert "<td>10.0</td><td>yes</td>" in html
+    assert "<td>no</td>" in html
 
 
 def test_one_record_is_named_and_its_error_is_no_range(content):

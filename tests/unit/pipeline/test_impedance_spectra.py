@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import aesi
+from aesi.calibration.records.spectra import check_spectra
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import activated
-from aesi.pipeline.impedance import check_spectra, held_against, impedance_file, read_frequencies
+from aesi.pipeline.impedance import held_against, impedance_file, read_frequencies
 from aesi.records import Spectrum
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"

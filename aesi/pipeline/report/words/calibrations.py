@@ -87,14 +87,15 @@ def _parameters(content: Mapping[str, Any]) -> list[str]:
 def _impedance(content: Mapping[str, Any]) -> list[str]:
     low, high = content["impedance"][0]["band_hz"]
     rows = [
-        f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {_number(s['rms_pct'])} |"
+        f"| {s['name']} | {s['soc']:.3f} | {_number(s['temperature_degc'])} | {_number(s['rms_pct'])} | "
+        f"{'yes' if s['fitted'] else 'no'} |"
         for s in content["impedance"]
     ]
     return [
-        f"## Impedance, {low:g} to {high:g} Hz, nothing fitted to it",
+        f"## Impedance, {low:g} to {high:g} Hz",
         "",
-        "| spectrum | state of charge | degC | root mean square of the error of abs(Z), % |",
-        "|---|---|---|---|",
+        "| spectrum | state of charge | degC | root mean square of the error of abs(Z), % | fitted |",
+        "|---|---|---|---|---|",
         *rows,
     ]
 
