@@ -13,16 +13,14 @@ import numpy as np
 
 from aesi.calibration import Calibration, Conditions
 from aesi.calibration import calibrate as fit_cell
-from aesi.calibration.start import sized
 from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
 from aesi.errors import DataError, InputError
 from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
-from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Soh
-from aesi.pipeline.calibrate import check_records, effects_left
+from aesi.pipeline.calibrate import check_records, effects_left, scaled_to
 from aesi.pipeline.discovery.cases import MOST_ROWS
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
@@ -137,7 +135,7 @@ def calibrate(
     declared = given.cell
     measurements = _read_all(_listed(data), None, hold)
     check_records(measurements, temperatures_degc)
-    check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted
     conditions = Conditions(
         soc0,
         temperatures_degc or {},

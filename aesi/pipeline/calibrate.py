@@ -14,12 +14,14 @@ from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
+from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
+from aesi.physics.cell import Cell
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import BAND_HZ, SpectrumError, check_spectra, held_against
@@ -72,9 +74,7 @@ def calibrate_files(
     check_posterior(asked.posterior)
     given = declared_model(cell)
     declared, model = given.cell, conditions.physics or given.model
-    start = sized(declared, measurements)[0]  # the start file may be of another size
-    check_measured(start, measurements)
-    check_spectra(start, asked.impedance)
+    check_spectra(scaled_to(declared, measurements, conditions.temperatures_degc), asked.impedance)
     found = calibrate(declared, measurements, replace(conditions, physics=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
@@ -160,6 +160,19 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
             raise InputError(
                 f"the temperature of {name} is a row of {len(value)}; give one number here, or the record a column."  # type: ignore[arg-type]
             )
+
+
+def scaled_to(
+    declared: Cell, measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None
+) -> Cell:
+    """The cell at the size that the records tell, which need not be the start file's.
+
+    temperatures_degc : of records without a column, by name.  Raises DataError for a record that cannot be of it, at
+    its temperature.
+    """
+    start = sized(declared, measurements)[0]
+    check_measured(start, with_temperatures(start, measurements, temperatures_degc or {})[0])
+    return start
 
 
 def _made_from(found: Calibration) -> str:
