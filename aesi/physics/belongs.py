@@ -97,11 +97,9 @@ def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
     """What the voltages and the charge of a record say of the capacity: 0 and infinity where they say nothing."""
     rows = np.unique(np.linspace(0, len(record) - 1, ROWS).astype(int))
     charge = record.discharged_ah("backward")[rows]  # as loggers write
-    drop = _largest_drop_v(cell, record, rows)
-    current, voltage = record.current_a[rows], record.voltage_v[rows]
-    calm = np.abs(current) < SMALL_C_RATE * cell.nominal_capacity_ah
-    high = _soc_of(cell, voltage + np.where(calm | (current > 0), drop, DROP_V))
-    low = _soc_of(cell, voltage - np.where(calm | (current < 0), drop, DROP_V))
+    voltage = record.voltage_v[rows]
+    high = _soc_of(cell, voltage + _largest_drop_v(cell, record, rows, 1.0))
+    low = _soc_of(cell, voltage - _largest_drop_v(cell, record, rows, -1.0))
     moved = charge[None, :] - charge[:, None]  # discharged from row i to row j
     at_least = low[:, None] - high[None, :]  # of state of charge lost from i to j
     at_most = np.maximum(high[:, None] - low[None, :], FEWEST_SOC)
@@ -219,13 +217,25 @@ def _cause(ratio: float, record: Measurement) -> str:
     )
 
 
-def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray) -> Array:
-    """(n_rows,) V: the drop that no cell exceeds under its current, or after that of the half hour before."""
-    size = np.abs(record.current_a)
+def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray, sign: float) -> Array:
+    """(n_rows,) V: how far no cell is below its rest voltage, or above it, under its current, or after that of the half
+    hour before. A smaller current the other way does not undo what came before it: after pulses of 12 A an LG 18650HG2
+    at -7 degC is 0.5 V below rest while a drive puts 0.6 A back.
+
+    sign : 1 for below it, where discharge leaves a cell; -1 for above it.
+    """
+    flows = sign * record.current_a
     since = np.searchsorted(record.time_s, record.time_s[rows] - AFTER_S)
-    before = np.array([np.max(size[first : row + 1]) for first, row in zip(since, rows, strict=True)])
-    rate = np.maximum(size[rows], AFTER_SHARE * before) / cell.nominal_capacity_ah
-    drop = DROP_V + DROP_V_PER_C * rate
+    turned = flows[rows] < -SMALL_C_RATE * cell.nominal_capacity_ah
+    before_a = np.array(
+        [
+            np.max(flows[first : row + 1] if other else np.abs(flows[first : row + 1]))
+            for first, row, other in zip(since, rows, turned, strict=True)
+        ]
+    )
+    after_a = AFTER_SHARE * before_a
+    here_a = np.where(turned, after_a + flows[rows], np.maximum(np.abs(flows[rows]), after_a))
+    drop = DROP_V + DROP_V_PER_C * np.maximum(here_a, 0.0) / cell.nominal_capacity_ah
     measured = record.temperature_degc
     degc = np.asarray(_declared_degc(cell)) if measured is None else measured[rows]
     cold = np.clip((COLD_DEGC - degc) / COLD_SPAN_K, 0.0, MOST_SPANS)

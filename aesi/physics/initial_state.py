@@ -147,9 +147,11 @@ class _Start:
         soc, sd = self.open_circuit.reading(true, spread)
         soc += rest.charge_ah / self.cell.capacity_ah
         words = f"{self.record.name} rests at {begins:.3f} V"
-        if abs(voltage - begins) > READING_V:
+        if max(abs(voltage - begins), sd_v) > READING_V:
             words += f", relaxing to {voltage:.3f} +/- {sd_v:.3f} V"
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
+        if sd > OTHER_STATE:
+            words += "; give --soc0 if it is known"
         low, high = self.open_circuit.ends(true, spread)
         ends = self._declared(low), self._declared(high)
         return InitialState(self._declared(soc), sd, "rest", words + ".", rest_voltage_v=voltage, ends=ends)

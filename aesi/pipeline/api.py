@@ -13,17 +13,16 @@ import numpy as np
 
 from aesi.calibration import Calibration, Conditions
 from aesi.calibration import calibrate as fit_cell
-from aesi.calibration.start import sized
 from aesi.data.read import Reading, examined, read
 from aesi.data.reading import record_names
 from aesi.errors import DataError, InputError
 from aesi.over_time import stamp
 from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
-from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Soh
-from aesi.pipeline.calibrate import check_records, effects_left
+from aesi.pipeline.calibrate import check_records, effects_left, scaled_to
 from aesi.pipeline.discovery.cases import MOST_ROWS
+from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
 from aesi.pipeline.product.declared import Declared, declared_model
@@ -80,7 +79,6 @@ def discover(
     asked = [one for part in parts for one in part]
     found = iter(_read_all(asked, MOST_ROWS // max(1, len(asked)), hold))
     measurements, judged, known = (tuple(islice(found, len(part))) for part in parts)
-    check_measured(given.cell, [*measurements, *judged, *known])
     named = [effect_files] if isinstance(effect_files, str | PathLike) else effect_files
     files = tuple(Path(file) for file in named)
     case = Case(
@@ -97,7 +95,7 @@ def discover(
         model,
         good=known,
     )
-    case.tried()  # refused before anything is searched
+    case = with_cold_admitted(case)  # refused before anything is searched
     finding = Finding(case, run_case(case, folder, progress))
     if folder is not None:
         finding.save(folder)
@@ -137,7 +135,7 @@ def calibrate(
     declared = given.cell
     measurements = _read_all(_listed(data), None, hold)
     check_records(measurements, temperatures_degc)
-    check_measured(sized(declared, measurements)[0], measurements)  # the start file may be of another size
+    scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted
     conditions = Conditions(
         soc0,
         temperatures_degc or {},

@@ -14,6 +14,7 @@ from aesi.calibration import Calibration, Conditions, calibrate
 from aesi.calibration.health import HEALTH_WORDS, health_intervals, health_of
 from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
+from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
@@ -21,6 +22,7 @@ from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
+from aesi.physics.cell import Cell
 from aesi.physics.simulation import MODEL_WORDS
 from aesi.pipeline.distinct import check_distinct
 from aesi.pipeline.impedance import SpectrumError, held_against
@@ -74,8 +76,7 @@ def calibrate_files(
     check_posterior(asked.posterior)
     given = declared_model(cell)
     declared, model = given.cell, conditions.physics or given.model
-    start = sized(declared, measurements)[0]  # the start file may be of another size
-    check_measured(start, measurements)
+    start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
     found = calibrate(declared, measurements, replace(conditions, physics=model))
     name = declared.name if asked.title is None else asked.title
@@ -162,6 +163,19 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
             raise InputError(
                 f"the temperature of {name} is a row of {len(value)}; give one number here, or the record a column."  # type: ignore[arg-type]
             )
+
+
+def scaled_to(
+    declared: Cell, measurements: Sequence[Measurement], temperatures_degc: Mapping[str, float] | None
+) -> Cell:
+    """The cell at the size that the records tell, which need not be the start file's.
+
+    temperatures_degc : of records without a column, by name.  Raises DataError for a record that cannot be of it, at
+    its temperature.
+    """
+    start = sized(declared, measurements)[0]
+    check_measured(start, with_temperatures(start, measurements, temperatures_degc or {})[0])
+    return start
 
 
 def _made_from(found: Calibration) -> str:

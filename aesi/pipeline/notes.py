@@ -50,15 +50,11 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
     )
 
 
-def without_energies(
-    cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
-) -> tuple[str, ...]:
+def without_energies(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
     """A sentence where properties of the cell do not answer to the temperatures that it is taken at.
 
-    temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares, or as
-    `effects` change that.
+    temperatures_degc : of each record, None where it holds none and is taken as the cell declares.
     """
-    cell = model_with(cell, effects).cell
     reference_k, missing = cell.reference_temperature_k, _without_energy(cell)
     kelvin = (cell.initial_temperature_k if t is None else t + ZERO_CELSIUS_K for t in temperatures_degc)
     farthest = max((float(np.max(np.abs(each - reference_k))) for each in kelvin), default=0.0)
@@ -70,17 +66,17 @@ def without_energies(
     )
 
 
-def beyond_fitted(
-    cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
-) -> tuple[str, ...]:
+def beyond_fitted(cell: Cell, temperatures_degc: Iterable[Array | float | None]) -> tuple[str, ...]:
     """A sentence where records are colder or warmer in the mean than any that the cell's file was fitted to.
 
     Arguments as of `without_energies`.
     """
     if not cell.fitted_at_k:
         return ()
-    taken_k = model_with(cell, effects).cell.initial_temperature_k
-    means = [taken_k if t is None else float(np.mean(t)) + ZERO_CELSIUS_K for t in temperatures_degc]
+    means = [
+        cell.initial_temperature_k if t is None else float(np.mean(t)) + ZERO_CELSIUS_K
+        for t in temperatures_degc
+    ]
     out = []
     for word, sign in (("colder", -1.0), ("warmer", 1.0)):
         record, edge_k = max(cell.fitted_at_k, key=lambda one: sign * one[1])
@@ -97,9 +93,13 @@ def beyond_fitted(
 def on_temperatures(
     cell: Cell, temperatures_degc: Iterable[Array | float | None], effects: Iterable[ActiveEffect] = ()
 ) -> tuple[str, ...]:
-    """All that is to be said of the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`."""
-    given, active = list(temperatures_degc), list(effects)
-    return (*without_energies(cell, given, active), *beyond_fitted(cell, given, active))
+    """All that is to be said of the temperatures that a cell is taken at: `without_energies` and `beyond_fitted`.
+
+    temperatures_degc : of each record, None where it holds none and is taken as the cell's file declares, or as
+    `effects` change that.
+    """
+    given, acting = list(temperatures_degc), model_with(cell, effects).cell
+    return (*without_energies(acting, given), *beyond_fitted(acting, given))
 
 
 def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:

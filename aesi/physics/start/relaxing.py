@@ -4,7 +4,8 @@
 
 g is how far the model's voltage is from rest, over C-rate, after a current has flowed for one of some times and has
 stopped one of some times before the record; C is one of some C-rates. U is averaged over these histories by how well
-each explains the means of the rest over equal parts, and is as uncertain as they leave it.
+each explains the means of the rest over equal parts, and is as uncertain as they leave it. Double layers are left out
+of g: they follow within a second, and what charge they take is taken from the particles for good.
 """
 
 from __future__ import annotations
@@ -89,7 +90,11 @@ def _means(values: Array, starts: IntArray) -> Array:
 
 def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, physics: ModelName) -> Iterator[Array]:
     """(n,) V over C-rate, g of (1) at the rows of a rest, for each history."""
-    cell = open_circuit.cell
+    # With the charge of its double layers a cell rests beside the open-circuit voltage of its state of charge, and far
+    # beside it where that is steep: layers of 7 and 11 F/m2 made 60 mV of 20 s of C/4 at a full LFP cell, and of a rest
+    # that stands still within 0.2 mV a state of charge of 0.996 +/- 0.48.
+    whole = open_circuit.cell
+    cell = whole.with_negative(double_layer_f_m2=0.0).with_positive(double_layer_f_m2=0.0)
     # The history comes from the middle of the range, so that it does not begin beyond full or empty.
     rate = HISTORY_C_RATE if soc < 0.5 else -HISTORY_C_RATE
     current_a = rate * cell.capacity_ah

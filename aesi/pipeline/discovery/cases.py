@@ -9,13 +9,12 @@ from aesi.data.read import Reading, read
 from aesi.data.reading import record_names
 from aesi.errors import ConfigError
 from aesi.physics import ModelName
-from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Soh
+from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
 from aesi.pipeline.experiment.sources import cell_path, discovery_records
-from aesi.pipeline.product.declared import declared_model
 from aesi.records import Hold
 
 MOST_ROWS = 80_000
@@ -45,14 +44,13 @@ def case_of_files(
     data, tests, good : files of the records that are looked at, that choose nothing, and that are known to be good.
     reading, hold : how the files are read, and how the current runs between their rows; None tells by the rows.
     All else as `Case` has it.
-    Raises DataError where a file cannot be of the cell.
+    Raises DataError where a file cannot be of the cell, at any temperature that is looked for.
     """
     paths = (*data, *tests, *good)
     rows = MOST_ROWS // max(1, len(paths))
     named = zip(paths, record_names(paths), strict=True)
     records = [read(path, reading or Reading(), rows, name).held(hold) for path, name in named]
-    check_measured(declared_model(cell).with_soh(soh).cell, records)
-    return Case(
+    case = Case(
         cell,
         measurements=tuple(records[: len(data)]),
         tests=tuple(records[len(data) : len(data) + len(tests)]),
@@ -67,6 +65,7 @@ def case_of_files(
         model=model,
         soh=soh,
     )
+    return with_cold_admitted(case)
 
 
 def case_of_experiment(config: ExperimentConfig) -> Case:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
@@ -74,6 +74,12 @@ class Case:
     def records(self) -> tuple[Measurement, ...]:
         """All of them: those that are looked at, those that are known to be good, and those that choose nothing."""
         return (*self.measurements, *self.good, *self.tests)
+
+    def with_each(self, changed: Callable[[Measurement], Measurement]) -> Case:
+        """The case with what `changed` makes of each of its records."""
+        groups = (self.measurements, self.tests, self.good)
+        measurements, tests, good = (tuple(map(changed, group)) for group in groups)
+        return replace(self, measurements=measurements, tests=tests, good=good)
 
     @property
     def kept_back(self) -> float:

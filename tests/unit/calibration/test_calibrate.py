@@ -2,6 +2,7 @@
 
 import re
 import warnings
+from copy import copy
 from dataclasses import replace
 from datetime import date
 
@@ -253,6 +254,23 @@ def test_a_file_that_is_worse_than_the_start_file_as_it_is_simulated_was_not_war
         f"{first.name}: the file that is written errs by 40.00 mV there, the start file by 20.00"
     )
     assert replace(found, errors=(replace(worse, simulated_v=20e-3),)).warnings == ()
+
+
+def test_a_double_layer_that_no_cell_has_was_written_without_a_word(found):
+    free = list(found.model.free)
+    at = [one.name for one in free].index("negative.double_layer")
+    x = found.x.copy()
+    x[at] = 3.5
+    absurd = replace(found, x=x)
+    (warning,) = set(absurd.warnings) - set(found.warnings)
+    assert warning.startswith(
+        "negative.double_layer = 66.7 F/m2 (3.5 standard deviations above 1): the records contra"
+    )
+    assert "it rather stands in for something that the model lacks" in warning
+    free[at] = replace(free[at], given=True)  # a note says so
+    told = copy(found.model)
+    told.free = tuple(free)
+    assert set(replace(absurd, model=told).warnings) == set(found.warnings)
 
 
 def test_a_resistance_of_nought_was_written_as_what_round_off_left(found):

@@ -57,6 +57,20 @@ def test_a_cold_record_without_its_temperature_was_called_another_cells_and_noth
         assert "colder" not in str(caught.value)
 
 
+def test_a_little_charge_between_pulses_in_the_cold_was_taken_for_a_rest_voltage(m50):
+    """Pulses of 2C, between which a drive puts C/8 back, at a voltage 0.35 V below rest that the pulses left."""
+    time_s = np.arange(0.0, 3600.0, 2.0)
+    drives = (time_s > 120) & (time_s < 2400)
+    current_a = np.where(drives, np.where(np.sin(time_s / 20.0) > 0.0, 2.0, -1 / 8) * m50.capacity_ah, 0.0)
+    soc = 1.0 - np.cumsum(2.0 * current_a) / 3600.0 / m50.capacity_ah
+    left = np.where(time_s > 120, 0.35, 0.0)
+    voltage_v = m50.rest_voltage_v(soc) - 0.02 * current_a - left
+    cold = Measurement(time_s, current_a, voltage_v, np.full(len(time_s), -10.0), name="drive")
+    bounds = capacity_bounds(m50, cold)
+    assert bounds.low_ah <= m50.capacity_ah <= bounds.high_ah
+    check_belongs(m50, [cold])
+
+
 def test_a_voltage_that_is_still_low_after_a_discharge_says_of_no_smaller_cell(m50):
     """Two thirds discharged at 1C, and then at rest 0.12 V below its open-circuit voltage for twenty minutes."""
     time_s = np.arange(0.0, 3720.0, 2.0)

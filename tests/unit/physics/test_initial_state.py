@@ -185,6 +185,25 @@ def test_a_rest_after_a_current_that_nobody_saw_is_read_as_what_it_relaxes_to(fl
         assert "relaxing to" in found.sentence
 
 
+@pytest.mark.parametrize("layer_f_m2", [0.2, 10.0])
+def test_the_charge_of_double_layers_made_nothing_known_of_a_full_cell_at_rest(layer_f_m2):
+    lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
+    layered = lfp.with_negative(double_layer_f_m2=layer_f_m2).with_positive(double_layer_f_m2=layer_f_m2)
+    data = resting(float(lfp.rest_voltage_v(0.97)[0]))
+    found, plain = initial_state(layered, data), initial_state(lfp, data)
+    assert found.basis == "rest"
+    assert found.soc == pytest.approx(plain.soc, abs=1e-3)
+    assert found.sd == pytest.approx(plain.sd, rel=0.1)
+
+
+def test_a_rest_on_a_flat_potential_asks_for_the_state_of_charge():
+    lfp = Cell.from_bpx(CELLS / "lfp_prada2013.bpx.json")
+    flat, steep = (initial_state(lfp, resting(float(lfp.rest_voltage_v(soc)[0]))) for soc in (0.5, 0.02))
+    assert (flat.sd > 0.05) == flat.sentence.endswith("; give --soc0 if it is known.")
+    assert flat.sd > 0.05 > steep.sd
+    assert "--soc0" not in steep.sentence
+
+
 def test_a_rest_is_read_as_it_is_where_it_does_not_move_or_says_too_little():
     data = resting(3.7, rows=60)
     moving = replace(data, voltage_v=3.7 - 0.02 * np.exp(-np.arange(60.0) / 20.0))

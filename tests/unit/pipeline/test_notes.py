@@ -7,9 +7,12 @@ import numpy as np
 
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
+from aesi.physics.simulation import model_with
+from aesi.pipeline import notes
 from aesi.pipeline.notes import (
     beyond_fitted,
     of_another_model,
+    on_temperatures,
     temperature_sentence,
     together,
     without_energies,
@@ -56,7 +59,7 @@ def test_what_is_colder_or_warmer_than_all_that_a_file_was_fitted_to_is_said():
         "-18.0 degC in the mean is 10 K colder than any record that the cell's file was fitted to (pulses, -7.9 degC): "
         "what the model says there is extrapolated.",
     )
-    (sentence,) = beyond_fitted(fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=15.0)])
+    (sentence,) = on_temperatures(fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=15.0)])
     assert sentence.startswith("40.0 degC in the mean is 14 K warmer than any record ")
     assert beyond_fitted(Cell.from_bpx(NMC), [-30.0]) == ()  # published: nobody says what it was fitted to
 
@@ -71,9 +74,19 @@ def test_two_effects_that_change_the_temperature_were_one():
 def test_a_shift_of_the_temperature_was_no_temperature_that_energies_are_missing_for():
     silent = Cell.from_bpx(NMC).with_electrolyte(diffusivity_ea_j_mol=0.0)
     shifted = [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)]
-    (sentence,) = without_energies(silent, [None], shifted)
+    (sentence,) = on_temperatures(silent, [None], shifted)
     assert sentence.endswith("taken as at 25 degC, which is up to 20 K off.")
-    assert without_energies(silent, [np.full(3, 25.0)], shifted) == ()  # a measured temperature is as it is
+    assert on_temperatures(silent, [np.full(3, 25.0)], shifted) == ()  # a measured temperature is as it is
+
+
+def test_what_is_said_of_temperatures_activated_the_effects_once_for_each_sentence(monkeypatch):
+    asked = []
+    monkeypatch.setattr(notes, "model_with", lambda *given: asked.append(given) or model_with(*given))
+    silent = Cell.from_bpx(NMC).with_electrolyte(diffusivity_ea_j_mol=0.0)
+    fitted = replace(silent, fitted_at_k=(("drive", 299.0),))
+    both = on_temperatures(fitted, [None], [CATALOGUE["ambient_temperature"].activate(shift_k=-20.0)])
+    assert len(both) == 2
+    assert len(asked) == 1
 
 
 def test_a_model_that_was_found_with_the_single_particle_was_simulated_with_the_other_without_a_word():
