@@ -1,7 +1,9 @@
 #!/bin/sh
 # Makes the calibrated cell files of this folder from public records (AESI_DATA as in docs/reference/files.md).
-#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc] [OUT_FOLDER]
-# Without arguments all four, into this folder. Each takes some minutes of one processor.
+#   sh experiments/cells/calibrate.sh [panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_cold] [OUT_FOLDER]
+# Without arguments the first four, into this folder; hg2_cold needs two records of the published archive, as `aesi data
+# get lg_18650hg2 --out "$AESI_DATA/measured/lg_18650hg2"` lays an unpacked one out. Each takes some minutes of one
+# processor.
 set -eu
 here=$(cd "$(dirname "$0")" && pwd)
 which=${1:-all}
@@ -31,15 +33,25 @@ panasonic_25degc() {
 # answers a step of its first drive with 17.6 within a second: 2.6 are counted as another holder's. Of the deviation 0.5
 # is of the fit, 0.5 of the energy, and 1.0 (a convention) of what of those 2.6 may be no holder's.
 hg2_contacts=contact.resistance=0.0108:0.0012
-hg2() {
-    p=$data/lg_18650hg2
-    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, calibrated" \
+hg2_with() { # TITLE NAME [--data ... --date ...]
+    title=$1 name=$2 p=$data/lg_18650hg2
+    shift 2
+    aesi calibrate --cell "$start" --title "LG 18650HG2 3.0 Ah NMC|graphite-SiOx, $title" \
         --data "$p/25degC_c20_ocv.csv" "$p/25degC_cap_1c.csv" "$p/25degC_mixed1.csv.gz" "$p/40degC_c20_ocv.csv" \
         "$p/0degC_c20_ocv.csv" "$p/n10degC_cap_1c.csv" \
         --date 25degC_c20_ocv=2018-10-26 --date 25degC_cap_1c=2018-10-28 --date 25degC_mixed1=2018-10-29 \
         --date 40degC_c20_ocv=2018-11-03 --date 0degC_c20_ocv=2018-11-27 --date n10degC_cap_1c=2018-12-07 \
-        --as-of 2018-10-29 --prior "$hg2_contacts" \
-        --out "$out/lg_18650hg2.bpx.json"
+        --as-of 2018-10-29 --prior "$hg2_contacts" "$@" \
+        --out "$out/$name.bpx.json"
+}
+hg2() {
+    hg2_with calibrated lg_18650hg2
+}
+hg2_cold() {
+    p=$data/lg_18650hg2
+    hg2_with "calibrated down to -20 degC" lg_18650hg2_cold \
+        --data "$p/n10degC_604_mixed6.csv" "$p/n20degC_610_la92.csv" \
+        --date n10degC_604_mixed6=2018-12-18 --date n20degC_610_la92=2018-12-24
 }
 hg2_25degc() {
     p=$data/lg_18650hg2
@@ -51,6 +63,6 @@ hg2_25degc() {
 }
 case $which in
 all) panasonic && panasonic_25degc && hg2 && hg2_25degc ;;
-panasonic | panasonic_25degc | hg2 | hg2_25degc) "$which" ;;
+panasonic | panasonic_25degc | hg2 | hg2_25degc | hg2_cold) "$which" ;;
 *) echo "there is no cell $which" >&2 && exit 2 ;;
 esac

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from aesi.bench.physics.archive import ARCHIVE
 from aesi.data.catalogue import locate
 from aesi.errors import DataError
 from aesi.physics import Cell, simulate
@@ -23,6 +24,7 @@ CELLS = Path(__file__).resolve().parents[2] / "experiments" / "cells"
         ("hg2_25degc", "lg_18650hg2_25degc", "lg_18650hg2"),
         ("panasonic", "panasonic_ncr18650pf", "panasonic_ncr18650pf"),
         ("panasonic_25degc", "panasonic_ncr18650pf_25degc", "panasonic_ncr18650pf"),
+        ("hg2_cold", "lg_18650hg2_cold", "lg_18650hg2"),
     ],
 )
 def test_the_command_gives_the_file_again(name, file, data, tmp_path):
@@ -30,10 +32,15 @@ def test_the_command_gives_the_file_again(name, file, data, tmp_path):
         records = locate(data, "25degC_c20_ocv").parent.parent.parent
     except DataError as error:
         pytest.skip(str(error))
+    shipped = Cell.from_bpx(CELLS / f"{file}.bpx.json")
+    folder = records / "measured" / data
+    beyond = [fitted for fitted, _ in shipped.fitted_at_k if fitted in ARCHIVE[data]]
+    if not all((folder / f"{fitted}.csv").is_file() for fitted in beyond):
+        pytest.skip(f"{name} needs {', '.join(beyond)} of the published archive in {folder}")
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     environment = os.environ | {"AESI_DATA": str(records), "PATH": path}
     subprocess.run(["sh", CELLS / "calibrate.sh", name, tmp_path], check=True, env=environment, timeout=3600)
-    shipped, again = (Cell.from_bpx(folder / f"{file}.bpx.json") for folder in (CELLS, tmp_path))
+    again = Cell.from_bpx(tmp_path / f"{file}.bpx.json")
     assert again.tested_on == shipped.tested_on
     assert again.fitted_at_k == shipped.fitted_at_k
     time = np.arange(0.0, 2400.0)

@@ -10,7 +10,9 @@ tested for five months is not the same cell.
 A model that runs out (a surface or the electrolyte, see `aesi.physics.depletion`) is held at its edge to the end of the
 record and said in `ran_out`; its figure counts all rows. A record that entered the calibration of its file is marked:
 its figure is no test. What others print is beside ours with its protocol; none of it was run here.
-With `archive` it is the records of the published archives that chose nothing (`aesi.bench.physics.archive`).
+With `archive` it is the records of the published archives that chose nothing (`aesi.bench.physics.archive`); beside the
+others stands, where there is one, the file that was fitted to loads of the archive in the cold as well, whose figures
+on these are marked and count in no median.
 """
 
 from __future__ import annotations
@@ -60,6 +62,9 @@ class MeasuredRecord:
 
 FILES = {NCR: (START, NCR), HG2: (START, HG2), NMC: (None, None), M50T: (START, None)}
 """Set -> start file and calibrated file of `experiments/cells`; None: the file published with the data, or none."""
+
+COLD = "_cold"
+"""Ends the name of the file of a cell that was fitted to loads in the cold of its archive, too, where there is one."""
 
 RECORDS = (
     *(MeasuredRecord(NMC, name, others_mv=mv, protocol=PUBLISHED) for name, mv in (
@@ -159,9 +164,10 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     return [*lines, "", *(f"[{k}] {text}.  " for k, text in enumerate(protocols, start=1))]
 
 
-HEADINGS = COLUMNS | {"porous_mv": "porous electrode"}
-JUDGED = ("declared_mv", "with_temperature_mv", "porous_mv", "aged_mv")
-"""Of a record of an archive: the start file, the calibrated one by both models, and at the state of its day."""
+HEADINGS = COLUMNS | {"porous_mv": "porous electrode", "cold_mv": "fitted in the cold"}
+JUDGED = ("declared_mv", "with_temperature_mv", "porous_mv", "aged_mv", "cold_mv")
+"""Of a record of an archive: the start file, the calibrated one by both models, and at the state of its day, and the
+one that was fitted to a load in the cold as well."""
 
 
 def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -178,8 +184,12 @@ def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in there):
         ours = [row for row in there if (row["cell"], chamber(row["record"])) == (cell, place)]
-        figures = [[row[key] for row in ours] for key in keys]
-        told = " | ".join(f"{np.median(each):.1f} / {max(each):.1f}" for each in figures)
+        seen = [[row for row in ours if key not in row.get("fitted_mv", ())] for key in keys]
+        figures = [
+            [row[key] for row in those if row.get(key) is not None]
+            for key, those in zip(keys, seen, strict=True)
+        ]
+        told = " | ".join(f"{np.median(each):.1f} / {max(each):.1f}" if each else "" for each in figures)
         out = sum("with_temperature" in row["ran_out"] for row in ours)
         lines.append(f"| {cell} | {place} | {len(ours)} | {told} | {out or ''} |")
     lines += [
@@ -201,7 +211,8 @@ def _shown(row: Mapping[str, Any], key: str) -> str:
     if row.get(key) is None:
         return ""
     ran_out = row.get("ran_out", {}).get(key.removesuffix("_mv"))
-    return f"{row[key]:.1f}" + ("" if ran_out is None else f" (ran out at {ran_out:.0f} s)")
+    fitted = " (fitted)" if key in row.get("fitted_mv", ()) else ""
+    return f"{row[key]:.1f}{fitted}" + ("" if ran_out is None else f" (ran out at {ran_out:.0f} s)")
 
 
 def judged(cells: Path, record: MeasuredRecord, porous: bool = False) -> dict[str, Any]:
@@ -236,6 +247,10 @@ def _figures(cells: Path, record: MeasuredRecord, porous: bool) -> dict[str, Any
         if soh is not None:
             out["soh"] = round(soh, 3)
             runs["aged"] = free_run(best_cell.with_soh(soh), data)
+        if record in ARCHIVED and (cells / f"{calibrated}{COLD}.bpx.json").is_file():
+            cold = cell_of(cells, record.data, calibrated + COLD)
+            runs["cold"] = free_run(cold, data)
+            out["fitted_mv"] = ["cold_mv"] if record.name in dict(cold.fitted_at_k) else []
     if "windows" in record.protocol:
         out["windows_mv"] = windows_mv(best_cell, data)
     out |= {f"{name}_mv": run.rmse_mv for name, run in runs.items()}

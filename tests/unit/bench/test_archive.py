@@ -73,6 +73,14 @@ def test_the_table_holds_median_and_worst_of_each_chamber_coldest_first():
         "| c | 0 degC | 1 | 200.0 / 200.0 | 20.0 / 20.0 | 19.0 / 19.0 |  |",
     ]
     assert "    | c | n20degC_la92 | -5.0 | 300.0 | 30.0 (ran out at 7 s) | 29.0 |" in lines
+    cold = archive_table(
+        [
+            row("n20degC_la92", 30.0, cold_mv=9.0, fitted_mv=["cold_mv"]),
+            row("n20degC_udds", 50.0, cold_mv=20.0, fitted_mv=[]),
+        ]
+    )
+    assert cold[2] == "| c | -20 degC | 2 | 400.0 / 500.0 | 40.0 / 50.0 | 39.0 / 49.0 | 20.0 / 20.0 |  |"
+    assert "    | c | n20degC_la92 | -5.0 | 300.0 | 30.0 | 29.0 | 9.0 (fitted) |" in cold
     assert not any("n20degC_nn" in line for line in lines)
     assert (chamber("n20degC_trise_us06"), degc_of("n20degC_trise_us06"), degc_of("10degC_nn")) == (
         "-20 degC, rising",
