@@ -28,7 +28,7 @@ from aesi.calibration.result import (
     undetermined,
 )
 from aesi.calibration.rewind import capacities, rewound
-from aesi.calibration.shapes import SPAN_K, Shapes
+from aesi.calibration.shapes import Shapes
 from aesi.calibration.start import one_branch, size_assumed, sized, with_activation
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.errors import DataError, FitError
@@ -36,6 +36,7 @@ from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Cell
+from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
 from aesi.physics.depletion import ran_out
 from aesi.records import Measurement, Spectrum

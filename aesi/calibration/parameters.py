@@ -14,9 +14,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from aesi.calibration.records.conditions import Prior
-from aesi.calibration.shapes import SPAN_K
 from aesi.errors import InputError, did_you_mean
 from aesi.physics.cell import Cell, Electrode
+from aesi.physics.cell.energies import FILM_ENERGY, SPAN_K, energy_priors
 from aesi.physics.cell.parts import NO_FILM
 from aesi.physics.cell.relations import Constant, LookupTable, Product, Relation, scaled
 
@@ -64,9 +64,6 @@ class Free:
 RATE_SD, SALT_SD = 0.8, 0.35
 """Deviations of logarithms. Wider ones let a drive at one temperature trade kinetics for a slow electrolyte, and an LG
 18650HG2 then runs out of salt under its US06."""
-RATE_ENERGY, RATE_ENERGY_SD = 55e3, 12e3
-"""J/mol: what lithium pays to leave its solvent, the mean of the sources. Lower values (40 and 24 in O'Regan et al.
-2022, as PyBaMM has them) are of rates that hold contacts and films too."""
 CONTACT_V = 0.03
 """V at 1C: what contacts (tabs, collectors, can) typically take, and the prior's deviation. It is the 12 mohm that
 pulses at four temperatures find in a Panasonic NCR18650PF. From nought, which no cell has, a fit at one temperature
@@ -81,35 +78,12 @@ FULLEST = 0.95
 """Stoichiometry of an electrode that is as full as a charged cell's may be: beyond, its kinetics stand still."""
 RATES = "convention: rates of cells of one chemistry scatter by a factor of three either way; no source"
 TORTUOSITY = "convention: tortuosities scatter by a third; no source"
-SOLID_EA, SALT_EA = 20e3, 5e3
-"""J/mol, deviations of the prior: a convention, with the sources below between 12 and 81, and 12 and 21 kJ/mol."""
-ENERGIES = (
-    "graphite 30.3, NCO 80.6 kJ/mol, Ecker et al. 2015, doi:10.1149/2.0551509jes; graphite-SiOx 17.4, NMC811 12.0, "
-    "O'Regan et al. 2022, doi:10.1016/j.electacta.2022.140700; NMC811 25, O'Kane et al. 2022; all as PyBaMM has them"
-)
-KINETIC_ENERGIES = (
-    "graphite 68, NCA 50 kJ/mol, Jow, Marx & Allen 2011, ECS Trans. 33 (23) 1, abstract; graphite 53.4, NCO 43.6, "
-    "Ecker et al. 2015, as PyBaMM has them"
-)
-SALT_ENERGIES = (
-    "conductivity 17.1 kJ/mol, Ecker et al. 2015; 12 to 21 and diffusivity 15 to 21 from 0.5 to 2 mol/l, 0 to 25 degC, "
-    "Landesfeind & Gasteiger 2019; both as PyBaMM has them"
-)
 FILM_OHM_M2, FILM_SD = 3e-3, 1.2
 """A convention: three times the source, whose area is that of smooth spheres under a thin film. The 10 mohm m2 that are
 told of Ramadass et al. 2004 were not found; PyBaMM's notes on that paper speak of faults in its units and values."""
 FILMS = (
     "1 mohm m2 (5 nm of 2e5 ohm m) in PyBaMM's parameter sets, after Ramadass et al. 2004 as corrected by Safari et "
     "al. 2009"
-)
-FILM_ENERGY, FILM_ENERGY_SD = 50e3, 12e3
-"""Between the source, of a film by itself in another solvent, and what a cell's pulses want. A Panasonic NCR18650PF's
-file of its C/20, 1C discharge and a drive at 25 degC alone misses those at 10, 0 and -10 degC with 60 kJ/mol by 25, 56
-and 111 mV, with 50 by 18, 33 and 57, with 40 by 14, 20 and 34; its file over temperatures, fitted to them, is off its
-impedance at 10 degC from 0.95 to 0.2 of charge by 11 to 15 % with 50 and by 14 to 17 % with 40."""
-FILM_ENERGIES = (
-    "0.61 to 0.66 eV (59 to 64 kJ/mol) of the film on graphite, J. Power Sources 153 (2006) 391, "
-    "doi:10.1016/j.jpowsour.2005.05.034, abstract; 38 and 57 fitted to a cell's pulses"
 )
 FILM_COURSES = "convention: a factor of seven either way; no source"
 COURSES = "factors of 59 and 11 over the windows of graphite and NCO, Ecker et al. 2015, as PyBaMM has them"
@@ -183,17 +157,10 @@ def free_parameters(
     if measured and k is not None and cell.winding_resistance_k_w:
         out.append(Free("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
     if span_k > SPAN_K:
-        n, p, e = cell.negative, cell.positive, cell.electrolyte
         out += [
-            Free("negative.diffusivity_energy", n.diffusivity_ea_j_mol, SOLID_EA, "J/mol", ENERGIES, low=0.0),
-            Free("positive.diffusivity_energy", p.diffusivity_ea_j_mol, SOLID_EA, "J/mol", ENERGIES, low=0.0),
-            Free("negative.rate_energy", RATE_ENERGY, RATE_ENERGY_SD, "J/mol", KINETIC_ENERGIES, low=0.0),
-            Free("positive.rate_energy", RATE_ENERGY, RATE_ENERGY_SD, "J/mol", KINETIC_ENERGIES, low=0.0),
-            Free("electrolyte.conductivity_energy", e.conductivity_ea_j_mol, SALT_EA, "J/mol", SALT_ENERGIES, low=0.0),
-            Free("electrolyte.diffusivity_energy", e.diffusivity_ea_j_mol, SALT_EA, "J/mol", SALT_ENERGIES, low=0.0),
-            Free("negative.film_energy", FILM_ENERGY, FILM_ENERGY_SD, "J/mol", FILM_ENERGIES, low=0.0),
-            Free("positive.film_energy", FILM_ENERGY, FILM_ENERGY_SD, "J/mol", FILM_ENERGIES, low=0.0),
-        ]  # fmt: skip
+            Free(f"{part}.{rate}_energy", one.mean_j_mol, one.sd_j_mol, "J/mol", one.source, low=0.0)
+            for (part, rate), one in energy_priors(cell).items()
+        ]
     return tuple(out)
 
 

@@ -19,10 +19,9 @@ from scipy.interpolate import CubicSpline
 
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell, Electrode
+from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.relations import Constant, LookupTable, Relation, Sum
 
-SPAN_K = 8.0
-"""Records have to span this many kelvins before activation energies and entropy move."""
 POSITIVE_KNOTS, NEGATIVE_KNOTS = 23, 15
 """Of the corrections of both potentials, dense where they are steep."""
 ENTROPY_KNOTS = 5

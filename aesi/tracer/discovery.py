@@ -19,6 +19,7 @@ from aesi.physics.initial_state import REST_C_RATE
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
 from aesi.tracer.case.checks import check_compared, check_record, check_same_cell
+from aesi.tracer.case.energies import ACTIVATION_ENERGIES
 from aesi.tracer.case.free_parameter import OF_ONE_RECORD, by_owner
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.case.records import PreparedRecord, prepare_all, prepare_test
@@ -204,10 +205,10 @@ def inverse_problem(
     records = prepare_all(cell, measurements, soc0, holdout, given, good)
     for record in records:
         check_record(cell, record)
-    taken = next((name for name in effects if name in OF_ONE_RECORD), None)
+    taken = next((name for name in effects if name in (*OF_ONE_RECORD, ACTIVATION_ENERGIES)), None)
     if taken is not None:
         raise DataError(
-            f"an effect cannot have the id {taken!r}, which records have their own of; give it another."
+            f"an effect cannot have the id {taken!r}, which the cell or its records have their own of; give it another."
         )
     there = {active.id for active in given} - _own(effects)
     tried = {name: effect for name, effect in effects.items() if name not in there}

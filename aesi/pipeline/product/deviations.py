@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from aesi.calibration.parameters import FILM_ENERGY_SD, RATE_ENERGY_SD, SALT_EA, SOLID_EA
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName, simulate
 from aesi.physics.balance import same_rest
+from aesi.physics.cell.energies import FILM_ENERGY_SD, RATE_ENERGY_SD, SALT_EA, SOLID_EA
 from aesi.physics.cell.relations import scaled
 from aesi.physics.effects import CATALOGUE
 from aesi.physics.simulation import model_with

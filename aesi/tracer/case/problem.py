@@ -16,6 +16,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.simulation import ModelName
 from aesi.records import Hold, Measurement, Run
+from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of, far_from_file
 from aesi.tracer.case.fit_simulation import fit_simulation
 from aesi.tracer.case.free_parameter import (
     CAPACITY_SHARE,
@@ -131,9 +132,31 @@ class InverseProblem:
                 sd = own_sd(self.trust, effect, p, self.cell.nominal_capacity_ah)
                 if sd is not None:
                     out.append(own(owner, name, p, sd))
+        out += self._open_energies(hypothesis)
         for effect_id in hypothesis:
             out += self.parameters_of(effect_id)
         return tuple(out)
+
+    def _open_energies(self, hypothesis: Sequence[str]) -> list[FreeParameter]:
+        """Of a measured cell, the activation energies that its file does not know, where a record is further from the
+        temperature that it was fitted at than records have to be to tell them, or may be by the hypothesis."""
+        if self.trust not in MEASURED_CELL:
+            return []
+        acting = (*(self.effects[name] for name in hypothesis), *(active.effect for active in self.fixed))
+        supposed = any(effect.infers == "temperature" for effect in acting)
+        if not any(far_from_file(self.cell, record.data, supposed) for record in self.records):
+            return []
+        owner = of_all_records(ACTIVATION_ENERGIES) if self.has_good else ACTIVATION_ENERGIES
+        return [
+            own(owner, name, p, p.spread.tight)
+            for name, p in self._movable[ACTIVATION_ENERGIES].parameters.items()
+            if p.spread is not None and p.spread.tight is not None
+        ]
+
+    @cached_property
+    def _movable(self) -> Mapping[str, Effect]:
+        """id -> Effect, of all that a hypothesis may move."""
+        return {**self.effects, ACTIVATION_ENERGIES: energies_of(self.cell)}
 
     def parameters_of(self, effect: str) -> list[FreeParameter]:
         """What an effect under test moves, by its id: all of its parameters, in order."""
@@ -145,8 +168,8 @@ class InverseProblem:
 
         good : of a record that is known to be good, on which no effect under test acts.
         """
-        acting = acting_on(self.effects, values, good)
-        return (*self.fixed, *(self.effects[name].activate_only(**given) for name, given in acting.items()))
+        acting = acting_on(self._movable, values, good)
+        return (*self.fixed, *(self._movable[name].activate_only(**given) for name, given in acting.items()))
 
     def predict(self, values: ValuesByOwner, only: int | None = None) -> Array | None:
         """(n,) V over the fit parts of all records, or of one; None where the model fails."""

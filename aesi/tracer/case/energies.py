@@ -1,0 +1,111 @@
+"""Activation energies that no record has told the file of a measured cell.
+
+A calibration on records of one temperature leaves them as its start file has them, so that at another one the logarithm
+of each rate is off by
+
+    dE/R (1/T_file - 1/T)        T_file mean temperature of the records that the file was fitted to
+
+with dE as far off as a calibration on records of several temperatures expects them to be: nought at T_file, a factor of
+four either way in a solid diffusivity at -20 degC of a file of 25 degC. A file whose records span temperatures has
+energies that were fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+
+import numpy as np
+
+from aesi.constants import ZERO_CELSIUS_K
+from aesi.parameters import Parameter, Spread
+from aesi.physics.cell import Cell
+from aesi.physics.cell.energies import SPAN_K, energy_priors
+from aesi.physics.cell.relations import scaled
+from aesi.physics.effect import Effect
+from aesi.physics.espm.plain import rate_factor
+from aesi.physics.model import EspmModel
+from aesi.records import Measurement
+from aesi.tracer.case.free_parameter import FURTHEST_SDS
+
+ACTIVATION_ENERGIES = "activation_energies"
+"""Id of the effect that moves them, which no hypothesis can name: it restates what the file declares."""
+
+
+def fitted_kelvin(cell: Cell) -> float | None:
+    """The temperature of a file that was fitted at one, K; None where its records span more, or it tells of none."""
+    kelvin = [mean_k for _, mean_k in cell.fitted_at_k]
+    return float(np.mean(kelvin)) if kelvin and max(kelvin) - min(kelvin) <= SPAN_K else None
+
+
+def far_from_file(cell: Cell, data: Measurement, supposed: bool) -> bool:
+    """Is a record further from the one temperature that the file was fitted at than records have to be to tell
+    energies?
+
+    supposed : whether an effect says what temperature it had, where that was not measured.
+    """
+    fitted_k = fitted_kelvin(cell)
+    if fitted_k is None:
+        return False
+    if data.temperature_degc is None:
+        return supposed or abs(cell.initial_temperature_k - fitted_k) > SPAN_K
+    return bool(abs(np.mean(data.temperature_degc) + ZERO_CELSIUS_K - fitted_k) > SPAN_K)
+
+
+def energies_of(cell: Cell) -> Effect:
+    """The effect that gives the rates of a file that was fitted at one temperature other activation energies, its rates
+    there as they are; not those that do not change with temperature by the file.
+
+    The spread of each is the root mean square of what the file's is off by, if what is known of it is right.
+    """
+    parameters, declared = {}, {}
+    for (part, rate), known in energy_priors(cell).items():
+        name, energy = f"{part}_{rate}", float(getattr(getattr(cell, part), f"{rate}_ea_j_mol"))
+        declared[name] = energy
+        if energy > 0.0:
+            off = float(np.hypot(known.sd_j_mol, energy - known.mean_j_mol))
+            most = max(energy, known.mean_j_mol + FURTHEST_SDS * known.sd_j_mol)
+            spread = Spread(off, off, known.source)
+            parameters[name] = Parameter(
+                energy, "J/mol", (0.0, most), known.source, neutral=energy, spread=spread
+            )
+    acting = partial(
+        with_energies, declared=declared, held_at_k=fitted_kelvin(cell) or cell.reference_temperature_k
+    )
+    return Effect(ACTIVATION_ENERGIES, "parameter", __doc__, parameters, on_model=acting)
+
+
+def with_energies(
+    model: EspmModel, *, declared: Mapping[str, float], held_at_k: float, **energies: float
+) -> EspmModel:
+    """The model with other activation energies, J/mol, its rates at `held_at_k` as they were.
+
+    declared : of all rates.
+    """
+    cell, there = model.cell, {**declared, **energies}
+
+    def as_it_was(name: str) -> float:
+        """Factor of a rate at the reference temperature."""
+        return rate_factor(declared[name] - there[name], held_at_k, cell.reference_temperature_k)
+
+    e = cell.electrolyte
+    cell = cell.with_electrolyte(
+        diffusivity=scaled(e.diffusivity, as_it_was("electrolyte_diffusivity")),
+        diffusivity_ea_j_mol=there["electrolyte_diffusivity"],
+        conductivity=scaled(e.conductivity, as_it_was("electrolyte_conductivity")),
+        conductivity_ea_j_mol=there["electrolyte_conductivity"],
+    )
+    for side, electrode, with_side in (
+        ("negative", cell.negative, Cell.with_negative),
+        ("positive", cell.positive, Cell.with_positive),
+    ):
+        cell = with_side(
+            cell,
+            diffusivity=scaled(electrode.diffusivity, as_it_was(f"{side}_diffusivity")),
+            diffusivity_ea_j_mol=there[f"{side}_diffusivity"],
+            rate_constant=electrode.rate_constant * as_it_was(f"{side}_rate"),
+            rate_ea_j_mol=there[f"{side}_rate"],
+            film_ohm_m2=scaled(electrode.film_ohm_m2, 1.0 / as_it_was(f"{side}_film")),
+            film_ea_j_mol=there[f"{side}_film"],
+        )
+    return model.of(cell)
