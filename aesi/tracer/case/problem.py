@@ -79,7 +79,8 @@ class InverseProblem:
     fixed : effects in every simulation.  model : that every hypothesis uses.
     approximated_v : RMS, V, by which approximations of that model that were let stand move the voltage: no effect is
     named for less.  reduced_v : RMS, V, by which the other model of the cell differs where it may be asked, too: what
-    is left may be that.  ages : whether the records say that they are of several ages.
+    is left may be that.  ages : whether the records say that they are of several ages.  energies : whether activation
+    energies that no record told the file of a measured cell are open.
     """
 
     cell: Cell
@@ -91,6 +92,7 @@ class InverseProblem:
     approximated_v: float = 0.0
     reduced_v: float = 0.0
     ages: bool = False
+    energies: bool = True
 
     @property
     def coarse(self) -> bool:
@@ -140,7 +142,7 @@ class InverseProblem:
     def _open_energies(self, hypothesis: Sequence[str]) -> list[FreeParameter]:
         """Of a measured cell, the activation energies that its file does not know, where a record is further from the
         temperature that it was fitted at than records have to be to tell them, or may be by the hypothesis."""
-        if self.trust not in MEASURED_CELL:
+        if not self.energies or self.trust not in MEASURED_CELL:
             return []
         acting = (*(self.effects[name] for name in hypothesis), *(active.effect for active in self.fixed))
         supposed = any(effect.infers == "temperature" for effect in acting)

@@ -69,7 +69,8 @@ class Archive:
 def fit_name(problem: InverseProblem, kind: str, hypothesis: Sequence[str]) -> str:
     """Of a fit in the archive: its kind, what is believed of the own parameters and records, its effects in order."""
     ages = ", several ages" if problem.several_ages else ""
-    return f"{kind} {problem.trust}{ages}: {'+'.join(hypothesis)}"
+    energies = "" if problem.energies else ", energies as declared"
+    return f"{kind} {problem.trust}{ages}{energies}: {'+'.join(hypothesis)}"
 
 
 def context_of(problem: InverseProblem) -> str:

@@ -13,6 +13,7 @@ from aesi.physics.model import activation_energies
 from aesi.tracer.case.energies import ACTIVATION_ENERGIES, energies_of
 from aesi.tracer.case.free_parameter import of_all_records
 from aesi.tracer.case.trust import MEASURED_CELL
+from aesi.tracer.decide.evidence import named_options
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.report.own_parameters import own_parameters
@@ -106,6 +107,18 @@ def test_a_cold_cell_with_slower_kinetics_than_its_file_expects_gets_no_name(cel
     rows = {row.name: row for row in own_parameters(ModelState.of(unknown.problem, unknown.base))}
     assert rows["negative_rate"].declared == pytest.approx(cell.negative.rate_ea_j_mol)
     assert rows["negative_rate"].deviations > 0.5
+
+
+def test_what_is_written_of_a_temperature_may_have_the_energies_that_the_file_declares(fitted, recorded):
+    untold = replace(recorded(fitted, COLD_DEGC), temperature_degc=None)
+    problem, archive = inverse_problem(fitted, [untold], SOC0, 0.0, TRIED), Archive(None, "")
+    measured = searched(replace(problem, trust="measured"), 1, archive)
+    assert measured.chosen.hypothesis == ("ambient_temperature",)
+    tight = searched(problem, 0, archive)
+    options = named_options(measured, tight, tight.blocks, archive)
+    assert [one.state.problem.energies for one in options] == [True, False, True]
+    moved = [ACTIVATION_ENERGIES in one.state.values for one in options]
+    assert moved == [True, False, False]  # at the wider trusts they are as declared
 
 
 def test_an_effect_of_ones_own_cannot_take_their_name(cell, make):
