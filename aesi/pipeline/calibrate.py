@@ -24,7 +24,7 @@ from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Cell
 from aesi.physics.simulation import MODEL_WORDS
-from aesi.pipeline.distinct import check_distinct
+from aesi.pipeline.distinct import check_distinct, check_distinct_spectra
 from aesi.pipeline.impedance import SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
@@ -58,8 +58,10 @@ class Request:
 
 
 def check_request(cell: Path, request: Request) -> None:
-    """Raises CellError or InputError, one sentence, for what is asked of a fit and needs no record to be refused."""
+    """Raises CellError, DataError or InputError, one sentence, for what is asked of a fit and needs no record to be
+    refused."""
     check_posterior(request.posterior)
+    check_distinct_spectra(request.conditions.spectra, request.impedance)
     check_names(declared_model(cell).cell, request.conditions.priors)
 
 
@@ -74,6 +76,7 @@ def calibrate_files(
     conditions = asked.conditions
     check_records(measurements, conditions.temperatures_degc)
     check_posterior(asked.posterior)
+    check_distinct_spectra(conditions.spectra, asked.impedance)
     given = declared_model(cell)
     declared, model = given.cell, conditions.physics or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
