@@ -196,6 +196,11 @@ def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(vie
     content = view.discovery | {"after": view.discovery["before"], "written": []}
     assert list(discoveries.states_of(content)) == ["before", "recalibrated"]
     assert discoveries.unchanged_finding(content).startswith("The model that is written is the declared one")
+    refused = content | {"not_adopted": "the recalibrated model: these data cannot bear it out"}
+    assert discoveries.unchanged_finding(refused) == (
+        "The model that is written is the declared one, unchanged. Not adopted: the recalibrated model: these data "
+        "cannot bear it out."
+    )
     assert "the declared model, which is what is written, does worse" in discoveries.short_finding(content)
     text = write_discovery_report(tmp_path / "r.html", replace(view, discovery=content)).read_text()
     assert "as written" not in text
