@@ -21,6 +21,9 @@ SALT, NO_SOLUTION = 3, 4
 DRY_SHARE = 0.02
 """Of the rest concentration at a collector: no reaction can be found because there is no salt for one."""
 
+RUN_ON = ', or let it run on: aesi simulate --run-on, in Python on_depletion="clip".'
+"""How a sentence ends."""
+
 
 def sentence(
     model: EspmModel, time_s: Array, current_a: Array, kelvin: float, rows: Array, at: int, what: int
@@ -41,7 +44,7 @@ def sentence(
         )
     else:
         told = _surface_left(model, kelvin, amperes, rows[:, at], what, where)
-    return f'{head}{told}, or let it run on: aesi simulate --run-on, in Python on_depletion="clip".'
+    return f"{head}{told}{RUN_ON}"
 
 
 def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
