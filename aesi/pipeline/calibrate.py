@@ -20,6 +20,7 @@ from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
+from aesi.over_time import stamp
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Cell
@@ -152,7 +153,7 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
         span_s = float(record.time_s[-1] - record.time_s[0])
         if span_s < SHORTEST_S:
             raise DataError(
-                f"{record.name} lasts {span_s:.3g} s, in which neither diffusion nor the slope of the open-circuit "
+                f"{record.name} lasts {stamp(span_s)} s, in which neither diffusion nor the slope of the open-circuit "
                 f"voltage shows; give records of at least {SHORTEST_S:g} s."
             )
         if not record.current_a.any():
