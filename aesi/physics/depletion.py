@@ -21,6 +21,9 @@ SALT, NO_SOLUTION = 3, 4
 DRY_SHARE = 0.02
 """Of the rest concentration at a collector: no reaction can be found because there is no salt for one."""
 
+RUN_ON = ', or let it run on: aesi simulate --run-on, in Python on_depletion="clip".'
+"""How a sentence ends."""
+
 
 def sentence(
     model: EspmModel, time_s: Array, current_a: Array, kelvin: float, rows: Array, at: int, what: int
@@ -28,9 +31,11 @@ def sentence(
     """rows : of `run_plain`.  at : the first faulty row.  what : 1 or 2, an electrode's surface; 3, the salt;
     4, no reaction carries the current."""
     cell = model.cell
-    head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at)}"
+    way_there = current_a[max(at - 1, 0) : at + 1]
+    asked_a = float(way_there[np.argmax(np.abs(way_there))])
+    head = f"{cell.name}: {_cut_off(model, time_s, rows[0], at, charging=asked_a < 0.0)}"
     where = f"at {stamp(time_s[at])} s"  # of a row the file may know nothing: models run on rows of their own
-    amperes = float(np.max(np.abs(current_a[max(at - 1, 0) : at + 1])))  # on the way there
+    amperes = abs(asked_a)
     driest = float(np.min(rows[3:5, at])) / cell.electrolyte.c0_mol_m3
     if what == SALT or (what == NO_SOLUTION and driest < DRY_SHARE):
         told = _no_salt(model, kelvin, amperes, where)
@@ -41,7 +46,7 @@ def sentence(
         )
     else:
         told = _surface_left(model, kelvin, amperes, rows[:, at], what, where)
-    return f'{head}{told}, or let it run on: aesi simulate --run-on, in Python on_depletion="clip".'
+    return f"{head}{told}{RUN_ON}"
 
 
 def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
@@ -120,14 +125,14 @@ def carried_a(model: EspmModel, kelvin: float) -> float:
     return e.c0_mol_m3 / max(abs(m) for m in means)
 
 
-def _cut_off(model: EspmModel, time_s: Array, voltage_v: Array, at: int) -> str:
-    """Where a cut-off voltage was passed before the fault: a cell is taken off there."""
-    cell = model.cell
-    low, high = voltage_v[: at + 1] < cell.lower_voltage_v, voltage_v[: at + 1] > cell.upper_voltage_v
-    for passed, name, limit in ((low, "lower", cell.lower_voltage_v), (high, "upper", cell.upper_voltage_v)):
-        if passed.any():
-            row = int(np.argmax(passed))
-            words = f"the voltage passed the {name} cut-off ({limit:g} V) at {stamp(time_s[row])} s "
-            words += "and the record goes on; "
-            return words
-    return ""
+def _cut_off(model: EspmModel, time_s: Array, voltage_v: Array, at: int, charging: bool) -> str:
+    """Where the cut-off voltage of a charge, or of a discharge, was passed before the fault: a cell is taken off there.
+
+    charging : whether a charge ends at the fault."""
+    cell, seen = model.cell, voltage_v[: at + 1]
+    name, limit = ("upper", cell.upper_voltage_v) if charging else ("lower", cell.lower_voltage_v)
+    passed = seen > limit if charging else seen < limit
+    if not passed.any():
+        return ""
+    when = stamp(time_s[int(np.argmax(passed))])
+    return f"the voltage passed the {name} cut-off ({limit:g} V) at {when} s and the record goes on; "

@@ -20,11 +20,12 @@ from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
 from aesi.numerics.files.whole import write_whole
+from aesi.over_time import stamp
 from aesi.physics.arguments import check_temperature
 from aesi.physics.belongs import check_measured
 from aesi.physics.cell import Cell
 from aesi.physics.simulation import MODEL_WORDS
-from aesi.pipeline.distinct import check_distinct
+from aesi.pipeline.distinct import check_distinct, check_distinct_spectra
 from aesi.pipeline.impedance import SpectrumError, held_against
 from aesi.pipeline.notes import together
 from aesi.pipeline.product.declared import declared_model
@@ -58,8 +59,10 @@ class Request:
 
 
 def check_request(cell: Path, request: Request) -> None:
-    """Raises CellError or InputError, one sentence, for what is asked of a fit and needs no record to be refused."""
+    """Raises CellError, DataError or InputError, one sentence, for what is asked of a fit and needs no record to be
+    refused."""
     check_posterior(request.posterior)
+    check_distinct_spectra(request.conditions.spectra, request.impedance)
     check_names(declared_model(cell).cell, request.conditions.priors)
 
 
@@ -74,6 +77,7 @@ def calibrate_files(
     conditions = asked.conditions
     check_records(measurements, conditions.temperatures_degc)
     check_posterior(asked.posterior)
+    check_distinct_spectra(conditions.spectra, asked.impedance)
     given = declared_model(cell)
     declared, model = given.cell, conditions.physics or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
@@ -149,7 +153,7 @@ def check_records(measurements: Sequence[Measurement], temperatures_degc: Mappin
         span_s = float(record.time_s[-1] - record.time_s[0])
         if span_s < SHORTEST_S:
             raise DataError(
-                f"{record.name} lasts {span_s:.3g} s, in which neither diffusion nor the slope of the open-circuit "
+                f"{record.name} lasts {stamp(span_s)} s, in which neither diffusion nor the slope of the open-circuit "
                 f"voltage shows; give records of at least {SHORTEST_S:g} s."
             )
         if not record.current_a.any():

@@ -5,7 +5,34 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from aesi.errors import DataError
-from aesi.records import Measurement
+from aesi.records import Measurement, Spectrum
+
+
+def check_distinct_spectra(fitted: Sequence[Spectrum], witnesses: Sequence[Spectrum] = ()) -> None:
+    """Raises DataError, one sentence, for two spectra of the same frequencies and impedance.
+
+    fitted : what a fit takes in.  witnesses : what its result is held against.
+    """
+    seen: dict[str, str] = {}
+    for spectrum in fitted:
+        if spectrum.digest in seen:
+            raise DataError(
+                f"{_both(seen[spectrum.digest], spectrum.name)} among the spectra to fit; give it once."
+            )
+        seen[spectrum.digest] = spectrum.name
+    shown: dict[str, str] = {}
+    for spectrum in witnesses:
+        if spectrum.digest in seen:
+            raise DataError(
+                f"{_both(seen[spectrum.digest], spectrum.name)} among the spectra to fit and those to hold the result "
+                "against; what is fitted is held against it anyway and judges nothing: give it once."
+            )
+        if spectrum.digest in shown:
+            raise DataError(
+                f"{_both(shown[spectrum.digest], spectrum.name)} among the spectra to hold the result against; give it "
+                "once."
+            )
+        shown[spectrum.digest] = spectrum.name
 
 
 def check_distinct(fitted: Sequence[Measurement], tests: Sequence[Measurement] = ()) -> None:

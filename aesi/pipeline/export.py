@@ -23,7 +23,7 @@ SUFFIX = {"bpx": ".json", "pybamm": ".py"}
 
 @dataclass(frozen=True)
 class Exported:
-    """files : what was written.  held, left : sentences on what is in them, and on what they cannot hold."""
+    """files : what was written.  held, left : sentences on what is in them, and on what others do not get."""
 
     files: tuple[Path, ...]
     held: tuple[str, ...]
@@ -71,8 +71,8 @@ def export(model: Path, out: Path, to: Target = "bpx") -> Exported:
         left += _beyond_bpx(found.cell)
         if found.cell.contact_resistance_ohm:
             left.append(
-                f"{found.cell.contact_resistance_ohm:.4g} ohm of contacts: in the section User-defined, which other "
-                "tools do not read; --to pybamm hands it over."
+                f"{found.cell.contact_resistance_ohm:.4g} ohm of contacts: in the section User-defined, which they do "
+                "not read; --to pybamm hands it over."
             )
         return Exported((_write(bpx, _bpx(found.cell)),), tuple(held), tuple(left))
     left += _beyond_bpx(found.cell)
@@ -103,9 +103,7 @@ def _beyond_bpx(cell: Cell) -> list[str]:
         "double layers": any(x.double_layer_f_m2 for x in both),
     }
     return [
-        f"{name}: in the section User-defined, which other tools do not read."
-        for name, has in own.items()
-        if has
+        f"{name}: in the section User-defined, which they do not read." for name, has in own.items() if has
     ]
 
 

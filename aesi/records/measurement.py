@@ -192,6 +192,11 @@ class Spectrum:
     voltage_v: float | None = None
     temperature_degc: float | None = None
 
+    @property
+    def digest(self) -> str:
+        """Content hash of frequencies and impedance."""
+        return digest(self.frequency_hz, self.z_ohm.real, self.z_ohm.imag)
+
     def __repr__(self) -> str:
         low, high = float(self.frequency_hz.min()), float(self.frequency_hz.max())
         return f"Spectrum({self.name!r}, {len(self.frequency_hz)} points, {low:.3g} to {high:.3g} Hz)"

@@ -94,6 +94,7 @@ class Discovery:
     declared and after show.
     effects : by id, all that may be tried or moved.  tried : ids of those that competed, none where none may be added.
     experiments : (group of look-alikes, what would tell them apart).  choice : of the model of the cell.
+    not_adopted : why the written model has not what the verdict names, or is the declared one where a refit errs less.
     notes : what was assumed, and what a reader should know of the records and the search.
     contradicted : whether what explains the data leaves more of the test part than a right explanation may.
     warnings : that, where the written model does worse on the test part than another one, or on what was fitted than
@@ -114,6 +115,7 @@ class Discovery:
     effects: Mapping[str, Effect]
     experiments: tuple[tuple[tuple[str, ...], str], ...]
     choice: ModelChoice
+    not_adopted: str | None = None
     notes: tuple[str, ...] = ()
     contradicted: bool = False
     warnings: tuple[str, ...] = ()
@@ -275,6 +277,7 @@ def _told(
         effects=problem.effects,
         experiments=tuple((g, telling_experiment(g, problem.effects)) for g in verdict.groups),
         choice=choice,
+        not_adopted=evidence.fault,
         notes=(choice.sentence, *_notes(evidence, tested, left), *emptied(files)),
         contradicted=contradicted_by_v(files, verdict) is not None,
         warnings=warnings(files, verdict, REST_C_RATE * problem.cell.capacity_ah),
@@ -300,7 +303,9 @@ def _notes(evidence: Evidence, tested: Sequence[PreparedRecord], left: ResidualS
     notes += [ages] if ages else []
     if left.yardstick.explained_v is None:
         notes.append(NO_YARDSTICK)
-    if evidence.fault is not None:
+    if (
+        evidence.fault is not None and evidence.after.values is not None
+    ):  # else it is said with what is written
         notes.append(f"not adopted: {evidence.fault}.")
     return tuple(dict.fromkeys(notes))
 

@@ -305,6 +305,6 @@ def export(
     for sentence in done.held:
         typer.echo(sentence, err=True)
     for sentence in done.left:
-        typer.echo(f"Not in it: {sentence}", err=True)
+        typer.echo(f"Lost to other tools: {sentence}", err=True)
     for file in done.files:
         typer.echo(str(file))

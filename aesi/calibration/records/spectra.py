@@ -24,6 +24,10 @@ SPECTRUM_SHARE = 0.1
 fitted beside its C/20, its pulses and a 1C discharge, are left with 6 to 20 %, 10.7 % in all; its 13 at 10 degC, which
 were not, with 13.4 % instead of 15.7, and five of its drives with 1.0 mV less to 0.4 mV more than without them."""
 
+MOST_CAPACITIES = 10.0
+"""How many capacities of a cell may have been discharged of it. A convention: a record scales a start file to a cell of
+another size, and what is in mAh is a thousand times too much."""
+
 
 def state_of(cell: Cell, spectrum: Spectrum) -> float:
     """State of charge of a spectrum.  Raises DataError where it gives none."""
@@ -65,7 +69,7 @@ def usable(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...
 def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
     """Raises DataError, before anything is fitted, for spectra that are no such cell's, and where none could be used.
 
-    cell : whose capacity may be off by what a fit moves it, so that a state in Ah is not judged by it.
+    cell : whose capacity may be off by what a fit moves it, so that a state in Ah is judged by `MOST_CAPACITIES` alone.
     A spectrum in milliohm is told as a current in mA is, by capacity times resistance: that of its smallest |Z|.
     """
     for spectrum in spectra:
@@ -74,6 +78,14 @@ def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
             raise DataError(
                 f"{spectrum.name}: |Z| is {least_ohm:.3g} ohm and more, as of no cell of "
                 f"{cell.nominal_capacity_ah:.3g} A.h; z_real_ohm and z_imag_ohm are in ohm, so that 30 mOhm is 0.03."
+            )
+        if (
+            spectrum.soc is None
+            and abs(spectrum.discharged_ah or 0.0) > MOST_CAPACITIES * cell.nominal_capacity_ah
+        ):
+            raise DataError(
+                f"{spectrum.name}: {spectrum.discharged_ah:.4g} A.h were discharged of a cell of "
+                f"{cell.nominal_capacity_ah:.3g} A.h; discharged_ah is in A.h, so that 500 mA.h are 0.5."
             )
     beyond = [s for s in spectra if s.soc is not None and not 0.0 <= s.soc <= 1.0]
     if spectra and len(beyond) == len(spectra):

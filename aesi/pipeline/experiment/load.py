@@ -12,10 +12,11 @@ from pathlib import Path
 
 from aesi.data.resample import to_even
 from aesi.data.virtual import DEFAULT_MIX
-from aesi.errors import ConfigError, DataAway, DataError, InputError
+from aesi.errors import ConfigError, DataAway, DataError, InputError, SimulationError
 from aesi.numerics.files.contents import contents
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_measured
+from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import activated
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.drives import by_role, cut_short, training_drives
@@ -137,7 +138,7 @@ def _load(config: ExperimentConfig) -> Loaded:
         series[name] = physics.with_slopes(series[name], record.measurement, record.soc0, hold)
     for name in empty:
         if name not in sources.roles["test"]:
-            _refuse(physics, records[name], hold)
+            _refuse(physics, name, records[name], hold)
         notes.append(
             f"{name} runs empty in the model; its stoichiometries were held at the edge from there on."
         )
@@ -194,19 +195,25 @@ def _on_grid(
     return records, notes
 
 
-def _refuse(physics: PhysicsModels, record: FitRecord, hold: Hold) -> None:
-    """Raise what a simulation that may not run empty says."""
+def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) -> None:
+    """Raise what a simulation that may not run empty says, with the record and what an experiment can do about it."""
     chosen, data = physics.chosen, record.measurement
-    simulate(
-        chosen.cell,
-        data.time_s,
-        data.current_a,
-        chosen.soc0(record.soc0),
-        chosen.effects,
-        data.temperature_degc,
-        hold,
-        model=chosen.model,
-    )
+    try:
+        simulate(
+            chosen.cell,
+            data.time_s,
+            data.current_a,
+            chosen.soc0(record.soc0),
+            chosen.effects,
+            data.temperature_degc,
+            hold,
+            model=chosen.model,
+        )
+    except SimulationError as error:
+        raise SimulationError(
+            f"{Path(name).name}: {str(error).removesuffix(RUN_ON)}, or end the file before that, or give it as a test, "
+            "where stoichiometries are held at the edge from there on."
+        ) from error
 
 
 def _effects(config: ExperimentConfig) -> tuple[ActiveEffect, ...]:

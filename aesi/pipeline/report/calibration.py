@@ -15,6 +15,7 @@ from aesi.pipeline.report.nyquist import nyquist_figures
 from aesi.pipeline.report.page import write_page
 from aesi.pipeline.report.plots import maps, records
 from aesi.pipeline.report.views import DiscoveryTrace, Row
+from aesi.pipeline.report.words.calibrations import best_known_first
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -52,10 +53,7 @@ class CalibrationView:
 
 def write_calibration_report(path: str | Path, view: CalibrationView) -> Path:
     """Write the page of a calibration to `path` and return it."""
-    parameters = sorted(
-        ({"name": name, **row} for name, row in view.content["parameters"].items()),
-        key=lambda row: 1.0 if row["of_prior"] is None else row["of_prior"],
-    )
+    parameters = best_known_first(view.content)
     nyquist = nyquist_figures(view.spectra)
     return write_page(
         path,

@@ -149,7 +149,7 @@ def _harmed(runs: Sequence[ComparedRun]) -> str:
     if not worse:
         return ""
     who = "All" if worse == len(known) else f"{worse} of {len(known)}"
-    where = "" if _judged_alike(runs) else f" on {'its' if worse == 1 else 'their'} own"
+    where = "" if _judged_alike(runs) else f" on {'its' if worse == 1 else 'their'} own test records"
     return f"{who} err{'s' if worse == 1 else ''} by more than the declared model alone{where}."
 
 
@@ -288,7 +288,8 @@ def _terms(runs: Sequence[ComparedRun]) -> PageTable | None:
     if not differing:
         return PageTable("terms", "Terms", f"All {len(having)} runs hold the same {shared} terms.", (), ())
     caption = (
-        f"Coefficients of the terms that not all runs hold; the other {shared} are in all {len(having)} runs."
+        f"Coefficients, on scaled variables, of the terms that not all runs hold; the other {shared} are in all "
+        f"{len(having)} runs."
     )
     if len(having) > MOST_COLUMNS:
         counted = tuple(

@@ -23,7 +23,7 @@ from aesi.tracer.decide.verdict import (
     tolerance_v,
     unexplained_v,
 )
-from aesi.tracer.decide.written import Option, carries_best, limits_of, stand_ins, written
+from aesi.tracer.decide.written import Option, carries_best, limits_of, refused, stand_ins, written
 from aesi.tracer.likelihood.model_state import ModelState
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import base_of
@@ -46,7 +46,8 @@ MOST_EFFECTS: dict[Trust, int] = {"measured": MEASURED_EFFECTS, "loose": STAND_I
 class Evidence:
     """path : the search that the verdict is about.  paths : all of them, by trust.  recalibrated : the declared model
     with all of its own parameters open.  after : the model that is written.  fault : why the chosen hypothesis was not
-    adopted, where it was not.  limits : where the written model stops short of the declared one."""
+    adopted, or the recalibrated model where the declared one is written.  limits : where the written model stops short
+    of the declared one."""
 
     path: Path
     paths: dict[Trust, Path]
@@ -166,7 +167,10 @@ def _unexplained(problem: InverseProblem, path: Path, verdict: Verdict, searches
     if measured.chosen.hypothesis:
         path, verdict = measured, partly(measured, verdict, searches.thresholds)
         named = named_options(lasting, tight, blocks, archive)
-    after, why = written(Option.of(problem, blocks, None), options, named)
+    declared = Option.of(problem, blocks, None)
+    after, why = written(declared, options, named)
+    if after is declared.state and recalibrations:
+        why = "; ".join(filter(None, (refused(carries_best(recalibrations), declared), why))) or None
     limits = (*stand_ins(after, verdict.effects), *limits_of(after)) if after.hypothesis else ()
     recalibrated = _recalibrated(problem, recalibrations)
     return Evidence(path, searches.paths, recalibrated, after, with_confidence(verdict), why, limits)
@@ -324,5 +328,6 @@ def _adopted(
     chosen = ModelState.of(path.problem, path.chosen)
     fault = range_fault(chosen, ORDINARY_C)
     if fault is not None:
-        return Evidence(path, paths, recalibrated, ModelState(path.problem), verdict, fault)
+        names = " + ".join(path.chosen.hypothesis) or "the recalibrated model"
+        return Evidence(path, paths, recalibrated, ModelState(path.problem), verdict, f"{names}: {fault}")
     return Evidence(path, paths, recalibrated, chosen, verdict, None, limits_of(chosen))

@@ -102,7 +102,14 @@ def written(
         return best.state, None
     names = " + ".join(named[0].state.hypothesis)
     fault = faults[0] if not sound else None
-    return best.state, f"{names}: {fault or LESS_ELSEWHERE}; {_instead(best, declared)}"
+    why = f"{names}: {fault or LESS_ELSEWHERE}"
+    return best.state, why if best is declared else f"{why}; {_instead(best, declared)}"
+
+
+def refused(recalibrated: Option, declared: Option) -> str | None:
+    """Why a recalibrated model may not be written, None where nothing speaks against it."""
+    fault = _fault(recalibrated, declared, (*ORDINARY_C, *FAST_C))
+    return None if fault is None else f"the recalibrated model: {fault}"
 
 
 def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
@@ -129,8 +136,6 @@ def _fault(one: Option, declared: Option, rates_c: Sequence[float]) -> str | Non
 
 
 def _instead(taken: Option, declared: Option) -> str:
-    if taken is declared:
-        return "the declared model stays"
     left_mv, before_mv = 1e3 * taken.left_out.pooled_v, 1e3 * declared.left_out.pooled_v
     names = " + ".join(taken.state.hypothesis)
     beside = f" with {names}" if names else ""

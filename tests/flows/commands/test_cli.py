@@ -153,6 +153,13 @@ def test_the_file_beside_an_export_is_never_the_one_that_is_read(call, cell, tmp
     assert not (tmp_path / "mine.py").exists()
 
 
+def test_what_a_file_holds_in_its_own_section_was_said_not_to_be_in_it(call, tmp_path):
+    cell = Path(LG_M50).with_name("panasonic_ncr18650pf.bpx.json")
+    code, _, err = call("export", "--cell", cell, "--to", "bpx", "--out", tmp_path / "mine.json")
+    assert code == 0
+    assert "Lost to other tools: double layers: in the section User-defined, which they do not read." in err
+
+
 def test_the_file_beside_an_export_replaced_one_that_nobody_named(call, cell, tmp_path):
     export = ("export", "--cell", cell, "--to", "pybamm", "--out", tmp_path / "mine.py")
     mine = tmp_path / "mine.bpx.json"

@@ -85,7 +85,7 @@ def test_runs_that_were_judged_on_different_records_had_a_winner(tmp_path):
     text = heading_of(tmp_path, one, other)
     assert text == (
         "The 2 runs were not judged on the same test records, so that their errors do not compare. "
-        "1 of 2 errs by more than the declared model alone on its own."
+        "1 of 2 errs by more than the declared model alone on its own test records."
     )
     assert "On the test records of each run, which differ" in (tmp_path / "page.html").read_text()
     assert "errs least" in heading_of(tmp_path, one, replace(other, judged_on="abc"))

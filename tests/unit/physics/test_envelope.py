@@ -138,8 +138,23 @@ def test_a_current_asked_of_an_empty_cell_is_named_as_charge():
         simulate(cell, time, np.full(len(time), 5.0), 0.9)
     assert "passed the lower cut-off (2.5 V)" in str(caught.value)
     assert "soc0" in str(caught.value)
-    with pytest.raises(SimulationError, match="brings more charge than the cell can hold"):
+    with pytest.raises(SimulationError, match="brings more charge than the cell can hold") as caught:
         simulate(cell, time, np.full(len(time), -5.0), 0.9)
+    assert "passed the upper cut-off (4.2 V)" in str(caught.value)
+
+
+def test_a_pulse_of_charge_above_the_upper_cut_off_was_told_of_a_cell_that_ran_empty():
+    cell = cell_of("lg_m50_chen2020")
+    time = np.arange(0.0, 8000.0, 10.0)
+    current = np.where(time < 20.0, -10.0, 5.0)
+    assert simulate(cell, time[:3], current[:3], 0.99).voltage_v.max() > cell.upper_voltage_v
+    with pytest.raises(SimulationError, match="asks for more charge than the cell has") as caught:
+        simulate(cell, time, current, 0.99)
+    assert "passed the lower cut-off (2.5 V)" in str(caught.value)
+    cold = np.full(len(time), -20.0)
+    with pytest.raises(SimulationError, match=r"too cold|solid diffusion cannot") as caught:
+        simulate(cell, time, np.where(time < 20.0, -10.0, 10.0), 0.99, (), cold)
+    assert "upper cut-off" not in str(caught.value)
 
 
 def test_the_salt_of_a_drive_in_the_cold_stays_near_that_of_a_porous_electrode():

@@ -47,8 +47,8 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
             "health": {},
             "size_assumed": "no record tells it.",
             "parameters": {
-                "negative.rate": told | {"of_prior": 0.034},
                 "contact": told | {"of_prior": 1.001},
+                "negative.rate": told | {"of_prior": 0.034},
             },
             "impedance": [],
             "undetermined": [],
@@ -63,3 +63,4 @@ def test_a_report_says_at_what_a_record_was_taken_and_what_the_records_tell_of_e
     assert "| b | 9.5 | 2.00 |" in text
     assert "| negative.rate | 1 | 0.9 to 1.1 | factor | 3 | convention |" in text
     assert "| contact | 1 | 0.9 to 1.1 | factor | 100 | convention |" in text
+    assert text.index("| negative.rate |") < text.index("| contact |")  # the best known first, as on the page

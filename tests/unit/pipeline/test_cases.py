@@ -1,5 +1,6 @@
 """Cases of the tracer from experiment files."""
 
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
@@ -121,6 +122,10 @@ def test_a_calibration_takes_a_record_once_and_at_a_temperature_of_a_cell(tmp_pa
         calibrate_files(BPX, [record, record], tmp_path / "new.json")
     with pytest.raises(DataError, match="give records of at least 300 s"):
         calibrate_files(BPX, [record.between(0.0, 100.0)], tmp_path / "new.json")
+    five_minutes = record.between(0.0, 301.0)
+    nearly = replace(five_minutes, time_s=0.9998 * five_minutes.time_s)
+    with pytest.raises(DataError, match=r"lasts 299.94 s, .* at least 300 s"):  # said to last 300
+        calibrate_files(BPX, [nearly], tmp_path / "new.json")
     kelvin = Request(Conditions(temperatures_degc={record.name: 298.15}))
     with pytest.raises(InputError, match=f"the temperature of {record.name} = 298.15 degC is outside"):
         calibrate_files(BPX, [record], tmp_path / "new.json", kelvin)

@@ -10,6 +10,7 @@ import aesi
 from aesi.calibration.records.spectra import check_spectra
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import activated
+from aesi.pipeline.distinct import check_distinct_spectra
 from aesi.pipeline.impedance import held_against, impedance_file, read_frequencies
 from aesi.records import Spectrum
 
@@ -125,3 +126,30 @@ def test_a_frequency_that_is_none_was_refused_without_its_file_and_row(tmp_path,
     path.write_text(f"frequency_hz\n{rows}")
     with pytest.raises(DataError, match=f"f.csv, {words}; give positive numbers in Hz"):
         read_frequencies(str(path))
+
+
+def test_a_charge_in_milliamp_hours_left_all_spectra_out_but_the_first(cell):
+    full, half = spectrum(cell, discharged_ah=0.0), spectrum(cell, discharged_ah=2.5)
+    check_spectra(cell, [full, half])
+    with pytest.raises(
+        DataError, match=r"s: 2500 A\.h were discharged of a cell of 5 A\.h; .* 500 mA\.h are 0\.5"
+    ):
+        check_spectra(cell, [full, replace(half, discharged_ah=2500.0)])
+
+
+def test_a_file_of_spectra_was_fitted_and_was_its_own_witness(cell):
+    one = spectrum(cell, soc=0.5)
+    other = replace(one, name="other", z_ohm=1.01 * one.z_ohm)
+    check_distinct_spectra([one], [other])
+    with pytest.raises(
+        DataError, match="s is there twice among the spectra to fit and those to hold the result"
+    ):
+        check_distinct_spectra([one, other], [one])
+    with pytest.raises(
+        DataError, match="s and copy hold the same rows and are both among the spectra to fit; give"
+    ):
+        check_distinct_spectra([one, replace(one, name="copy")])
+    with pytest.raises(
+        DataError, match="s is there twice among the spectra to hold the result against; give it"
+    ):
+        check_distinct_spectra([], [one, one])

@@ -55,6 +55,18 @@ def test_training_records_of_another_cell_than_the_validation_ones_are_told_of(v
     assert runs.validation_finding(view) == ""
 
 
+def test_a_refit_that_errs_more_on_its_own_records_was_laid_to_the_validation_ones(views):
+    """Of an LFP cell's drive, whose potential falls steeply near full: 66.8 mV as declared, 82.5 refitted."""
+    rows = (
+        {"name": name, "free_run": {"train_rmse_mv": train, "valid_rmse_mv": valid}}
+        for name, train, valid in (("ESPM", 66.8, 136.0), ("ESPM recalibrated", 82.5, 143.5))
+    )
+    failed = replace(views.run_view(200), models=tuple(rows), corrected="ESPM recalibrated")
+    assert runs.validation_finding(failed).startswith(
+        "On the training records themselves the ESPM recalibrated errs by 82.5 mV and the ESPM by 66.8 mV"
+    )
+
+
 def test_what_a_mere_refit_and_a_constant_leave_stands_beside_the_gain(views):
     view = views.run_view(200)
     assert runs.constant_finding(view) == ""
@@ -196,6 +208,11 @@ def test_a_declared_model_that_is_written_unchanged_was_shown_as_a_third_one(vie
     content = view.discovery | {"after": view.discovery["before"], "written": []}
     assert list(discoveries.states_of(content)) == ["before", "recalibrated"]
     assert discoveries.unchanged_finding(content).startswith("The model that is written is the declared one")
+    refused = content | {"not_adopted": "the recalibrated model: these data cannot bear it out"}
+    assert discoveries.unchanged_finding(refused) == (
+        "The model that is written is the declared one, unchanged. Not adopted: the recalibrated model: these data "
+        "cannot bear it out."
+    )
     assert "the declared model, which is what is written, does worse" in discoveries.short_finding(content)
     text = write_discovery_report(tmp_path / "r.html", replace(view, discovery=content)).read_text()
     assert "as written" not in text

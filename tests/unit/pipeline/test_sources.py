@@ -4,10 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_experiment import BPX, experiment, write_record
 
 from aesi.data.reading import Reading
-from aesi.errors import DataError
+from aesi.errors import DataError, SimulationError
 from aesi.pipeline.experiment.config import parse_experiment
+from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.sources import _record, discovery_records, sources_of, with_keys
 
 
@@ -92,3 +94,11 @@ def test_a_copy_of_a_training_record_was_taken_to_validate(tmp_path):
     config = parse_experiment({"name": "days", "data": data})
     with pytest.raises(DataError, match="day0 drive and copy hold the same rows and are both among the data"):
         sources_of(config, Path("unread.bpx.json"))
+
+
+def test_a_record_on_which_a_model_runs_empty_was_not_named_and_the_remedy_was_another_commands(tmp_path):
+    config = experiment(write_record(tmp_path), cell={"bpx": str(BPX), "soc0": 0.05, "start": "declared"})
+    with pytest.raises(
+        SimulationError, match=r"^drive.csv: .* or end the file before that, or give it as a test, "
+    ):
+        load(config)

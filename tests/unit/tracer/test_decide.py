@@ -26,7 +26,15 @@ from aesi.tracer.decide.verdict import (
     structured_v,
     unexplained_v,
 )
-from aesi.tracer.decide.written import Option, carries_best, stand_ins, worst_ratio, written
+from aesi.tracer.decide.written import (
+    UNTESTED,
+    Option,
+    carries_best,
+    refused,
+    stand_ins,
+    worst_ratio,
+    written,
+)
 from aesi.tracer.likelihood.fit import prediction_sd_v, scored
 from aesi.tracer.likelihood.growth import Parent
 from aesi.tracer.likelihood.model_error import MEASURED_V, PRIORS
@@ -223,6 +231,9 @@ def test_at_one_current_there_are_no_ranges_of_it_and_own_parameters_are_not_wri
     moved = Option.of(one, blocks, base)
     declared = replace(Option.of(one, blocks, None), left_out=LeftOut((1.0,), (1.0,)))
     assert written(declared, [moved])[0] is declared.state
+    assert refused(moved, declared) == f"the recalibrated model: {UNTESTED}"
+    named = replace(moved, state=replace(moved.state, hypothesis=("ambient_temperature",)))
+    assert written(declared, [moved], [named]) == (declared.state, f"ambient_temperature: {UNTESTED}")
 
 
 def test_data_that_order_nothing_give_look_alikes(path):

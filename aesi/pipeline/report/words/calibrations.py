@@ -70,13 +70,22 @@ def _health(content: Mapping[str, Any]) -> list[str]:
     return ["| state of health | value | 95 % interval |", "|---|---|---|", *rows, *said]
 
 
+def best_known_first(content: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """The parameters, each with its name, by the share of their priors' width that the records leave."""
+    return sorted(
+        ({"name": name, **row} for name, row in content["parameters"].items()),
+        key=lambda row: 1.0 if row["of_prior"] is None else row["of_prior"],
+    )
+
+
 def _parameters(content: Mapping[str, Any]) -> list[str]:
     rows = [
-        f"| {name} | {_with_interval(p)} | {p['unit']} | {_percent(p['of_prior'])} | {p['prior_from']} |"
-        for name, p in content["parameters"].items()
+        f"| {p['name']} | {_with_interval(p)} | {p['unit']} | {_percent(p['of_prior'])} | {p['prior_from']} |"
+        for p in best_known_first(content)
     ]
     return [
-        "Of prior: the share of the prior's width that the records leave; of 100 % they say nothing.",
+        "Of prior: the share of the prior's width that the records leave, the best known first; of 100 % they say "
+        "nothing.",
         "",
         "| parameter | value | 95 % interval | unit | of prior, % | prior from |",
         "|---|---|---|---|---|---|",

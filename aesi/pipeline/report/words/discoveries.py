@@ -119,10 +119,12 @@ def written_model(discovery: Mapping[str, Any]) -> str:
 
 
 def unchanged_finding(discovery: Mapping[str, Any]) -> str:
-    """Where all that is written is the declared model, that; '' where something came of it."""
+    """Where all that is written is the declared model, that and why; '' where something came of it."""
     if _written_as(discovery) != "before":
         return ""
     text = "The model that is written is the declared one, unchanged"
+    if (why := discovery.get("not_adopted")) is not None:
+        return f"{text}. Not adopted: {why}."
     if discovery["verdict"] == "unknown":
         return f"{text}: no fit of these data carries over well enough to take its place."
     return f"{text}."

@@ -81,19 +81,33 @@ def corrected_finding(view: RunView) -> str:
 
 
 def validation_finding(view: RunView) -> str:
-    """Where the physics refitted to the training records does worse on the validation records than as declared."""
-    errors = (
-        _figure(view.model(name), "free_run", "valid_rmse_mv") for name in (view.physics, view.corrected)
-    )
-    declared, refitted = errors
-    if declared is None or refitted is None or refitted <= declared:
+    """Where the physics refitted to the training records does worse than as declared: on these, else on the validation
+    records."""
+    if (worse := _worse_refitted(view, "train_rmse_mv")) is not None:
+        first, last = worse
+        return (
+            f"On the training records themselves the {view.corrected} errs by {last} mV and the {view.physics} by "
+            f"{first} mV: its own parameters cannot follow these records. Leave them as declared (cell.start: "
+            "declared)."
+        )
+    if (worse := _worse_refitted(view, "valid_rmse_mv")) is None:
         return ""
-    first, last = _told(declared, refitted)
+    first, last = worse
     return (
         f"On the validation records the {view.corrected} errs by {last} mV and the {view.physics} by {first} mV: "
         "what was fitted to the training records does not hold there. Are they of the same cell, at the same "
         "temperature and age?"
     )
+
+
+def _worse_refitted(view: RunView, figure: str) -> tuple[str, str] | None:
+    """The errors of the physics as declared and refitted, mV, where the latter is the larger one."""
+    declared, refitted = (
+        _figure(view.model(name), "free_run", figure) for name in (view.physics, view.corrected)
+    )
+    if declared is None or refitted is None or refitted <= declared:
+        return None
+    return _told(declared, refitted)
 
 
 def constant_finding(view: RunView) -> str:
