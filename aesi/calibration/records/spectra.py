@@ -96,19 +96,24 @@ def check_spectra(cell: Cell, spectra: Sequence[Spectrum]) -> None:
 
 
 def fitted_ones(cell: Cell, spectra: Sequence[Spectrum]) -> tuple[tuple[Spectrum, ...], tuple[str, ...]]:
-    """The spectra that a fit from this cell takes in, and sentences, as of `usable`.
+    """The spectra that a fit from this cell takes in, and sentences, as of `usable`, and on those outside the band.
 
-    Raises DataError where spectra were given and no frequency of them lies in the band.
+    Raises DataError where spectra were given and none can be fitted.
     """
     check_spectra(cell, spectra)
     kept, told = usable(cell, spectra)
     seen = tuple(spectrum for spectrum in kept if in_band(spectrum).any())
     if spectra and not seen:
         raise DataError(
-            f"no spectrum that was given to be fitted can be: none within {BAND_HZ[0]:g} to {BAND_HZ[1]:g} Hz is "
-            "between empty and full."
+            f"{spectra[0].name}: no spectrum that was given to be fitted can be; none within {BAND_HZ[0]:g} to "
+            f"{BAND_HZ[1]:g} Hz is between empty and full."
         )
-    return seen, told
+    outside = (
+        f"{spectrum.name}: not fitted, since it has no frequency from {BAND_HZ[0]:g} to {BAND_HZ[1]:g} Hz."
+        for spectrum in kept
+        if not in_band(spectrum).any()
+    )
+    return seen, (*told, *outside)
 
 
 @dataclass(frozen=True, eq=False)

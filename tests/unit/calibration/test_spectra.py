@@ -64,11 +64,12 @@ def test_more_frequencies_of_one_decade_say_no_more(start, truth, records):
 
 def test_a_spectrum_that_cannot_be_fitted_is_told(start, truth, records):
     good, empty = spectrum_of(truth, 0.5, 25.0), Spectrum("low", FREQUENCY_HZ, np.ones(13), soc=-0.1)
-    model, notes = problem(start, records[:1], Conditions(spectra=(good, empty)))
+    fast = spectrum_of(truth, 0.5, 25.0, np.array([200.0, 1000.0]))
+    model, notes = problem(start, records[:1], Conditions(spectra=(good, empty, fast)))
     assert [one.name for one in model.spectra.spectra] == [good.name]
     assert any(note.startswith("low: left out, since its state of charge of -0.1 is not") for note in notes)
-    fast = spectrum_of(truth, 0.5, 25.0, np.array([200.0, 1000.0]))
-    with pytest.raises(DataError, match="no spectrum that was given to be fitted can be: none within"):
+    assert f"{fast.name}: not fitted, since it has no frequency from 0.01 to 100 Hz." in notes
+    with pytest.raises(DataError, match="no spectrum that was given to be fitted can be; none within"):
         problem(start, records[:1], Conditions(spectra=(fast,)))
     in_milliohm = Spectrum("m", FREQUENCY_HZ, 1e3 * good.z_ohm, soc=0.5)
     with pytest.raises(DataError, match=r"m: \|Z\| is .* as of no cell of 5 A.h"):
