@@ -265,8 +265,8 @@ def named_options(path: Path, tight: Path, blocks: Blocks, archive: Archive) -> 
     On a drive of the HG2 at 0 degC without its temperature, a development record of `aesi bench real`, the two leave
     23.0 and 8.2 mV of the last part, the declared model 97.5, the own parameters alone 67.6; on one of the Panasonic at
     10 degC 8.1, 5.0, 22.9 and 7.1; on one at -10 degC 42.8 and 82.1, of which the first is written. With open energies
-    alone, of which one record foretells little elsewhere, four of eight development drives of its archive without
-    their temperature were written as declared.
+    alone, of which one record foretells little elsewhere, five of eleven development drives of its archive without
+    their temperature were written as declared that are not with the file's.
 
     blocks : by which all options are held against each other.
     """
