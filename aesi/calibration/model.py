@@ -222,13 +222,12 @@ class Model:
         """(rows,) V of each record, measured less this cell's, with what the working vector says of the record."""
         return [r.rows.voltage_v - self.run(i, cell, x)[0] for i, r in enumerate(self.records)]
 
-    def misfits(self, x: Array) -> list[Array]:
-        """(rows,) of each record: errors over what they are expected to be, large ones by their size."""
-        return [w * saturated(e) for w, e in zip(self.weights, self.errors(x), strict=True)]
-
     def residual(self, x: Array) -> Array:
-        """All misfits, of records and of spectra, and the priors."""
-        return np.concatenate([*self.misfits(x), self.spectra.misfits(self.cell_at(x)), x])
+        """Errors of all rows over what they are expected to be, large ones by their size, the misfits of spectra, and
+        the priors."""
+        cell = self.cell_at(x)
+        misfits = [w * saturated(e) for w, e in zip(self.weights, self.errors_of(cell, x), strict=True)]
+        return np.concatenate([*misfits, self.spectra.misfits(cell), x])
 
     def jacobian(self, x: Array) -> Array:
         """(rows + frequencies + n, n) slopes of `residual`: one-sided differences, and for records in closed form those

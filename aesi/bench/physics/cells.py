@@ -184,10 +184,9 @@ def archive_table(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     ]
     for cell, place in dict.fromkeys((row["cell"], chamber(row["record"])) for row in there):
         ours = [row for row in there if (row["cell"], chamber(row["record"])) == (cell, place)]
-        seen = [[row for row in ours if key not in row.get("fitted_mv", ())] for key in keys]
         figures = [
-            [row[key] for row in those if row.get(key) is not None]
-            for key, those in zip(keys, seen, strict=True)
+            [row[key] for row in ours if row.get(key) is not None and key not in row.get("fitted_mv", ())]
+            for key in keys
         ]
         told = " | ".join(f"{np.median(each):.1f} / {max(each):.1f}" if each else "" for each in figures)
         out = sum("with_temperature" in row["ran_out"] for row in ours)

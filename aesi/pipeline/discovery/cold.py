@@ -67,9 +67,8 @@ def _in_the_cold(given: HybridModel, record: Measurement, soc0: float | None) ->
     shifts = np.arange(-STEP_K, coldest - 0.5 * STEP_K, -STEP_K)
     colder_v = [_error_v(given, record, soc0, shift_k=float(shift)) for shift in shifts]
     best = int(np.argmin(colder_v))
-    if best == len(shifts) - 1 or not _allowed(
-        given, record, shifts[best]
-    ):  # at the end, colder would be better
+    at_the_end = best == len(shifts) - 1  # where colder would be better
+    if at_the_end or not _allowed(given, record, shifts[best]):
         return None
     sizes_v = [_error_v(given, record, soc0, size=float(size)) for size in SIZES]
     if min(sizes_v) <= colder_v[best]:
