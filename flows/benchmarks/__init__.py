@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from aesi.bench import BENCHMARKS as OF_THE_PACKAGE
 from aesi.errors import InputError, wanted
@@ -42,6 +42,10 @@ def missing(names: Iterable[str]) -> dict[str, str]:
     return {package: source for package, source in needed.items() if find_spec(package) is None}
 
 
+AS_WRITTEN = ConfigDict(coerce_numbers_to_str=True)
+"""A name may look like a number."""
+
+
 def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
     """Lines of one benchmark, as they come.
 
@@ -56,7 +60,7 @@ def run(name: str, **options: Any) -> Iterator[dict[str, Any]]:
             there = ", ".join(known) or "none"
             raise InputError(f"--set {option}: `aesi bench {name}` has no such option; it has: {there}.")
         try:
-            options[option] = TypeAdapter(known[option]).validate_python(value)
+            options[option] = TypeAdapter(known[option], config=AS_WRITTEN).validate_python(value)
         except ValidationError as error:
             raise InputError(f"--set {option}={value}: it {wanted(error.errors()[0])}.") from None
     _check_places({option: str(options[option]) for option in PLACES if options.get(option) is not None})

@@ -54,6 +54,11 @@ def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, 
         next(benchmarks.run(name, **options))
 
 
+def test_a_name_that_looks_like_a_number_is_a_name():
+    (summary,) = benchmarks.run("cells", only=18650)  # no set and no record is called so
+    assert summary["records"] == 0
+
+
 def test_the_options_of_every_benchmark_are_checked():
     for name in benchmarks.BENCHMARKS:
         with pytest.raises(InputError, match="has no such option"):

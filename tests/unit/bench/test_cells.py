@@ -1,10 +1,11 @@
 """The leaderboard of measured cells: a run that runs out is flagged, windows start from a given state, the table."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from aesi.bench.physics.cells import free_run, table, windows_mv
+from aesi.bench.physics.cells import free_run, held_from, table, windows_mv
 from aesi.physics import Cell, simulate
 from aesi.records import Measurement
 
@@ -39,6 +40,22 @@ def test_windows_start_from_rest_at_the_charge_that_has_passed():
     in_parts = windows_mv(CELL, data, rows=40)
     assert whole < 0.5
     assert 1.0 < in_parts < 60.0  # each has to build up its own gradients again
+
+
+def test_a_record_that_a_tester_holds_at_the_cut_off_says_from_which_row_on():
+    data = drawn(1.0)
+    assert held_from(CELL, data) is None
+    voltage = data.voltage_v.copy()
+    voltage[-60:] = CELL.lower_voltage_v + 0.003
+    assert held_from(CELL, replace(data, voltage_v=voltage)) == len(data) - 60
+    voltage[:-1] = data.voltage_v[:-1]  # a single row there is an end
+    assert held_from(CELL, replace(data, voltage_v=voltage)) is None
+
+
+def test_the_table_says_what_was_left_before_a_record_was_held():
+    row = {"cell": "c", "record": "r", "fitted": False, "declared_mv": 186.5, "held_from_s": 6841.1}
+    line = table([row | {"until_held_mv": {"declared": 19.34}}])[2]
+    assert "186.5 (19.3 until 6841 s)" in line
 
 
 def test_the_table_flags_what_ran_out_what_was_fitted_and_what_trained():
