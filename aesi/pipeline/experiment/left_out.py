@@ -61,6 +61,11 @@ class TrainingDrives:
     drives: Sequence[TrainingDrive]
     roles: Mapping[Role, Sequence[str]]
 
+    @property
+    def of_several_records(self) -> bool:
+        """Then each has a charge of its own, also where one is left out."""
+        return len({name for name, _ in self.drives}) > 1
+
     def under(self, physics: PhysicsModels) -> tuple[ErrorSeries, ...]:
         """`Split.train` under that physics."""
         records = self.records
@@ -120,6 +125,7 @@ class TrainingDrives:
             cell.start,
             fitted,
             declared.model,
+            own_charges=self.of_several_records,
         )
 
     def _slope(self, physics: PhysicsModels, piece: Piece) -> float:

@@ -126,8 +126,16 @@ def _load(config: ExperimentConfig) -> Loaded:
         notes += cut_short(cut.measurement.time_s, config.data.repeats)
     for name, rows in drives:
         records[name].rows[rows] = True
-    physics = physics_models(cell, given.effects, records, hold, config.cell.start, model=given.model)
     training = TrainingDrives(config, records, drives, sources.roles)
+    physics = physics_models(
+        cell,
+        given.effects,
+        records,
+        hold,
+        config.cell.start,
+        model=given.model,
+        own_charges=training.of_several_records,
+    )
     left_out = None
     if config.cell.start == "recalibrated" and len(drives) > 1:
         physics, left_out = training.left_out(physics)

@@ -81,14 +81,16 @@ def physics_models(
     start: str,
     begin: PhysicsModels | None = None,
     model: ModelName = "espm",
+    *,
+    own_charges: bool,
 ) -> PhysicsModels:
     """All of them, fitted to the rows that the records admit; start : "declared" or "recalibrated".
 
-    begin : fitted to nearly the same rows.
+    begin : fitted to nearly the same rows.  own_charges : see `recalibrate`.
     """
     known = {} if begin is None else begin.by_name
     fitted = {
-        name: recalibrate(cell, effects, records, hold, free, known.get(name), model)
+        name: recalibrate(cell, effects, records, hold, free, known.get(name), model, own_charges=own_charges)
         for name, free in FREE.items()
     }
     by_name = {DECLARED: PhysicsStart(cell, cell, effects, model=model), **fitted}

@@ -1,10 +1,16 @@
 """What a recalibration makes of records that differ in their charge: nothing, where they are of several days."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_experiment import BPX
 
+from aesi.numerics.metrics import rms
 from aesi.physics import Cell, simulate
+from aesi.pipeline.experiment.config import parse_experiment
+from aesi.pipeline.experiment.load import load
+from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
 from aesi.pipeline.experiment.recalibrate import FitRecord, recalibrate
 from aesi.pipeline.product.deviations import INITIAL_STATE
 from aesi.records import Measurement
@@ -32,7 +38,7 @@ def test_a_record_of_another_charge_does_not_move_the_cell():
     # Two records that hold less than the file says, and the next one as the file says.
     low = {name: discharged(name, -OFF) for name in ("one", "other")}
     fresh = discharged("next", 0.0)
-    several = recalibrate(CELL, (), low, "linear")
+    several = recalibrate(CELL, (), low, "linear", own_charges=True)
     alone = recalibrate(CELL, (), {"one": low["one"]}, "linear")
     assert max(np.abs(several.deviations)) < 0.4 * max(np.abs(alone.deviations))
     assert left_v(several, fresh) < 0.4 * left_v(alone, fresh)
@@ -46,9 +52,34 @@ def test_of_one_record_its_charge_is_fitted():
     assert declared.deviations == pytest.approx(np.zeros(len(found.deviations)))
 
 
+def test_a_record_that_no_fit_may_see_took_the_charge_of_the_training_record_from_its_fit(tmp_path):
+    names = ("train", "test")
+    for name, charge_off in zip(names, (-OFF, 0.0), strict=True):
+        discharged(name, charge_off).measurement.to_frame().to_csv(tmp_path / f"{name}.csv", index=False)
+    files = {role: [str(tmp_path / f"{role}.csv")] for role in names}
+    config = parse_experiment(
+        {
+            "name": "one",
+            "data": {"kind": "files", "dt_s": 10.0, "hold": "linear", **files},
+            "cell": {"bpx": str(BPX), "soc0": 0.5},
+        }
+    )
+    (train,) = load(config).split.train
+    left_mv, declared_mv = (1e3 * rms(train.left_by(name)) for name in (RECALIBRATED, DECLARED))
+    assert left_mv < 0.5 * declared_mv
+
+
+def test_a_model_that_misses_40_mv_followed_them_as_far_as_one_that_misses_10():
+    record = discharged("one", 0.0)
+    missed_v = 0.04 * np.sin(record.measurement.time_s / 200.0)
+    other = replace(record.measurement, voltage_v=record.measurement.voltage_v + missed_v)
+    found = recalibrate(CELL, (), {"one": replace(record, measurement=other)}, "linear")
+    assert max(np.abs(found.deviations)) < 1.0
+
+
 def test_an_initial_state_that_is_fitted_alone_is_the_charge_of_all_records():
     low = {name: discharged(name, -OFF) for name in ("one", "other")}
-    found = recalibrate(CELL, (), low, "linear", INITIAL_STATE)
+    found = recalibrate(CELL, (), low, "linear", INITIAL_STATE, own_charges=True)
     declared = recalibrate(CELL, (), {}, "linear")
     assert 0.5 - OFF < found.soc0(0.5) < 0.5 - 0.5 * OFF
     assert left_v(found, low["one"]) < 0.5 * left_v(declared, low["one"])
