@@ -150,13 +150,13 @@ def problem(
             else "a single record does not tell how the cell answers to temperature"
         )
         told = (*told, f"{apart}: activation energies and entropy stay as they are.")
-    measured = any(r.kelvin is not None for r in ready)
-    start = with_interfaces(start, measured)
+    on_case = any(r.kelvin is not None and np.ptp(r.kelvin) > 0.0 for r in ready)
+    start = with_interfaces(start, on_case)
     ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
     model = Model(
         start,
         ready,
-        with_priors(free_parameters(start, span, conditions.same_cell, measured), conditions.priors),
+        with_priors(free_parameters(start, span, conditions.same_cell, on_case), conditions.priors),
         Shapes.over(start, span),
         zero,
         ageing,

@@ -113,13 +113,12 @@ HALF_CELLS = "convention: cells of one chemistry are balanced alike within a ten
 
 
 def free_parameters(
-    cell: Cell, span_k: float, same_cell: bool = False, measured: bool = False
+    cell: Cell, span_k: float, same_cell: bool = False, on_case: bool = False
 ) -> tuple[Free, ...]:
     """What moves, for records whose temperatures span `span_k` (K).
 
     Energies are free where the records tell them; at one temperature nothing does, and they stay.
-    same_cell : the records are of the cell of the file, which may have lost lithium.  measured : there is a temperature
-    of the case.
+    same_cell : the records are of the cell of the file, which may have lost lithium.  on_case : see `with_interfaces`.
     """
     ohm = CONTACT_V / cell.nominal_capacity_ah
     most_ohm = (cell.upper_voltage_v - cell.lower_voltage_v) / cell.nominal_capacity_ah
@@ -154,7 +153,7 @@ def free_parameters(
         out.append(Free(f"{side}.double_layer", typical, LAYER_SD, "F/m2", LAYERS, True))
         out.append(Free(f"{side}.film", 1.0, FILM_SD, "factor", FILMS, True))
     k = cell.thermal_conductivity_w_m_k
-    if measured and k is not None and cell.winding_resistance_k_w:
+    if on_case and k is not None and cell.winding_resistance_k_w:
         out.append(Free("thermal.conductivity", k, CONDUCTIVITY_SD, "W/(m K)", CONDUCTIVITIES, True))
     if span_k > SPAN_K:
         out += [
@@ -178,7 +177,7 @@ def with_priors(free: Sequence[Free], priors: Mapping[str, tuple[float, float]])
 
 def check_names(cell: Cell, priors: Iterable[str]) -> None:
     """Raises InputError for a prior of what no fit of `cell` has, whatever its records."""
-    known = [one.name for one in free_parameters(with_interfaces(cell, True), np.inf, measured=True)]
+    known = [one.name for one in free_parameters(with_interfaces(cell, True), np.inf, on_case=True)]
     for name in priors:
         _check_name(name, known)
 
@@ -249,12 +248,13 @@ def course(side: str, what: str, place: int) -> str:
     return f"{side}.{what}_at_{round(100 * PLACES[place])}_percent"
 
 
-def with_interfaces(cell: Cell, measured: bool = False) -> Cell:
+def with_interfaces(cell: Cell, on_case: bool = False) -> Cell:
     """The cell with typical contacts and films where its file has none: a calibration moves them from there.
 
-    measured : there is a temperature of the case, to which heat is conducted from within.
+    on_case : a temperature was measured on the case, to which heat is conducted from within. One that never moves was
+    stated: it is a chamber's, or what the cell was taken to be at.
     """
-    if measured and cell.thermal_conductivity_w_m_k is None:
+    if on_case and cell.thermal_conductivity_w_m_k is None:
         cell = replace(cell, thermal_conductivity_w_m_k=CONDUCTIVITY_W_M_K)
     if not cell.contact_resistance_ohm:
         cell = replace(cell, contact_resistance_ohm=CONTACT_V / cell.nominal_capacity_ah)

@@ -13,7 +13,7 @@ from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.physics.cell import Soh
 from aesi.physics.simulation import MODEL_WORDS, model_with
 from aesi.pipeline.product.hybrid import HybridModel
-from aesi.records import Measurement
+from aesi.records import Measurement, at_its_temperature
 
 SEPARATOR = ": "
 TELLING_K = 5.0
@@ -39,9 +39,8 @@ def temperature_sentence(cell: Cell, record: Measurement, effects: Sequence[Acti
     inferring = [active.id for active in effects if active.effect.infers == "temperature"]
     inferred, several = " and ".join(inferring), len(inferring) > 1
     if record.temperature_degc is not None:
-        low, high = float(np.min(record.temperature_degc)), float(np.max(record.temperature_degc))
         beside = f"; {inferred} {'have' if several else 'has'} nothing to add" if inferred else ""
-        return f"{record.name}: at its measured temperature, {low:.1f} to {high:.1f} degC{beside}."
+        return f"{record.name}: {at_its_temperature(record.temperature_degc)}{beside}."
     degc = cell.initial_temperature_k - ZERO_CELSIUS_K
     beside = f" and {inferred} {'change' if several else 'changes'} it" if inferred else ""
     return (

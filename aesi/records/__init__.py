@@ -5,7 +5,15 @@ SI units and seconds; current is positive on discharge; voltage error e = V_meas
 
 from aesi.records.error_series import INPUT_NAMES, ErrorModel, ErrorSeries, FreeRun
 from aesi.records.failed import Failed
-from aesi.records.measurement import Hold, Measurement, Spectrum, assumed_hold, digest, hold_sentence
+from aesi.records.measurement import (
+    Hold,
+    Measurement,
+    Spectrum,
+    assumed_hold,
+    at_its_temperature,
+    digest,
+    hold_sentence,
+)
 from aesi.records.run import Run
 from aesi.records.split import ROLES, HeldOutDrive, LeftOutDrives, Role, Split
 
@@ -25,6 +33,7 @@ __all__ = [
     "Spectrum",
     "Split",
     "assumed_hold",
+    "at_its_temperature",
     "digest",
     "hold_sentence",
 ]

@@ -43,6 +43,14 @@ def hold_sentence(
     return f"{name}: the current is taken {words[hold]}{writer}; {option}{other} takes it otherwise."
 
 
+def at_its_temperature(temperature_degc: Array) -> str:
+    """What a record with this column (n,) is taken at, for a reader. One that never moves was stated, not measured."""
+    low, high = float(np.min(temperature_degc)), float(np.max(temperature_degc))
+    if low == high:
+        return f"at {low:.4g} degC in every row, as its column states"
+    return f"at its measured temperature, {low:.1f} to {high:.1f} degC"
+
+
 def digest(*arrays: Array | None) -> str:
     """SHA-256 of the bytes of the arrays, 16 hexadecimal digits; None counts as an empty array."""
     sha = hashlib.sha256()

@@ -18,7 +18,7 @@ from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.simulation import ModelName
-from aesi.records import Hold, Measurement, assumed_hold, hold_sentence
+from aesi.records import Hold, Measurement, assumed_hold, at_its_temperature, hold_sentence
 
 SOC_SD = 0.005
 """Least standard deviation of an initial state of charge that was read from a voltage, since the potentials that it was
@@ -149,8 +149,7 @@ def with_temperatures(
             record = replace(record, temperature_degc=np.full(len(record), float(given)))
             notes.append(f"{record.name}: at {given:g} degC, as given.")
         elif record.temperature_degc is not None:
-            low, high = float(record.temperature_degc.min()), float(record.temperature_degc.max())
-            notes.append(f"{record.name}: at its measured temperature, {low:.1f} to {high:.1f} degC.")
+            notes.append(f"{record.name}: {at_its_temperature(record.temperature_degc)}.")
         else:
             declared = cell.initial_temperature_k - ZERO_CELSIUS_K
             notes.append(

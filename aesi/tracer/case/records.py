@@ -17,7 +17,7 @@ from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.initial_state import InitialState, initial_state
-from aesi.records import Hold, Measurement, hold_sentence
+from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 from aesi.tracer.case.thinned import ThinnedRecord, lost_v, thinned_record, thinned_together
 
 THINNED_SHARE = 0.5
@@ -184,10 +184,9 @@ def _white_v(record: ThinnedRecord, seen: Measurement, noise_full_v: float) -> A
 def _temperature_noted(data: Measurement) -> tuple[str, ...]:
     if data.temperature_degc is None:
         return ()
-    low, high = float(np.min(data.temperature_degc)), float(np.max(data.temperature_degc))
     return (
-        f"{data.name}: simulated at its measured temperature, {low:.1f} to {high:.1f} degC; effects that would infer "
-        "it (self_heating, ambient_temperature) do not compete for this record.",
+        f"{data.name}: simulated {at_its_temperature(data.temperature_degc)}; effects that would infer it "
+        "(self_heating, ambient_temperature) do not compete for this record.",
     )
 
 

@@ -171,6 +171,18 @@ def test_a_record_without_the_column_takes_the_temperature_that_is_given_for_it(
     assert any("declares; its own can be given (--temperature FILE=DEGC)." in note for note in without[1])
 
 
+def test_a_temperature_that_never_moves_was_taken_for_one_of_the_case_and_told_how_a_winding_conducts(
+    start, records
+):
+    """Stated as 25 degC, a record of a cell at 25 degC gave a salt that diffuses an eighth too slowly."""
+    stated = records[0]
+    moving = replace(stated, temperature_degc=stated.temperature_degc + np.linspace(0.0, 1.0, len(stated)))
+    for record, told in ((stated, False), (moving, True)):
+        model, _ = problem(start, [record], Conditions())
+        assert ("thermal.conductivity" in {one.name for one in model.free}) == told
+        assert (model.cell.thermal_conductivity_w_m_k is not None) == told
+
+
 def test_a_temperature_that_cannot_be_used_is_refused(start, records):
     with pytest.raises(DataError, match="no such record"):
         calibrate(start, records, Conditions(temperatures_degc={"elsewhere": 5.0}))

@@ -322,7 +322,7 @@ def test_the_temperature_that_a_prediction_is_made_at_is_said(model, data, tmp_p
         said = []
         predict_file(folder, tmp_path / f"{name}.csv", tmp_path / "out.csv", say_notes=said.extend)
         words = (
-            "at its measured temperature, 11.0 to 11.0 degC"
+            "at 11 degC in every row, as its column states"
             if columns
             else "no temperature in it; taken at 25 degC"
         )
