@@ -225,7 +225,7 @@ def _read_all(records: Sequence[FileOrRecord], rows: int | None, hold: Hold | No
 
 
 def _checked(found: Measurement, hold: Hold | None) -> Measurement:
-    """The record with how its current was declared to run; one of arrays is examined as one of a file is.
+    """The record with how its current was declared to run; one that no reader examined is examined as a file is.
 
     Raises DataError where a voltage is missing, and for what a file would be refused for.
     """
@@ -238,5 +238,5 @@ def _checked(found: Measurement, hold: Hold | None) -> Measurement:
             f"{found.name}: voltage_v is nan at {stamp(found.time_s[row])} s ({row_words(row)}); drop the row, or give "
             "the parts before and after it as records of their own."
         )
-    whole = found if found.source else examined(found)
+    whole = found if found.was_examined else examined(found)
     return whole if hold is None else whole.held(hold)
