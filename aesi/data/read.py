@@ -102,7 +102,8 @@ def measurement_in(
         source=str(table.path),
         notes=tuple(f"{context.file}: {note}" for note in notes),
     )
-    return measurement if max_rows is None else decimate(measurement, max_rows)
+    few = measurement if max_rows is None else decimate(measurement, max_rows)
+    return replace(few, examined_digest=few.digest)
 
 
 def examined(record: Measurement) -> Measurement:
@@ -114,8 +115,10 @@ def examined(record: Measurement) -> Measurement:
     context = Context(record.name, {name: name for name in data}, lambda row: f"row {row + 1}")
     notes: list[str] = []
     data = _examine(data, context, notes, (), "; turn it")
-    told = tuple(f"{record.name}: {note}" for note in notes)
-    return replace(
+    told = tuple(
+        f"{record.name}: {note}" for note in notes if not any(had.endswith(note) for had in record.notes)
+    )
+    whole = replace(
         record,
         time_s=data["time_s"],
         current_a=data["current_a"],
@@ -123,6 +126,7 @@ def examined(record: Measurement) -> Measurement:
         temperature_degc=data.get("temperature_degc"),
         notes=(*record.notes, *told),
     )
+    return replace(whole, examined_digest=whole.digest)
 
 
 def _examine(

@@ -104,11 +104,21 @@ def decimate(measurement: Measurement, max_rows: int) -> Measurement:
     Rows behind the last whole run are left out, which the note says too.
     """
     n = len(measurement)
-    if n <= max_rows:
-        return measurement
-    if max_rows < 2:
+    if max_rows < min(n, 2):
         raise DataError(f"{measurement.name}: max_rows = {max_rows} leaves nothing; give at least 2.")
-    run = -(-(n - 1) // (max_rows - 1))
+    return in_runs(measurement, run_within(n, max_rows))
+
+
+def run_within(rows: int, most: int) -> int:
+    """How many rows to average over, so that so many become at most `most` (2 or more)."""
+    return 1 if rows <= most else -(-(rows - 1) // (most - 1))
+
+
+def in_runs(measurement: Measurement, run: int) -> Measurement:
+    """`decimate` by the number of rows in each run; itself where that is one."""
+    if run == 1:
+        return measurement
+    n = len(measurement)
     left = (n - 1) % run
     last = "the last row, no whole run, was" if left == 1 else f"the last {left} rows, no whole run, were"
     note = f"Decimated from {n:,} to {{rows:,}} rows: runs of {run} rows, {{how}}" + (

@@ -21,7 +21,7 @@ from aesi.physics import ModelName
 from aesi.physics.arguments import check_choice, check_soc
 from aesi.physics.cell import Soh
 from aesi.pipeline.calibrate import check_records, effects_left, scaled_to
-from aesi.pipeline.discovery.cases import MOST_ROWS
+from aesi.pipeline.discovery.budget import within_budget
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case, run_case
 from aesi.pipeline.discovery.finding import Finding
@@ -77,7 +77,7 @@ def discover(
     folder = None if out is None else _folder(out)
     given, parts = declared_model(cell).with_soh(soh), [_listed(part) for part in (data, tests, good)]
     asked = [one for part in parts for one in part]
-    found = iter(_read_all(asked, MOST_ROWS // max(1, len(asked)), hold))
+    found = iter(_read_all(asked, hold))
     measurements, judged, known = (tuple(islice(found, len(part))) for part in parts)
     named = [effect_files] if isinstance(effect_files, str | PathLike) else effect_files
     files = tuple(Path(file) for file in named)
@@ -95,7 +95,7 @@ def discover(
         model,
         good=known,
     )
-    case = with_cold_admitted(case)  # refused before anything is searched
+    case = with_cold_admitted(within_budget(case))  # refused before anything is searched
     finding = Finding(case, run_case(case, folder, progress))
     if folder is not None:
         finding.save(folder)
@@ -133,7 +133,7 @@ def calibrate(
     _check_days(dates or {}, as_of)
     given = declared_model(cell)
     declared = given.cell
-    measurements = _read_all(_listed(data), None, hold)
+    measurements = _read_all(_listed(data), hold)
     check_records(measurements, temperatures_degc)
     scaled_to(declared, measurements, temperatures_degc)  # refused before anything is fitted
     conditions = Conditions(
@@ -213,19 +213,19 @@ def _listed(records: Data) -> list[FileOrRecord]:
     return listed  # type: ignore[return-value]
 
 
-def _read_all(records: Sequence[FileOrRecord], rows: int | None, hold: Hold | None) -> list[Measurement]:
+def _read_all(records: Sequence[FileOrRecord], hold: Hold | None) -> list[Measurement]:
     """The records in their order; files of one name in several folders are called after folder and file."""
     if hold is not None:
         check_choice("hold", hold, Hold)
     names = iter(record_names([Path(one) for one in records if not isinstance(one, Measurement)]))
     return [
-        _checked(one if isinstance(one, Measurement) else read(Path(one), Reading(), rows, next(names)), hold)
+        _checked(one if isinstance(one, Measurement) else read(Path(one), Reading(), None, next(names)), hold)
         for one in records
     ]
 
 
 def _checked(found: Measurement, hold: Hold | None) -> Measurement:
-    """The record with how its current was declared to run; one of arrays is examined as one of a file is.
+    """The record with how its current was declared to run; one that no reader examined is examined as a file is.
 
     Raises DataError where a voltage is missing, and for what a file would be refused for.
     """
@@ -238,5 +238,5 @@ def _checked(found: Measurement, hold: Hold | None) -> Measurement:
             f"{found.name}: voltage_v is nan at {stamp(found.time_s[row])} s ({row_words(row)}); drop the row, or give "
             "the parts before and after it as records of their own."
         )
-    whole = found if found.source else examined(found)
+    whole = found if found.was_examined else examined(found)
     return whole if hold is None else whole.held(hold)

@@ -71,6 +71,7 @@ class Measurement:
     temperature_degc : (n,) degC, or None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
     hold : how the current runs between rows, where it was declared; else `assumed_hold` tells.
+    examined_digest : content hash of the rows that a reader examined; empty where none did.
     """
 
     time_s: Array
@@ -81,6 +82,7 @@ class Measurement:
     source: str = ""
     notes: tuple[str, ...] = ()
     hold: Hold | None = None
+    examined_digest: str = ""
 
     if TYPE_CHECKING:  # what is given need not be arrays yet
 
@@ -94,6 +96,7 @@ class Measurement:
             source: str = "",
             notes: tuple[str, ...] = (),
             hold: Hold | None = None,
+            examined_digest: str = "",
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -162,6 +165,11 @@ class Measurement:
     def digest(self) -> str:
         """Content hash of the four columns."""
         return digest(self.time_s, self.current_a, self.voltage_v, self.temperature_degc)
+
+    @property
+    def was_examined(self) -> bool:
+        """Whether a reader examined these very rows: a part of them, or another current, tells what they did not."""
+        return self.examined_digest == self.digest
 
     def held(self, hold: Hold | None) -> Measurement:
         """The record with how its current was declared to run between rows."""

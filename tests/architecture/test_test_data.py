@@ -25,6 +25,7 @@ MAY = {
     "aesi/pipeline/experiment/comparison.py": "compares runs by what the evaluation left",
     "aesi/pipeline/distinct.py": "refuses what is fitted too",
     "aesi/pipeline/batch": "hands the files of each cell on",
+    "aesi/pipeline/discovery/budget.py": "thins each by its own length",
     "aesi/pipeline/discovery/cases.py": "reads the files",
     "aesi/pipeline/discovery/finding.py": "tells what a reader did to them",
     "aesi/pipeline/discovery/discover.py": "hands them to the tracer",

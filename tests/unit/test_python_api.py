@@ -12,6 +12,7 @@ import pytest
 
 import aesi
 from aesi.calibration import calibrate as fit_cell
+from aesi.data.read import examined
 from aesi.errors import DataError, InputError
 from aesi.physics.effects import CATALOGUE
 from aesi.records import Spectrum
@@ -137,6 +138,36 @@ def test_what_a_file_is_refused_for_was_fitted_from_arrays(cell, record):
         aesi.calibrate(cell, bare.take(late))
     with pytest.raises(DataError, match="contradicts the one declared; turn it"):
         aesi.discover(cell, aesi.Measurement(record.time_s, -record.current_a, record.voltage_v))
+
+
+def test_rows_that_were_changed_after_they_were_read_were_not_examined(cell, record, tmp_path):
+    record.to_frame().to_csv(tmp_path / "drive.csv", index=False)
+    read = aesi.read_measurement(tmp_path / "drive.csv")
+    assert read.was_examined
+    assert read.held("linear").was_examined
+    late = (record.time_s < 600.0) | (record.time_s > 900.0)
+    changed = {
+        "contradicts the one declared; turn it": replace(read, current_a=-read.current_a),
+        "drive, row 601, column time_s: a gap of 302 s": read.take(late),
+        "is plainly in mV": replace(read, voltage_v=1e3 * read.voltage_v),
+    }
+    for sentence, other in changed.items():
+        assert not other.was_examined
+        with pytest.raises(DataError, match=sentence):
+            aesi.calibrate(cell, other)
+    read.current_a[:] *= -1.0
+    with pytest.raises(DataError, match="contradicts the one declared"):
+        aesi.calibrate(cell, read)
+
+
+def test_what_a_reader_doubted_is_told_once_of_a_part_of_its_rows(record, tmp_path):
+    slow = np.where(record.time_s < 30.0, record.time_s, record.time_s + 1000.0)  # the cell rests there
+    replace(record, time_s=slow).to_frame().to_csv(tmp_path / "drive.csv", index=False)
+    read = aesi.read_measurement(tmp_path / "drive.csv")
+    assert len(read.notes) == 1
+    part = examined(read.take(slice(0, 1700)))
+    assert part.notes == read.notes
+    assert part.was_examined
 
 
 def test_a_discovery_that_kept_nothing_back_showed_errors_that_are_no_number(

@@ -10,15 +10,13 @@ from aesi.data.reading import record_names
 from aesi.errors import ConfigError
 from aesi.physics import ModelName
 from aesi.physics.cell import Soh
+from aesi.pipeline.discovery.budget import within_budget
 from aesi.pipeline.discovery.cold import with_cold_admitted
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.sections import DiscoverConfig
 from aesi.pipeline.experiment.sources import cell_path, discovery_records
 from aesi.records import Hold
-
-MOST_ROWS = 80_000
-"""A hypothesis is simulated hundreds of times: more rows than these take hours, and tell hardly more."""
 
 
 def case_of_files(
@@ -39,7 +37,7 @@ def case_of_files(
     model: ModelName | None = None,
     soh: Soh | None = None,
 ) -> Case:
-    """A case of measurement files; together they have at most MOST_ROWS rows, and a note says where that told.
+    """A case of measurement files, thinned to what a search can be run on (`within_budget`).
 
     data, tests, good : files of the records that are looked at, that choose nothing, and that are known to be good.
     reading, hold : how the files are read, and how the current runs between their rows; None tells by the rows.
@@ -47,9 +45,8 @@ def case_of_files(
     Raises DataError where a file cannot be of the cell, at any temperature that is looked for.
     """
     paths = (*data, *tests, *good)
-    rows = MOST_ROWS // max(1, len(paths))
     named = zip(paths, record_names(paths), strict=True)
-    records = [read(path, reading or Reading(), rows, name).held(hold) for path, name in named]
+    records = [read(path, reading or Reading(), None, name).held(hold) for path, name in named]
     case = Case(
         cell,
         measurements=tuple(records[: len(data)]),
@@ -65,7 +62,7 @@ def case_of_files(
         model=model,
         soh=soh,
     )
-    return with_cold_admitted(case)
+    return with_cold_admitted(within_budget(case))
 
 
 def case_of_experiment(config: ExperimentConfig) -> Case:
@@ -84,7 +81,7 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
     fit, test, good = discovery_records(config, wanted, cell)
     if not fit:
         raise ConfigError(f"{config.name}: discover.fit names no record; give at least one to look at.")
-    return Case(
+    case = Case(
         cell,
         fit,
         test,
@@ -97,3 +94,4 @@ def case_of_experiment(config: ExperimentConfig) -> Case:
         soh=config.cell.soh,
         good=good,
     )
+    return within_budget(case)

@@ -190,6 +190,32 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
     )
 
 
+def led_by(data: Measurement, seen: Sequence[Measurement]) -> tuple[int, Measurement] | None:
+    """Which of the records that fits have seen leads to `data`, and that one with all that comes after it; None where
+    none does.
+
+    It is the longest that `data` begins with, or else the first that it continues. Such a one is not joined to it where
+    one of the two has a temperature and the other none, which no simulation could run at.
+    """
+    begun = [index for index, known in enumerate(seen) if _begins_with(data, known)]
+    if begun:
+        return max(begun, key=lambda index: len(seen[index])), data
+    index = next((index for index, known in enumerate(seen) if _continues(data, known)), None)
+    return None if index is None else (index, joined(seen[index], data))
+
+
+def _begins_with(data: Measurement, known: Measurement) -> bool:
+    n = len(known)
+    same = len(data) > n and np.array_equal(data.time_s[:n], known.time_s)
+    return same and np.array_equal(data.voltage_v[:n], known.voltage_v)
+
+
+def _continues(data: Measurement, known: Measurement) -> bool:
+    gap = float(data.time_s[0] - known.time_s[-1])
+    alike = (data.temperature_degc is None) == (known.temperature_degc is None)
+    return alike and 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s)))
+
+
 def prepare_test(
     cell: Cell,
     data: Measurement,
@@ -199,25 +225,19 @@ def prepare_test(
 ) -> PreparedRecord:
     """A record that chooses nothing.
 
-    Where it is the continuation of a record that fits have seen, or has such a record as its beginning, the model
-    runs through that and only what comes after is judged; not where one of the two has a temperature and the other
-    none, which no simulation could run at.
+    Where a record that fits have seen leads to it (`led_by`), the model runs through that and only what comes after is
+    judged.
     """
-    for index, known in enumerate(seen):
-        n = len(known)
-        same = len(data) > n and np.array_equal(data.time_s[:n], known.time_s)
-        if same and np.array_equal(data.voltage_v[:n], known.voltage_v):
-            whole = prepare(cell, data, soc0, 0.0, given=given, shared=True)
-            return replace(whole, lead_rows=n, continues=index)
-        gap = float(data.time_s[0] - known.time_s[-1])
-        alike = (data.temperature_degc is None) == (known.temperature_degc is None)
-        if alike and 0.0 < gap <= CONTINUATION_STEPS * float(np.median(np.diff(known.time_s))):
-            whole = prepare(cell, _joined(known, data), soc0, 0.0, given=given, shared=True)
-            return replace(whole, lead_rows=n, continues=index)
-    return prepare(cell, data, soc0, 0.0, given=given, shared=True)
+    led = led_by(data, seen)
+    if led is None:
+        return prepare(cell, data, soc0, 0.0, given=given, shared=True)
+    index, whole = led
+    prepared = prepare(cell, whole, soc0, 0.0, given=given, shared=True)
+    return replace(prepared, lead_rows=len(seen[index]), continues=index)
 
 
-def _joined(first: Measurement, second: Measurement) -> Measurement:
+def joined(first: Measurement, second: Measurement) -> Measurement:
+    """The rows of one record and then those of another one, as which it is told of."""
     temperatures = [t for t in (first.temperature_degc, second.temperature_degc) if t is not None]
     return replace(
         second,

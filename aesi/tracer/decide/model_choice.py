@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, TypeGuard
 
 from aesi.physics.simulation import MODEL_WORDS, ModelName
 from aesi.tracer.case.problem import InverseProblem
@@ -59,51 +59,106 @@ def with_model(
     problem: InverseProblem, wanted: ModelName | None, search: Search, archive_of: ArchiveOf, max_effects: int
 ) -> tuple[Evidence, ModelChoice]:
     """The search with the model that the user named, or else with the one that the parameters of the cell were fitted
-    with, or else with the one that the records ask for.
+    with, or else with the single particle beside good records, or else with the one that the records ask for.
 
     max_effects : names that may be given.
     """
     declared = reduction_of(problem)
-
-    def fine(name: ModelName) -> InverseProblem:
-        return with_fine_numerics(replace(problem, model=name))
-
     settled = wanted or problem.cell.fitted_with
     if settled:
-        one = fine("dfn" if settled == "dfn" else "espm")
+        one = _fine(problem, "dfn" if settled == "dfn" else "espm")
         why = ", as asked" if wanted else ", with which the parameters of the cell were fitted"
         return _chosen(search(one, archive_of(one, None), max_effects), one.model, declared, why)
-    single = fine("espm")
+    reduced = _fine(problem, "espm")
     if declared is not None and not declared.notable:
-        single = let_stand(single, declared.shift_v)
-    archive = archive_of(single, None)
+        reduced = let_stand(reduced, declared.shift_v)
+    single = _Single(reduced, archive_of(reduced, None), search, max_effects, declared)
     if problem.has_good:
-        by_single = search(single, archive, max_effects)
-        return _chosen(by_single, "espm", declared, ", since the good records share what it approximates")
-    most = min(FIRST_LOOK, max_effects) if _notable(declared) else max_effects
-    by_single = search(single, archive, most)
-    explained = _explains(by_single, declared)
-    if most < max_effects and (not explained or by_single.verdict.word == "found"):
-        most = max_effects
-        by_single = search(single, archive, most, by_single)
-        explained = _explains(by_single, declared)
-    out_of_reach = by_single.paths["tight"].beyond_reach_v is not None
-    if explained and out_of_reach and declared is not None and declared.notable:
-        looked = search(replace(single, reduced_v=declared.shift_v), archive, max_effects)
-        explained = _explains(looked, declared)
-    reduction = _larger(declared, by_single.paths["tight"]) if explained else declared
+        return _chosen(
+            single.whole(), "espm", declared, ", since the good records share what it approximates"
+        )
+    return _asked_by_records(single, problem, archive_of)
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What the single particle answered.  whole : with all names that may be given."""
+
+    answer: Answer
+    whole: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Single:
+    """The single particle of a case, and how it is asked.  declared : what the two models of the declared cell differ
+    by."""
+
+    problem: InverseProblem
+    archive: Archive
+    search: Search
+    max_effects: int
+    declared: Reduction | None
+
+    def whole(self, shallower: Answer | None = None) -> Answer:
+        """The search for all names that may be given.  shallower : the same for fewer."""
+        return self.search(self.problem, self.archive, self.max_effects, shallower)
+
+    def looked(self) -> _Look:
+        """The search for `FIRST_LOOK` names where the two models differ notably, and for all where they do not, where
+        one of the few explains the data, and where none could."""
+        few = min(FIRST_LOOK, self.max_effects) if _notable(self.declared) else self.max_effects
+        first = self.search(self.problem, self.archive, few)
+        if few == self.max_effects:
+            return _Look(first, True)
+        if first.verdict.word == "found" or not _explains(first, self.declared):
+            return _Look(self.whole(first), True)
+        return _Look(first, False)
+
+    def may_explain(self, answer: Answer) -> bool:
+        """Does an answer explain the data, or may what the two models differ by be all that it leaves? Where nothing
+        was tried since that is too much for all effects together, a search for what it leaves beside that tells."""
+        if not _explains(answer, self.declared):
+            return False
+        if answer.paths["tight"].beyond_reach_v is None or not _notable(self.declared):
+            return True
+        beside = replace(self.problem, reduced_v=self.declared.shift_v)
+        return _explains(self.search(beside, self.archive, self.max_effects), self.declared)
+
+
+def _asked_by_records(
+    single: _Single, problem: InverseProblem, archive_of: ArchiveOf
+) -> tuple[Evidence, ModelChoice]:
+    """The single particle where the two models do not differ notably, be it on what it ended with, and where it leaves
+    far more than they differ by; else the one that is believed of both."""
+    look = single.looked()
+    explained = single.may_explain(look.answer)
+    reduction = _larger(single.declared, look.answer.paths["tight"]) if explained else single.declared
     if not _notable(reduction):
-        return _chosen(by_single, "espm", reduction)
+        return _chosen(look.answer, "espm", reduction)
     if not explained:
-        return _chosen(by_single, "espm", reduction, ", which leaves far more than the two differ by")
-    full = fine("dfn")
-    full_archive = archive_of(full, archive)
-    if most < max_effects and search(full, full_archive, 0).verdict.word == "unknown":
-        by_single = search(single, archive, max_effects, by_single)
-    by_full = search(full, full_archive, most_names(by_single, max_effects))
+        return _chosen(look.answer, "espm", reduction, ", which leaves far more than the two differ by")
+    full = _fine(problem, "dfn")
+    return _weighed(single, look, full, archive_of(full, single.archive), reduction)
+
+
+def _weighed(
+    single: _Single, look: _Look, full: InverseProblem, archive: Archive, reduction: Reduction
+) -> tuple[Evidence, ModelChoice]:
+    """The model whose search is believed, each asked for as many names as could be.
+
+    full, archive : of the porous electrode. Where that one needs names, the single particle is asked for all of them.
+    """
+    needs_names = not look.whole and single.search(full, archive, 0).verdict.word == "unknown"
+    by_single = single.whole(look.answer) if needs_names else look.answer
+    by_full = single.search(full, archive, most_names(by_single, single.max_effects))
     if believed((by_full.path, by_full.verdict), (by_single.path, by_single.verdict)):
         return _chosen(_of_both(by_single, by_full), "espm", reduction, _likelier(by_single))
     return _chosen(_of_both(by_full, by_single), "dfn", reduction)
+
+
+def _fine(problem: InverseProblem, name: ModelName) -> InverseProblem:
+    """The problem with one model of the cell, as finely resolved as that one has to be."""
+    return with_fine_numerics(replace(problem, model=name))
 
 
 def _of_both(believed_one: Answer, other: Answer) -> Answer:
@@ -127,7 +182,7 @@ def _likelier(answer: Answer) -> str:
     return ", which explains the data with fewer or more usual effects"
 
 
-def _notable(reduction: Reduction | None) -> bool:
+def _notable(reduction: Reduction | None) -> TypeGuard[Reduction]:
     return reduction is not None and reduction.notable
 
 

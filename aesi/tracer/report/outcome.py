@@ -169,15 +169,17 @@ def rmse_difference(
 def test_rmse_v(
     state: ModelState, records: Sequence[PreparedRecord], tests: Sequence[PreparedRecord]
 ) -> float:
-    """RMSE on what the fits have not seen (on the fit part where there is nothing else), thinned, V."""
-    parts = []
-    for record in tests:
-        run = state.simulated(record, None, thin=True)
-        parts.append((record.thin.voltage_v - run.voltage_v)[record.lead_rows_thin :])
+    """RMSE on what the fits have not seen (on the fit parts where there is nothing else), thinned, V."""
+    parts = [_residual_v(state, record, None)[record.lead_rows_thin :] for record in tests]
     for index, record in enumerate(records):
-        if tests and record.n_fit == len(record.thin):
-            continue
-        run = state.simulated(record, index, thin=True)
-        residual = record.thin.voltage_v - run.voltage_v
-        parts.append(residual[record.n_fit :] if record.n_fit < len(record.thin) else residual)
-    return Errors.of(np.concatenate(parts)).rmse_v
+        if record.n_fit < len(record.thin):
+            parts.append(_residual_v(state, record, index)[record.n_fit :])
+    held_out = [part for part in parts if len(part)]
+    return rms(
+        np.concatenate(held_out or [_residual_v(state, record, k) for k, record in enumerate(records)])
+    )
+
+
+def _residual_v(state: ModelState, record: PreparedRecord, index: int | None) -> Array:
+    """(n_thin,) V, measured - model, of a thinned record.  index : its place among the fitted ones, or None."""
+    return np.asarray(record.thin.voltage_v - state.simulated(record, index, thin=True).voltage_v)

@@ -59,6 +59,16 @@ def test_a_record_that_is_fitted_cannot_judge(tmp_path):
         case_of_files(BPX, [record, record])
 
 
+def test_a_test_that_was_given_twice_counted_twice(tmp_path):
+    record, test = write_record(tmp_path), write_record(tmp_path, "test.csv", seed=1)
+    with pytest.raises(DataError, match=r"test is there twice among the tests; .* give it once"):
+        case_of_files(BPX, [record], [test, test])
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(test.read_bytes())
+    with pytest.raises(DataError, match="test and copy hold the same rows and are both among the tests"):
+        case_of_files(BPX, [record], [test, copy])
+
+
 def test_good_records_stand_beside_what_is_looked_at(tmp_path, shared_data, monkeypatch):
     record = write_record(tmp_path)
     with pytest.raises(DataError, match="is there twice among the data; give it once"):

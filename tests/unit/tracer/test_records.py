@@ -10,7 +10,7 @@ from aesi.data.thinning import averaged_over
 from aesi.physics import simulate
 from aesi.records import Measurement
 from aesi.tracer.case.checks import check_record
-from aesi.tracer.case.records import noise_floor_v, prepare, prepare_test
+from aesi.tracer.case.records import led_by, noise_floor_v, prepare, prepare_test
 from aesi.tracer.case.thinned import thinned_record, thinned_together
 from aesi.tracer.discovery import inverse_problem
 from aesi.tracer.likelihood.model_state import ModelState
@@ -154,6 +154,16 @@ def test_a_continuation_is_judged_only_after_what_was_seen(cell, degc):
     other = replace(rest, time_s=rest.time_s + 5000.0, current_a=np.zeros(300))
     stranger = prepare_test(cell, other, [seen], None)
     assert (stranger.lead_rows, stranger.continues) == (0, None)
+
+
+def test_of_two_fitted_records_that_lead_to_a_test_the_one_it_begins_with_was_judged(cell):
+    time = np.arange(900.0)
+    whole = measured(cell, time, np.where(time < 30, 0.0, 5.0))
+    first, second = whole.between(0, 300), whole.between(300, 600)
+    assert led_by(whole.between(300, 900), [first, second])[0] == 1  # which continues the first one, too
+    assert led_by(whole, [first, whole.between(0, 600)])[0] == 1
+    index, data = led_by(whole.between(600, 900), [first, second])
+    assert (index, data.time_s[0]) == (1, 300.0)
 
 
 def test_a_few_rows_that_are_off_make_no_noise():
