@@ -74,9 +74,9 @@ the LA92 are left with 361 and 327 mV**2 instead of 330 (before the share that c
 and 819 instead of 818."""
 SETTLED = 1.1
 """s has settled once a fit leaves no more than this many times the s that it was made with. Held at 10 mV, a fit to the
-drive of an LFP cell, whose declared model misses 67, moved the start by 9 deviations and its C/20 from 30 to 216 mV off;
-with s of what is left, by less than 1.2 and to 74. Of ten development splits of the NMC drive and two of the LG HG2 one
-changes: parts 4 and 5 take 60.0 instead of 57.2 % off the others."""
+drive of an LFP cell, whose declared model misses 67, moved the start by 9 deviations and its C/20 from 30 to 216 mV
+off; with s of what is left, by less than 1.2 and to 74. Of ten development splits of the NMC drive and two of the LG
+HG2 one changes: parts 4 and 5 take 60.0 instead of 57.2 % off the others."""
 GAIN = 0.05
 """Of the cost: a descent ends with a step that gains less. With ten times less no split changes by 0.1 %."""
 
