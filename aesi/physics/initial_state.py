@@ -151,32 +151,40 @@ class _Start:
             return self._full(read, f"rests at {begins:.3f} V", begins)
         voltage, sd_v = settled_voltage(self.open_circuit, rest.rows, self.physics)
         true = freed_of_instruments(self.model, self.effects, voltage)
-        moved = rest.rows.charge_ah / capacity_ah
-        unlike = [READING_V, sd_v, *(self._under_slow_current_v(rest, true, moved) if rest.flows else ())]
+        moved = rest.rows.charge_ah / capacity_ah  # before it, the cell was as much fuller and higher
+        higher_v = self._rise_v(true, moved)
+        unlike = [READING_V, sd_v, *([self._long_drop_v(rest, true), higher_v] if rest.flows else ())]
         spread = float(np.linalg.norm(unlike))
         soc, sd = self.open_circuit.reading(true, spread)
-        soc += moved
+        soc, low, high = (end + moved for end in (soc, *self.open_circuit.ends(true, spread)))
         words = f"{self.record.name} rests at {begins:.3f} V"
         if max(abs(voltage - begins), sd_v) > READING_V:
             words += f", relaxing to {voltage:.3f} +/- {sd_v:.3f} V"
         words += f": state of charge {soc:.4f} +/- {sd:.4f}"
         if sd > OTHER_STATE:
             words += "; give --soc0 if it is known"
-        low, high = self.open_circuit.ends(true, spread)
-        ends = self._declared(low), self._declared(high)
-        return InitialState(self._declared(soc), sd, "rest", words + ".", rest_voltage_v=voltage, ends=ends)
+        return InitialState(
+            self._declared(soc),
+            sd,
+            "rest",
+            words + ".",
+            rest_voltage_v=voltage + higher_v,
+            ends=(self._declared(low), self._declared(high)),
+        )
 
-    def _under_slow_current_v(self, rest: Rest, true_v: float, moved: float) -> tuple[float, float]:
-        """V that a current below that of a load takes from its rest: what the model drops once it has flowed for long,
-        and what the open-circuit voltage falls by.
+    def _rise_v(self, true_v: float, moved: float) -> float:
+        """V that the open-circuit voltage lay above `true_v` before `moved` of the charge had flowed."""
+        soc = self.open_circuit.soc_at(true_v)
+        return self.open_circuit.voltage_at(soc + moved) - self.open_circuit.voltage_at(soc)
 
-        true_v : that the rows seem to relax to.  moved : of the state of charge.
+    def _long_drop_v(self, rest: Rest, true_v: float) -> float:
+        """V that the model drops by a current below that of a load once it has flowed for long.
+
+        true_v : that the rows seem to relax to.
         Not for rows that a load ends sooner, which are of a cell that rested: by what C/58 drops once it has flowed for
         long, three drives of a Panasonic at -20 degC would start within 0.05 instead of 0.0009.
         """
-        soc = self.open_circuit.soc_at(true_v)
-        fallen = self.open_circuit.voltage_at(soc) - self.open_circuit.voltage_at(soc - moved)
-        return self.load.drop(true_v, float(rest.rows.current_a.mean()), FLOWED_S[-1]), fallen
+        return self.load.drop(true_v, float(rest.rows.current_a.mean()), FLOWED_S[-1])
 
     def _under_load(self) -> InitialState:
         first = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))

@@ -232,6 +232,15 @@ def test_a_rest_on_which_a_testers_zero_is_read_stays_that_rest():
     assert off.sd < 1.5 * plain.sd
 
 
+@pytest.mark.parametrize("c_rate", [1 / 50, -1 / 50])
+def test_the_rest_voltage_and_the_ends_were_those_of_the_last_row_of_a_rest(c_rate):
+    """Where the cell is steep, what a rest moves is three deviations of a voltage."""
+    found = initial_state(LG_M50, slow(0.01, c_rate, 1.0, 10.0).take(slice(0, 10)))
+    assert found.soc == pytest.approx(float(np.interp(found.rest_voltage_v, *_ocv())), abs=2e-5)
+    low, high = found.ends
+    assert found.soc - low == pytest.approx(high - found.soc, rel=0.1)
+
+
 def test_a_current_too_small_for_a_load_widens_what_is_read_once_it_has_moved_charge():
     data = slow(0.5, 1 / 50, 1.0, 10.0)
     short, long = initial_state(LG_M50, data.take(slice(0, 9))), initial_state(LG_M50, data)
