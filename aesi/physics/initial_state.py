@@ -25,11 +25,11 @@ from aesi.physics.arguments import check_soc
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
+from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
+from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments
 from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.load import FLOWED_S, LoadedStart
-from aesi.physics.start.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
-from aesi.physics.start.rest import first_rows_v, freed_of_instruments
 from aesi.physics.start.state import Basis, InitialState
 from aesi.records import Hold, Measurement
 
@@ -131,9 +131,9 @@ class _Start:
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
         self.current_a = float(record.current_a[0])
-        self.open_circuit = OpenCircuit(self.cell, record)
+        self.open_circuit = OpenCircuit.at_start(self.cell, record)
         self.physics, self.hold = physics, hold
-        self.load = LoadedStart(self.open_circuit, hold, physics)
+        self.load = LoadedStart(self.open_circuit, record, hold, physics)
 
     def read(self) -> InitialState:
         """From the voltage."""

@@ -17,9 +17,9 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array, IntArray
+from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
 from aesi.physics.start.load import FLOWED_S, HISTORY_C_RATE, JUDGED_ROWS
-from aesi.physics.start.open_circuit import OpenCircuit
 from aesi.records import Hold, Measurement
 
 C_RATE_SDS = (0.25, 1.0, 4.0)
@@ -121,7 +121,7 @@ def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, physics: Mo
         time = np.concatenate([flowed_s * WITHIN, flowed_s + after])
         current = np.where(time <= flowed_s, current_a, 0.0)
         before = soc + current_a * flowed_s / SECONDS_PER_HOUR / cell.capacity_ah
-        degc = open_circuit.kelvin() - ZERO_CELSIUS_K
+        degc = open_circuit.kelvin - ZERO_CELSIUS_K
         run = simulate(cell, time, current, before, (), degc, "backward", on_depletion="clip", model=physics)
         away = (run.voltage_v - open_circuit.voltage_at(float(run.series["soc"][-1]))) / rate
         for stopped_s in STOPPED_S:

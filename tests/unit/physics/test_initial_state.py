@@ -13,7 +13,7 @@ from aesi.constants import SECONDS_PER_HOUR
 from aesi.errors import DataError, InputError
 from aesi.physics import Cell, initial_state, simulate
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.start.open_circuit import READING_V, OpenCircuit
+from aesi.physics.rest.open_circuit import READING_V, OpenCircuit
 from aesi.records import Measurement
 
 CELLS = Path(__file__).resolve().parents[3] / "experiments" / "cells"
@@ -86,7 +86,7 @@ def test_a_start_under_load_was_told_to_rest_at_a_voltage_that_no_cell_has():
 
 
 def test_a_rest_as_far_above_full_as_below_leaves_the_same_doubt():
-    open_circuit = OpenCircuit(LG_M50, resting(LG_M50.upper_voltage_v))
+    open_circuit = OpenCircuit(LG_M50)
     below, above = (open_circuit.full_sd(open_circuit.voltage_at(1.0 + off)) for off in (-0.02, 0.02))
     assert above == pytest.approx(below, rel=1e-2)
     assert above == pytest.approx(0.01, rel=1e-2)
@@ -165,6 +165,26 @@ def test_an_instrument_fault_is_taken_off_the_reading():
     offset = CATALOGUE["voltage_sensor_offset"].activate(offset_v=0.02)
     found = initial_state(LG_M50, resting(float(LG_M50.rest_voltage_v(0.5)[0]) + 0.02), effects=[offset])
     assert found.soc == pytest.approx(0.5, abs=1e-3)
+
+
+@pytest.mark.parametrize("voltage_v", [2.46, 3.7, 4.16, 4.17, 4.18, 4.21, 4.24, 4.5])
+@pytest.mark.parametrize("offset_v", [0.0, 0.02])
+def test_a_rest_voltage_had_another_rule_in_a_simulation(voltage_v, offset_v):
+    """4.21 V were 1.0053 to one and 1 to the other, 4.24 V an error and 1, 2.46 V an error and empty."""
+    effects = [CATALOGUE["voltage_sensor_offset"].activate(offset_v=offset_v)]
+
+    def simulated(rest_v: float) -> float:
+        run = simulate(LG_M50, np.arange(3.0), np.zeros(3), None, effects, rest_voltage_v=rest_v)
+        return float(run.series["soc"][0])
+
+    if voltage_v == 4.5:
+        for refused in (simulated, lambda v: initial_state(LG_M50, resting(v), effects=effects)):
+            with pytest.raises(DataError, match="lies outside"):
+                refused(voltage_v + offset_v)
+        return
+    read = initial_state(LG_M50, resting(voltage_v + offset_v), effects=effects)
+    assert simulated(voltage_v + offset_v) == pytest.approx(read.soc, abs=1e-4)
+    assert (read.soc == 1.0) == (voltage_v >= 4.17)
 
 
 @pytest.mark.parametrize("flowed_s", [30, 600])
