@@ -1,10 +1,11 @@
 """Models of a cell, single particle or porous electrode, and the effects they may lack."""
 
-from aesi.physics.cell import Cell, initial_soc
+from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Contribution, Effect, Record, Trace
 from aesi.physics.impedance import impedance
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.model import EspmModel
+from aesi.physics.rest.open_circuit import initial_soc
 from aesi.physics.simulation import ModelName, simulate
 
 __all__ = [

@@ -24,10 +24,12 @@ from aesi.over_time import stamp
 from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
-from aesi.physics.cell import Cell, initial_soc
+from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect, Record, Trace, check_states
-from aesi.physics.espm.plain import run_plain, shifted_ocp
+from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
+from aesi.physics.rest.open_circuit import initial_soc
+from aesi.physics.rest.voltage import freed_of_instruments
 from aesi.records import Hold, Run
 from aesi.records.checked import check_row, check_times, numbers
 
@@ -59,7 +61,8 @@ def simulate(
 
     time_s : (n,) s, strictly increasing, any sampling.  current_a : (n,) A, positive on discharge.
     soc0 : state of charge at rest before the first sample, by the declared windows; where an effect moved these,
-    the cell starts from the same rest voltage in the new ones. None takes it from `rest_voltage_v`.
+    the cell starts from the same rest voltage in the new ones. None takes it from `rest_voltage_v`, as `initial_state`
+    reads that of a cell at rest: within `CHARGED_V` below the upper cut-off voltage it is a full charge.
     effects : what the cell has beyond its file; instrument faults act first, the others in the order given.
     temperature_degc : (n,) or one value: the measured temperature of the cell's case, which the winding follows (see
     `aesi.physics.model.of_record`); None leaves it to the cell file's initial temperature, or to the heat balance where
@@ -74,9 +77,9 @@ def simulate(
 
     Returns a Run with series c_sp, c_sn (mol/m3), c_e0, c_eL (mol/m3), soc, temperature_k.
     Raises SimulationError naming time and electrode, or where a clipped simulation has no solution either; DataError
-    for arrays that cannot be simulated; InputError for another model, hold or on_depletion, for what is no Cell, no
-    effect, no state of charge or no temperature of a cell, and for an effect that the model holds of itself; CellError
-    for one that needs what the cell's file does not declare.
+    for arrays that cannot be simulated, and a rest voltage that no state of the cell has; InputError for another model,
+    hold or on_depletion, for what is no Cell, no effect, no state of charge or no temperature of a cell, and for an
+    effect that the model holds of itself; CellError for one that needs what the cell's file does not declare.
     """
     check_cell(cell)
     check_choice("hold", hold, Hold)
@@ -280,16 +283,8 @@ def _soc_from_rest(
     """State of charge from the rest voltage at the first temperature, freed of what instrument faults add to it."""
     if rest_voltage_v is None:
         raise DataError("give soc0, or rest_voltage_v measured at rest before the record.")
-    true = np.array([rest_voltage_v])
-    one = np.zeros(1)
-    for active in effects:
-        if active.effect.on_reading is not None:
-            trace = Trace(model, one, one, np.array([rest_voltage_v]), {})
-            true = true - (active.act(active.effect.on_reading, trace) - rest_voltage_v)
-    cell = model.cell
-    rise = (cell.initial_temperature_k if kelvin is None else float(kelvin[0])) - cell.reference_temperature_k
-    cell = cell.with_negative(ocp=shifted_ocp(cell.negative, rise))
-    return initial_soc(cell.with_positive(ocp=shifted_ocp(cell.positive, rise)), float(true[0]))
+    true_v = freed_of_instruments(model, effects, rest_voltage_v)
+    return initial_soc(model.cell, true_v, None if kelvin is None else float(kelvin[0]))
 
 
 def _series(cell: Cell, rows: Array) -> dict[str, Array]:

@@ -23,7 +23,7 @@ from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import of_file
-from aesi.physics.start.open_circuit import GIVEN_SD
+from aesi.physics.rest.open_circuit import GIVEN_SD
 from aesi.pipeline.notes import of_another_model, of_day, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel

@@ -70,7 +70,7 @@ class Measurement:
     time_s, current_a, voltage_v : (n,) s (strictly increasing), A (discharge positive), V (NaN where it is unknown).
     temperature_degc : (n,) degC, or None where it was not measured.
     notes : what a reader dropped, mapped or resampled, one sentence each.
-    hold : how the current runs between rows, where it was declared; else `assumed_hold` tells.
+    hold : how the current runs between rows, where it was declared; `hold_taken` is it, or what `assumed_hold` tells.
     examined_digest : content hash of the rows that a reader examined; empty where none did.
     """
 
@@ -126,6 +126,11 @@ class Measurement:
 
     def __len__(self) -> int:
         return len(self.time_s)
+
+    @property
+    def hold_taken(self) -> Hold:
+        """How the current is taken to run between rows: as declared, else as `assumed_hold` says."""
+        return self.hold or assumed_hold(self.time_s)
 
     @property
     def charge_ah(self) -> float:

@@ -18,7 +18,7 @@ from aesi.physics.belongs import SOC_MARGIN
 from aesi.physics.cell import Cell
 from aesi.physics.initial_state import InitialState, initial_state
 from aesi.physics.simulation import ModelName
-from aesi.records import Hold, Measurement, assumed_hold, at_its_temperature, hold_sentence
+from aesi.records import Hold, Measurement, at_its_temperature, hold_sentence
 
 SOC_SD = 0.005
 """Least standard deviation of an initial state of charge that was read from a voltage, since the potentials that it was
@@ -86,7 +86,7 @@ def _prepared(
 ) -> Prepared:
     window_s = max(1.0, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
     thin = thinned(data, cell.capacity_ah, window_s)
-    start = initial_state(cell, data, soc0, data.hold or "backward", shared=shared, model=physics)
+    start = initial_state(cell, data, soc0, data.hold_taken, shared=shared, model=physics)
     slow = is_slow(thin.data, cell.nominal_capacity_ah)
     if start.basis == "given":
         sd = start.sd
@@ -98,7 +98,7 @@ def _prepared(
     return Prepared(
         data=data,
         rows=thin.data,
-        hold=(data.hold or assumed_hold(data.time_s)) if thin.data is data else thin.hold,
+        hold=data.hold_taken if thin.data is data else thin.hold,
         kelvin=None if temperature is None else np.ascontiguousarray(temperature + ZERO_CELSIUS_K),
         start=start,
         soc_sd=sd,

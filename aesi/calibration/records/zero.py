@@ -96,7 +96,10 @@ def _of_cycle(cell: Cell, data: Measurement) -> tuple[float, float] | None:
     if each_way < LONG_CHARGE * cell.capacity_ah or data.current_a[last] > 0.0 or last + 1 >= len(data):
         return None
     try:
-        began, ended = initial_state(cell, data), initial_state(cell, data.take(slice(last + 1, len(data))))
+        began, ended = (
+            initial_state(cell, part, hold=data.hold_taken)
+            for part in (data, data.take(slice(last + 1, None)))
+        )
     except DataError:
         return None
     if began.by_voltage is None or ended.by_voltage is None:

@@ -1,6 +1,6 @@
 """A cell as its BPX file declares it."""
 
-from aesi.physics.cell.cell import Cell, initial_soc
+from aesi.physics.cell.cell import Cell
 from aesi.physics.cell.health import Soh, checked_soh, read_soh
 from aesi.physics.cell.parts import CellParameters, Electrode, Electrolyte, Separator
 
@@ -12,6 +12,5 @@ __all__ = [
     "Separator",
     "Soh",
     "checked_soh",
-    "initial_soc",
     "read_soh",
 ]

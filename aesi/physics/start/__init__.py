@@ -1,1 +1,1 @@
-"""The first row of a record against a cell: rest voltages, loaded starts, and the state of charge that they mean."""
+"""The first row of a record against a cell: a rest that still relaxes, a loaded start, and what is known of either."""

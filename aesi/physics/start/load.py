@@ -13,9 +13,9 @@ import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
+from aesi.physics.rest.open_circuit import READING_V, OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
-from aesi.physics.start.open_circuit import READING_V, OpenCircuit
-from aesi.records import Hold
+from aesi.records import Hold, Measurement
 
 FLOWED_S = (0.0, 20.0, 200.0, 2000.0)
 """Times for which the first current may have flowed before: after the last, only the slowest drops still grow."""
@@ -36,9 +36,11 @@ ROUNDS = 4
 class LoadedStart:
     """The first minutes of a record under load, simulated.  physics : the model that does."""
 
-    def __init__(self, open_circuit: OpenCircuit, hold: Hold, physics: ModelName) -> None:
-        self.open_circuit, self.hold, self.physics = open_circuit, hold, physics
-        self.cell, self.record = open_circuit.cell, open_circuit.record
+    def __init__(
+        self, open_circuit: OpenCircuit, record: Measurement, hold: Hold, physics: ModelName
+    ) -> None:
+        self.open_circuit, self.record, self.hold, self.physics = open_circuit, record, hold, physics
+        self.cell = open_circuit.cell
         self.current_a = float(self.record.current_a[0])
 
     def state_of_charge(self, first_v: float, drops: list[float]) -> tuple[float, float, bool]:
@@ -89,7 +91,7 @@ class LoadedStart:
         return float(np.var(rows.voltage_v - voltage))
 
     def _run(self, time_s: Array, current_a: Array, soc: float) -> Array:
-        degc = self.open_circuit.kelvin() - ZERO_CELSIUS_K
+        degc = self.open_circuit.kelvin - ZERO_CELSIUS_K
         run = simulate(
             self.cell, time_s, current_a, soc, (), degc, self.hold, on_depletion="clip", model=self.physics
         )

@@ -11,15 +11,16 @@ of g: they follow within a second, and what charge they take is taken from the p
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
 from aesi.constants import SECONDS_PER_HOUR, ZERO_CELSIUS_K
 from aesi.numerics.typing import Array, IntArray
+from aesi.physics.rest.open_circuit import OpenCircuit
 from aesi.physics.simulation import ModelName, simulate
 from aesi.physics.start.load import FLOWED_S, HISTORY_C_RATE, JUDGED_ROWS
-from aesi.physics.start.open_circuit import OpenCircuit
-from aesi.records import Measurement
+from aesi.records import Hold, Measurement
 
 C_RATE_SDS = (0.25, 1.0, 4.0)
 """C of (1): from slow discharges to pulses. On 62 rests of `aesi bench start --set cuts=60 --set seed=1` the readings
@@ -39,14 +40,31 @@ WITHIN = np.concatenate([[0.0], np.geomspace(0.02, 1.0, 8)])
 """Rows of a history, as shares of the time for which its current flows."""
 
 
-def resting_rows(record: Measurement, limit_a: float) -> slice:
-    """The rows before the current starts, at least the first and at most `JUDGED_ROWS`.
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """How a record begins.
 
-    limit_a : A, below which a cell rests.
+    rows : before a load starts, or a smaller current has moved the state of charge; at least the first row.
+    flows : such a current goes on after them, and has likely flowed before.
     """
-    current = np.abs(record.current_a[:JUDGED_ROWS])
-    rests = current <= max(float(current[0]), limit_a)
-    return slice(0, len(rests) if rests.all() else max(1, int(np.argmin(rests))))
+
+    rows: Measurement
+    flows: bool
+
+
+def resting_rows(record: Measurement, limit_a: float, most_ah: float, hold: Hold) -> Rest:
+    """The rest that a record begins with, of at most `JUDGED_ROWS`.
+
+    limit_a : A, below which a cell rests.  most_ah : charge that its rows may move, either way, and be of one state.
+    hold : how the current runs.
+    """
+    rows = record.take(slice(0, JUDGED_ROWS))
+    current = np.abs(rows.current_a)
+    small = current <= max(float(current[0]), limit_a)
+    one_state = np.abs(rows.discharged_ah(hold)) <= most_ah
+    both = small & one_state
+    n = len(rows) if both.all() else int(np.argmin(both))
+    return Rest(rows.take(slice(0, n)), flows=n < len(rows) and bool(small[n]))
 
 
 def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, physics: ModelName) -> tuple[float, float]:
@@ -103,7 +121,7 @@ def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, physics: Mo
         time = np.concatenate([flowed_s * WITHIN, flowed_s + after])
         current = np.where(time <= flowed_s, current_a, 0.0)
         before = soc + current_a * flowed_s / SECONDS_PER_HOUR / cell.capacity_ah
-        degc = open_circuit.kelvin() - ZERO_CELSIUS_K
+        degc = open_circuit.kelvin - ZERO_CELSIUS_K
         run = simulate(cell, time, current, before, (), degc, "backward", on_depletion="clip", model=physics)
         away = (run.voltage_v - open_circuit.voltage_at(float(run.series["soc"][-1]))) / rate
         for stopped_s in STOPPED_S:

@@ -23,7 +23,6 @@ from aesi.physics.effects.ambient_temperature import depends_on_temperature
 from aesi.pipeline.discovery.discover import Case
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Measurement
-from aesi.records.measurement import assumed_hold
 
 COLD = CATALOGUE["ambient_temperature"]
 """What a record may be explained by, within its own bounds."""
@@ -98,7 +97,7 @@ def _error_v(
     cannot be simulated."""
     effects = (*given.effects, COLD.activate(shift_k=shift_k))
     record = replace(record, current_a=record.current_a / size)  # all else of a cell goes with its area
-    hold = record.hold or assumed_hold(record.time_s)
+    hold = record.hold_taken
     try:
         start = initial_state(given.cell, record, soc0, hold, effects, shared=True)
         run = simulate(

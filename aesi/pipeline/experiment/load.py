@@ -184,12 +184,15 @@ def _on_grid(
     Raises DataError where one cannot be of the cell.
     """
     cell, data = given.cell, config.data
+    shared = config.cell.soc0 is not None and len(sources.records) > 1
     records: dict[str, FitRecord] = {}
     notes: list[str] = []
     for name, (measurement, known_soc0) in sources.records.items():
         check_measured(cell, [measurement])
         declared = known_soc0 if config.cell.soc0 is None else config.cell.soc0
-        start = initial_state(cell, measurement, declared, data.hold, given.effects, model=given.model)
+        start = initial_state(
+            cell, measurement, declared, data.hold, given.effects, shared=shared, model=given.model
+        )
         held = hold_sentence(measurement.name, data.hold, "hold" in data.model_fields_set, "data.hold: ")
         even = to_even(measurement, data.dt_s, data.hold)
         notes += [

@@ -141,7 +141,8 @@ class CellConfig(Section):
     """The cell: a BPX file, a folder of a saved model (its cell and effects), or `catalogue` for the one that
     belongs to the data set.
 
-    soc0 : state of charge at the first row; None finds it from the rest voltage.
+    soc0 : state of charge at the first row, of several records that of all whose voltage does not contradict it; None
+    finds it from the voltage.
     soh : share of the file's capacity that the cell had when it was measured, or that day; None takes all of it.
     model : espm, one particle an electrode, or dfn, the porous electrode; None takes that of a saved model, or
     that the file was fitted with, else espm.

@@ -16,7 +16,7 @@ from aesi.errors import AesiError
 from aesi.numerics.typing import Array
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
-from aesi.records import Hold, Measurement, assumed_hold
+from aesi.records import Hold, Measurement
 from aesi.tracer.case.fit_simulation import fit_simulation
 
 THIN_STEP_S = 1.0
@@ -55,7 +55,7 @@ class ThinnedRecord:
 
 def thinned_record(cell: Cell, data: Measurement, step_s: float = THIN_STEP_S) -> ThinnedRecord:
     """One record; at most one sample in `step_s` of a drive."""
-    hold = data.hold or assumed_hold(data.time_s)
+    hold = data.hold_taken
     longest_s = float(data.time_s[-1] - data.time_s[0]) / STEADY_SAMPLES
     steady = condensed(data, cell.nominal_capacity_ah, longest_s, STEADY_SPACING, hold)
     thin, rows = (averaged_over(data, step_s), None) if steady is None else steady

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aesi.calibration.shapes import Shapes
+from aesi.constants import ZERO_CELSIUS_K
 from aesi.physics.cell.relations import Constant
-from aesi.physics.start.open_circuit import OpenCircuit
-from aesi.records import Measurement
+from aesi.physics.rest.open_circuit import OpenCircuit
 
 INNER = np.linspace(0.002, 0.998, 4001)
 
@@ -71,12 +71,8 @@ def test_a_corrected_entropy_is_what_its_knots_say_and_warms_the_voltage(start):
     assert added(theta) == pytest.approx(entropic.columns(theta) @ z, abs=1e-5)
     assert (added(theta) > 0.0).all()
     cell = replace(start, positive=replace(start.positive, entropic=added))
-    warm, cold = (OpenCircuit(cell, at_rest(degc)).voltage_at(0.5) for degc in (45.0, 5.0))
+    warm, cold = (OpenCircuit(cell, degc + ZERO_CELSIUS_K).voltage_at(0.5) for degc in (45.0, 5.0))
     assert warm - cold == pytest.approx(40.0 * float(added(np.array([middle(cell)]))[0]), rel=1e-3)
-
-
-def at_rest(degc):
-    return Measurement([0.0, 1.0], [0.0, 0.0], [3.7, 3.7], [degc, degc])
 
 
 def middle(cell):

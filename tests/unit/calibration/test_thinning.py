@@ -9,6 +9,7 @@ import pytest
 from aesi.calibration.model import leniency, saturated
 from aesi.calibration.records.prepared import hold_told, prepared
 from aesi.calibration.records.thinning import thinned
+from aesi.physics import initial_state, simulate
 from aesi.physics.cell import Cell
 from aesi.records import Measurement
 
@@ -84,3 +85,14 @@ def test_how_the_current_was_taken_between_the_rows_of_a_fit_is_told(data, taken
     cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
     (ready,) = prepared(cell, [data], 0.8)
     assert hold_told(ready).endswith(taken)
+
+
+def test_a_start_was_read_with_another_hold_than_its_record_is_simulated_with():
+    cell = Cell.from_bpx(CELLS / "lg_m50_chen2020.bpx.json")
+    time, current = np.arange(1000.0), np.repeat(np.random.default_rng(1).normal(2.5, 4.0, 200), 5)
+    loaded = Measurement(time, current, simulate(cell, time, current, 0.7).voltage_v).between(505.0, 1000.0)
+    (ready,) = prepared(cell, [loaded], None)
+    linear, backward = (initial_state(cell, loaded, hold=hold).soc for hold in ("linear", "backward"))
+    assert ready.hold == loaded.hold_taken == "linear"
+    assert ready.start.soc == linear
+    assert linear != pytest.approx(backward, abs=1e-5)

@@ -10,7 +10,7 @@ import bpx
 import numpy as np
 import pytest
 
-from aesi.errors import CellError, SimulationError
+from aesi.errors import CellError, DataError
 from aesi.physics import Cell, initial_soc
 from aesi.physics.cell import read_soh
 
@@ -510,7 +510,7 @@ def test_the_rest_voltage_leads_back_to_the_state_of_charge(lg_m50, soc):
 
 
 def test_a_rest_voltage_out_of_range_says_which_range(lg_m50):
-    with pytest.raises(SimulationError, match=r"5\.0000 V lies outside"):
+    with pytest.raises(DataError, match=r"5\.0000 V lies outside"):
         initial_soc(lg_m50, 5.0)
 
 

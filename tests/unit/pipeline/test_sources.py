@@ -4,10 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_experiment import BPX, experiment, write_record
+from small_experiment import BPX, PERIOD_S, SOC0, experiment, write_record
 
+from aesi.constants import SECONDS_PER_HOUR
 from aesi.data.reading import Reading
 from aesi.errors import DataError, SimulationError
+from aesi.physics import Cell
+from aesi.physics.initial_state import OTHER_STATE
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.sources import _record, discovery_records, sources_of, with_keys
@@ -102,3 +105,21 @@ def test_a_record_on_which_a_model_runs_empty_was_not_named_and_the_remedy_was_a
         SimulationError, match=r"^drive.csv: .* or end the file before that, or give it as a test, "
     ):
         load(config)
+
+
+def test_one_state_of_charge_was_believed_for_every_record_of_a_run(tmp_path):
+    """As in `aesi discover` and `aesi calibrate`: a record whose voltage contradicts it starts where that says."""
+    import pandas as pd
+
+    whole = write_record(tmp_path)
+    later = tmp_path / "later.csv"
+    rows = pd.read_csv(whole).iloc[3 * PERIOD_S :]  # three fifths on, where a rest begins
+    rows.to_csv(later, index=False)
+    data = {"kind": "files", "train": [str(whole)], "test": [str(later)]}
+    loaded = load(experiment(whole, data=data))
+    drawn = np.trapezoid(pd.read_csv(whole)["current_a"][: 3 * PERIOD_S + 1]) / SECONDS_PER_HOUR
+    capacity_ah = Cell.from_bpx(BPX).capacity_ah
+    assert loaded.soc0[str(whole)] == SOC0
+    assert loaded.soc0[str(later)] == pytest.approx(SOC0 - drawn / capacity_ah, abs=0.02)
+    assert abs(loaded.soc0[str(later)] - SOC0) > OTHER_STATE
+    assert any("later" in note and "not the 0.8 that was given" in note for note in loaded.notes)

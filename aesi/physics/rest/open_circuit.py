@@ -28,20 +28,33 @@ GRID = 4001
 """States of charge at which potentials are looked up."""
 
 
+def initial_soc(cell: Cell, voltage_v: float, kelvin: float | None = None) -> float:
+    """State of charge of a cell that rests at `voltage_v`: 1 of a full charge, else that of the open-circuit voltage.
+
+    kelvin : K; None is the cell file's initial temperature.
+    Voltages up to `BEYOND_V` beyond full and empty belong to such a cell. Raises DataError outside, naming the range.
+    """
+    open_circuit = OpenCircuit(cell, kelvin)
+    return 1.0 if open_circuit.charged(voltage_v) else open_circuit.reading(voltage_v, READING_V)[0]
+
+
 class OpenCircuit:
-    """The open-circuit voltage of a cell (effects folded in) at the temperature of a record's first row."""
+    """The open-circuit voltage of a cell (effects folded in) at one temperature.
 
-    def __init__(self, cell: Cell, record: Measurement) -> None:
-        self.cell, self.record = cell, record
+    kelvin : K; None is the cell file's initial temperature.  name : of the record whose voltages are read, if any.
+    """
+
+    def __init__(self, cell: Cell, kelvin: float | None = None, name: str = "") -> None:
+        self.cell, self.name = cell, name
+        self.kelvin = cell.initial_temperature_k if kelvin is None else kelvin
         self.soc = np.linspace(*aged_range(cell), GRID)
-        self.ocv = np.maximum.accumulate(_ocv(cell, self.soc, self.kelvin()))
+        self.ocv = np.maximum.accumulate(_ocv(cell, self.soc, self.kelvin))
 
-    def kelvin(self) -> float:
-        """K, at the first row."""
-        measured = self.record.temperature_degc
-        if measured is not None:
-            return float(measured[0]) + ZERO_CELSIUS_K
-        return self.cell.initial_temperature_k
+    @classmethod
+    def at_start(cls, cell: Cell, record: Measurement) -> OpenCircuit:
+        """At the temperature of a record's first row, where it was measured."""
+        degc = record.temperature_degc
+        return cls(cell, None if degc is None else float(degc[0]) + ZERO_CELSIUS_K, record.name)
 
     def soc_at(self, voltage_v: float) -> float:
         """State of charge of an open-circuit voltage, held at the ends of the range."""
@@ -65,8 +78,9 @@ class OpenCircuit:
         """State of charge of an open-circuit voltage, and half of what the voltage +/- `spread_v` spans."""
         if not self.admits(voltage_v, spread_v):
             low, high = np.interp([0.0, 1.0], self.soc, self.ocv)
+            of_record = f"{self.name}: " if self.name else ""
             raise DataError(
-                f"{self.record.name}: a rest voltage of {voltage_v:.4f} V lies outside [{low:.3f}, {high:.3f}] V, what "
+                f"{of_record}a rest voltage of {voltage_v:.4f} V lies outside [{low:.3f}, {high:.3f}] V, what "
                 f"the open-circuit potentials and stoichiometry limits of {self.cell.name} allow; check that the "
                 "record belongs to this cell, or give --soc0."
             )
