@@ -19,6 +19,7 @@ from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
 from aesi.errors import CellError, DataError, InputError
 from aesi.numerics.typing import Array, BoolArray, Numbers
+from aesi.numerics.visited import Visited
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
 from aesi.physics.belongs import check_voltage
@@ -28,6 +29,7 @@ from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import HEAD, part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
+from aesi.pipeline.product.trained import outside_trained, trained_on
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
@@ -80,6 +82,11 @@ class HybridModel:
     def with_soh(self, soh: Soh | None) -> Self:
         """A copy with the cell at a state of health, see `Cell.with_soh`; as it is for None."""
         return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
+
+    @property
+    def visited(self) -> Visited | None:
+        """The charges and temperatures that the correction was trained on, where they are known."""
+        return trained_on(self.correction, self.bands)
 
     def predict(
         self,
@@ -236,22 +243,23 @@ class HybridModel:
 
     def _free_run(self, series: ErrorSeries, error0_v: float) -> Prediction:
         n = len(series)
-        run = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool))
+        run, weight = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool)), np.full(n, np.nan)
         if self.correction is not None:
-            run = self.correction.free_run(series, error0_v)
+            run, weight = self.correction.free_run(series, error0_v), self.correction.kept(series)
+            run = replace(run, outside=outside_trained(run.outside, series, self.visited))
         low = high = np.full(n, np.nan)
         if self.bands is not None:
             reach = 0.0 if self.correction is None else self.correction.reach(series, error0_v=error0_v)
             band = self.bands.intervals(series, run, reach)
             low, high = band.lower_v, band.upper_v
         alpha = None if self.bands is None else self.bands.alpha
-        return Prediction.of(series, run.error_v, low, high, run.outside, alpha)
+        return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
 
     def _one_step(self, series: ErrorSeries) -> Prediction:
         n = len(series)
         if self.correction is None:
             none = np.full(n, np.nan)
-            return Prediction.of(series, np.zeros(n), none, none, np.zeros(n, dtype=bool), None)
+            return Prediction.of(series, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
         error = self.correction.one_step(series)
         error[0] = 0.0  # nothing was measured before the first sample
         low = high = np.full(n, np.nan)
@@ -261,7 +269,8 @@ class HybridModel:
             band = self.intervals.intervals(residual, series.current_a)
             low, high = (np.concatenate([[np.nan], bound[1:]]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
-        return Prediction.of(series, error, low, high, self.correction.outside(series), alpha)
+        outside = outside_trained(self.correction.outside(series), series, self.visited)
+        return Prediction.of(series, error, low, high, outside, self.correction.kept(series), alpha)
 
     def _back(self, prediction: Prediction, record: Measurement, soc0: float) -> Prediction:
         """Onto the record's own rows: the physics simulated there, the correction and its band interpolated."""
@@ -280,6 +289,7 @@ class HybridModel:
             physics_v=physics.model_v,
             soc=physics.soc,
             outside=onto(prediction.outside.astype(float)) > 0,
+            weight=onto(prediction.weight),
         )
 
 
