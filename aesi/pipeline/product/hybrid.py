@@ -17,13 +17,14 @@ import numpy as np
 
 from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
-from aesi.errors import CellError, DataError, InputError
+from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
 from aesi.numerics.visited import Visited
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Soh
+from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
@@ -38,6 +39,9 @@ MOST_STEP = 1.5
 """Steps of the correction between two rows, beyond which the voltage a step before the later one is not known from
 rows before it: of what would be filled in a third and more is the row's own. A convention: loggers' stamps wander by
 less."""
+
+END_BEFORE = ", or end the record before that (--to-s on the command line)."
+"""How a sentence on a record that runs out ends here: a correction and bands say nothing of a cell that has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,16 +226,21 @@ class HybridModel:
         return to_even(record, self.dt_s, self.hold)
 
     def _series(self, record: Measurement, soc0: float) -> ErrorSeries:
-        run = simulate(
-            self.cell,
-            record.time_s,
-            record.current_a,
-            soc0,
-            self.effects,
-            record.temperature_degc,
-            self.hold,
-            model=self.model,
-        )
+        try:
+            run = simulate(
+                self.cell,
+                record.time_s,
+                record.current_a,
+                soc0,
+                self.effects,
+                record.temperature_degc,
+                self.hold,
+                model=self.model,
+            )
+        except SimulationError as error:
+            if not str(error).endswith(RUN_ON):
+                raise
+            raise SimulationError(f"{str(error).removesuffix(RUN_ON)}{END_BEFORE}") from None
         return error_series(record, run, self.dt_s)
 
     def _with_slopes(self, series: ErrorSeries, record: Measurement, soc0: float) -> ErrorSeries:
