@@ -54,6 +54,13 @@ class Visited:
         """(n,) exp(-(d / LENGTH)**2 / 2), of a model's errors there and at the nearest visited state of charge."""
         return np.asarray(np.exp(-0.5 * (self.distance(soc) / LENGTH) ** 2))
 
+    def beyond_k(self, temperature_degc: Array) -> Array:
+        """(n,) K, how far each temperature lies above the span, negative below it; 0 within, and where none was
+        measured."""
+        if self.temperature_degc is None:
+            return np.zeros(len(temperature_degc))
+        return np.asarray(np.nan_to_num(temperature_degc - np.clip(temperature_degc, *self.temperature_degc)))
+
     def per_energy(self, temperature_degc: Array | None) -> Array | float:
         """(n,) mol/J, |1 / T - 1 / T_near| / R, >= 0: by how much the logarithm of a rate at T moves with its
         activation energy, if it is known at the nearest temperature of the span. 0 where none was measured."""

@@ -28,6 +28,7 @@ from aesi.pipeline.notes import of_another_model, of_day, on_temperatures, tempe
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
+from aesi.pipeline.product.trained import trained_figures, trained_sentence
 from aesi.records import Hold, Measurement, Run, assumed_hold, hold_sentence
 
 if TYPE_CHECKING:
@@ -233,10 +234,14 @@ def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, me
         empty = ", and lower_v and upper_v are empty" if prediction.nominal is None else ""
         said = [f"the model carries no learnt correction: one step ahead is the same as a free run{empty}."]
     else:
-        said = [
-            f"{record.name}: {_percent(prediction.outside)} of the rows lie outside the range the correction was "
-            "trained on."
-        ]
+        figures = trained_figures(
+            prediction.outside, record.temperature_degc, model.correction, model.visited, prediction.weight
+        )
+        said = [trained_sentence(record.name, figures, one_step=measured)]
+        if model.correction.fade is not None and model.correction.fade.amplitude == 0.0:
+            said.append(
+                "no drive that was left out bore the correction out, so that it adds nothing anywhere."
+            )
     banded = np.isfinite(prediction.lower_v)
     if prediction.nominal is not None and np.all(np.isfinite(record.voltage_v)):
         low, high = prediction.lower_v[banded], prediction.upper_v[banded]

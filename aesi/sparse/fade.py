@@ -50,10 +50,14 @@ class Fade:
     def weight(
         self, scaled: Array, soc: Array, temperature_degc: Array | None, excess: Array | None
     ) -> Array:
-        """(n,) a w along scaled inputs (n, n_inputs) that were not held at the edge, with the leverage's excess."""
+        """(n,) a w; arguments as of `kept`."""
+        return self.amplitude * self.kept(scaled, soc, temperature_degc, excess)
+
+    def kept(self, scaled: Array, soc: Array, temperature_degc: Array | None, excess: Array | None) -> Array:
+        """(n,) w along scaled inputs (n, n_inputs) that were not held at the edge, with the leverage's excess."""
         leverage = 0.0 if excess is None else KAPPA * excess**2
         near = self.region.nearness(scaled, soc, temperature_degc)
-        return np.asarray(self.amplitude * near / (1.0 + leverage))
+        return np.asarray(near / (1.0 + leverage))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values."""

@@ -129,6 +129,12 @@ class SparseModel:
         """(n,) True where an input or the measured error lies outside the trained range."""
         return self.scaling.is_outside(self._variables(series))
 
+    def kept(self, series: ErrorSeries) -> Array:
+        """(n,) share of the correction that is kept along a record, w of fade.py; 1 of one that does not fade."""
+        if self.fade is None:
+            return np.ones(len(series))
+        return self.fade.kept(*self._place(self._variables(series), series))
+
     def gain(self, series: ErrorSeries) -> Array:
         """(n,) slope of the map e[k] -> e[k + 1] along a record; stable where its size is below one."""
         if not self.has_feedback:
@@ -251,5 +257,11 @@ class SparseModel:
     def _weight(self, variables: Array, series: ErrorSeries) -> Array:
         """(n,) what is left of the correction."""
         assert self.fade is not None
+        return self.fade.weight(*self._place(variables, series))
+
+    def _place(
+        self, variables: Array, series: ErrorSeries
+    ) -> tuple[Array, Array, Array | None, Array | None]:
+        """What a fade asks of each row."""
         unheld = self.scaling.apply(variables) + self.scaling.cut_off(variables)
-        return self.fade.weight(unheld[:, 1:], series.soc, series.temperature_degc, self._excess(variables))
+        return unheld[:, 1:], series.soc, series.temperature_degc, self._excess(variables)

@@ -25,6 +25,7 @@ BY_SIGNAL = INTERRUPTED - signal.SIGINT
 HEARD = (signal.SIGINT, signal.SIGTERM)
 
 
+_hearing = threading.Event()
 _asked = threading.Event()
 _told = threading.Event()
 _ending = threading.Lock()
@@ -50,13 +51,34 @@ def ending_soon_on_interrupt() -> Iterator[None]:
         yield
         return
     before = {number: signal.signal(number, _interrupt) for number in HEARD}
+    _hearing.set()
     try:
         yield
     finally:
         if _asked.is_set():
             end_now()
+        _hearing.clear()
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@contextmanager
+def hearing_signals_again() -> Iterator[None]:
+    """Within, signals are heard as in `ending_soon_on_interrupt`, which it has to be within, whatever took its place.
+
+    Prefect takes SIGTERM while a flow runs: it unwinds the flow first and sends the signal on when it is left, when
+    how to go on is no longer known; where its server was ended too, it never does, and all ends in its traceback.
+    """
+    if not _hearing.is_set() or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = {number: signal.signal(number, _interrupt) for number in HEARD}
+    try:
+        yield
+    finally:
+        if not _asked.is_set():
+            for number, handler in before.items():
+                signal.signal(number, handler)
 
 
 @contextmanager

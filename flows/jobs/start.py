@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
@@ -17,6 +18,7 @@ from flows.jobs.temporary_server import (
     CURRENT,
     KeptWork,
     ServerNotStarted,
+    ended_by_signal,
     of_prefect,
     start_server,
 )
@@ -140,6 +142,8 @@ def _with_or_without(under_prefect: Callable[[], T], plainly: Callable[[], T], u
     except ServerNotStarted as reason:
         Console().say(f"Prefect's temporary server did not start ({reason}); the stages run without it.")
     except Exception as error:
+        if ended_by_signal(error):  # between Prefect's first steps and those of the job
+            signal.raise_signal(signal.SIGTERM)
         if not of_prefect(error):
             raise
         if not job.errors:

@@ -15,6 +15,7 @@ from typing import Any, Generic, TypeVar
 
 from aesi.errors import AesiError
 from flows.base.console import first_line
+from flows.base.interrupt import hearing_signals_again
 from flows.base.time_limit import Overdue, time_limit
 
 T = TypeVar("T")
@@ -58,6 +59,16 @@ def no_answer(error: Exception) -> bool:
     import httpx
 
     return isinstance(error, httpx.TransportError)
+
+
+def ended_by_signal(error: BaseException) -> bool:
+    """Whether it came of Prefect's attempt to tell its server, which may have been ended too, that a signal came."""
+    from prefect.exceptions import TerminationSignal
+
+    one: BaseException | None = error
+    while one is not None and not isinstance(one, TerminationSignal):
+        one = one.__cause__ or one.__context__
+    return one is not None
 
 
 def stop_sending() -> None:
@@ -105,6 +116,9 @@ CURRENT: ContextVar[KeptWork[Any] | None] = ContextVar("job", default=None)
 
 
 def as_the_job(work: Callable[[], T]) -> T:
-    """The work of a flow, kept for the process that started it."""
+    """The work of a flow, kept for the process that started it, and ended by signals as that process is."""
     job = CURRENT.get()
-    return work() if job is None else job.do(work)
+    if job is None:
+        return work()
+    with hearing_signals_again():
+        return job.do(work)

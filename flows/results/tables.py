@@ -1,13 +1,15 @@
 """`aesi tables`: the paper's tables rebuilt from the tracking store, and from nothing else.
 
 Each finished run carries its rows as the artifact summary.json. Runs that differ by seed alone are put
-together as mean and spread, with their ids beneath; those of another version of the program are named, and left out.
+together as mean and spread, with their ids beneath; those of other settings or of another version of the program are
+named, and left out.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,6 +22,19 @@ RANGED = ("test_mser_pct", "test_mser_recalibrated_pct", "coverage_pct")
 """What tables show with the range over seeds."""
 COUNTED = ("diverged",)
 """What runs have together: a mean of them would say nothing."""
+NO_SETTING = ("seed", "versions", "search.workers", "search.timeout_s", "search.memory_mb")
+NO_SETTINGS = ("chosen_", "runner.", "tracking.")
+"""Tracked parameters, and beginnings of some, that tell runs of one setting apart."""
+MOST_NAMED = 6
+"""Runs, or keys of settings, in one sentence: more are counted. A convention."""
+
+
+@dataclass(frozen=True)
+class _LeftOut:
+    """Finished runs that are not shown, newest first."""
+
+    by_setting: tuple[Any, ...] = ()
+    by_program: tuple[Any, ...] = ()
 
 
 def tables_of(
@@ -92,9 +107,10 @@ def tracked_as(experiment: str) -> tuple[str, str | None]:
     return config.name, config.tracking.uri
 
 
-def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any], list[Any]]:
+def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any], _LeftOut]:
     """The runs asked for, else the newest finished run of each seed that shares setting and program with the newest
-    run; and those of seeds that only another version of the program has run.
+    run; and what is left out: all of other settings, and those of seeds that only another version of the program has
+    run.
 
     A discovery of the same experiment has a verdict and no tables.
     """
@@ -107,19 +123,22 @@ def _chosen(store: Store, name: str, run_ids: Sequence[str]) -> tuple[list[Any],
     finished = [run for run in store.runs(experiment_id, condition) if "verdict" not in run.data.tags]
     if run_ids:
         asked = {run.info.run_id: run for run in (_by_id(finished, i, name) for i in run_ids)}
-        return _of_one_setting(asked), []
+        return _of_one_setting(asked), _LeftOut()
     if not finished:
         raise InputError(f"experiment {name!r} has no finished run yet; `aesi run` makes one.")
     newest = finished[0].data.tags
     of_program: dict[str, Any] = {}
     of_others: dict[str, Any] = {}
+    otherwise_set = []
     for run in finished:
         tags, seed = run.data.tags, run.data.params.get("seed", "0")
         if tags.get(SETTING) == newest.get(SETTING):
             same = tags.get(CODE) == newest.get(CODE)  # runs of before it was tracked stay together
             (of_program if same else of_others).setdefault(seed, run)
+        else:
+            otherwise_set.append(run)
     left_out = {seed: run for seed, run in of_others.items() if seed not in of_program}
-    return _by_seed(of_program), _by_seed(left_out)
+    return _by_seed(of_program), _LeftOut(tuple(otherwise_set), tuple(_by_seed(left_out)))
 
 
 def _by_seed(runs: Mapping[str, Any]) -> list[Any]:
@@ -158,7 +177,7 @@ def _copy_figures(store: Store, run_id: str, folder: Path) -> None:
             store.client.download_artifacts(run_id, item.path, str(folder))
 
 
-def _footer(name: str, runs: Sequence[Any], left_out: Sequence[Any], format: str) -> str:
+def _footer(name: str, runs: Sequence[Any], left_out: _LeftOut, format: str) -> str:
     text = f"Experiment {name}, tracked run{'s' if len(runs) > 1 else ''} {_ids(runs)}."
     if len(runs) > 1:
         text = f"Mean over {len(runs)} seeds. {text}"
@@ -168,10 +187,36 @@ def _footer(name: str, runs: Sequence[Any], left_out: Sequence[Any], format: str
     for run in runs:
         told = (run.data.tags.get(tag) for tag in ("aesi.fallback", UNFITTED))
         text = " ".join((text, *filter(None, told)))
-    if left_out:
-        text = f"{text} Left out, as of another version of the program: {_ids(left_out)}."
+    if left_out.by_program:
+        text = f"{text} Left out, as of another version of the program: {_ids(left_out.by_program)}."
+    if others := left_out.by_setting:
+        keys = _set_otherwise(runs[0].data.params, [run.data.params for run in others])
+        text += (
+            f" {len(others)} run{'s' if len(others) > 1 else ''} with other settings{keys and f' ({keys})'} left out: "
+            f"{_some([run.info.run_id[:8] for run in others])}; --run ID takes one."
+        )
     return {"md": text, "tex": f"% {text}", "csv": f"# {text}"}[format]
 
 
 def _ids(runs: Sequence[Any]) -> str:
     return ", ".join(f"{run.info.run_id} (seed {run.data.params.get('seed', '?')})" for run in runs)
+
+
+def _set_otherwise(shown: Mapping[str, str], others: Sequence[Mapping[str, str]]) -> str:
+    """Keys of the settings in which any of the others differs from what is shown."""
+    keys = dict.fromkeys(key for params in (shown, *others) for key in params)
+    return _some(
+        [
+            key
+            for key in keys
+            if key not in NO_SETTING
+            and not key.startswith(NO_SETTINGS)
+            and any(params.get(key) != shown.get(key) for params in others)
+        ]
+    )
+
+
+def _some(words: Sequence[str]) -> str:
+    """`a, b, c and 4 more`."""
+    more = len(words) - MOST_NAMED
+    return ", ".join(words[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -36,6 +36,8 @@ ADDRESSES = (("tracking", "uri"), ("runner", "storage"), ("runner", "address"))
 """Sections and keys of an experiment that hold the address of a server or a database."""
 HEADLINES = ("free_run", "one_step", "intervals")
 """What MLflow's charts show first: it draws a section a prefix, in the order of the alphabet."""
+NO_METRICS = ("test_records",)
+"""Sections by record: what a file is called may be no name of a metric. They are in summary.json."""
 WITH_UNIT = {
     "k_step": "test_rmse_mv_by_horizon_s",
     "k_step_persistence": "persistence_rmse_mv_by_horizon_s",
@@ -231,6 +233,8 @@ def _numbers(row: Mapping[str, Any], prefix: str = "") -> dict[str, float]:
     """The numbers of a table row as metrics: free_run/test_mser_pct and so on, what is no headline below tables/."""
     result: dict[str, float] = {}
     for name, value in row.items():
+        if name in NO_METRICS:
+            continue
         if isinstance(value, Mapping):
             below = prefix or ("" if name in HEADLINES else "tables/")
             result |= _numbers(value, f"{below}{WITH_UNIT.get(name, name)}/")

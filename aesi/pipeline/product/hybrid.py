@@ -17,17 +17,20 @@ import numpy as np
 
 from aesi.conformal import Calibrated, FreeRunBands, calibrated_from_dict
 from aesi.data.resample import is_even, to_even
-from aesi.errors import CellError, DataError, InputError
+from aesi.errors import CellError, DataError, InputError, SimulationError
 from aesi.numerics.typing import Array, BoolArray, Numbers
+from aesi.numerics.visited import Visited
 from aesi.physics import ActiveEffect, Cell, ModelName, initial_state, simulate
 from aesi.physics.arguments import check_cell, check_choice, check_soc, checked_effects
 from aesi.physics.belongs import check_voltage
 from aesi.physics.cell import Soh
+from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.model_folder import HEAD, part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
+from aesi.pipeline.product.trained import outside_trained, trained_on
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
@@ -36,6 +39,9 @@ MOST_STEP = 1.5
 """Steps of the correction between two rows, beyond which the voltage a step before the later one is not known from
 rows before it: of what would be filled in a third and more is the row's own. A convention: loggers' stamps wander by
 less."""
+
+END_BEFORE = ", or end the record before that (--to-s on the command line)."
+"""How a sentence on a record that runs out ends here: a correction and bands say nothing of a cell that has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +86,11 @@ class HybridModel:
     def with_soh(self, soh: Soh | None) -> Self:
         """A copy with the cell at a state of health, see `Cell.with_soh`; as it is for None."""
         return self if soh is None else replace(self, cell=self.cell.with_soh(soh))
+
+    @property
+    def visited(self) -> Visited | None:
+        """The charges and temperatures that the correction was trained on, where they are known."""
+        return trained_on(self.correction, self.bands)
 
     def predict(
         self,
@@ -215,16 +226,21 @@ class HybridModel:
         return to_even(record, self.dt_s, self.hold)
 
     def _series(self, record: Measurement, soc0: float) -> ErrorSeries:
-        run = simulate(
-            self.cell,
-            record.time_s,
-            record.current_a,
-            soc0,
-            self.effects,
-            record.temperature_degc,
-            self.hold,
-            model=self.model,
-        )
+        try:
+            run = simulate(
+                self.cell,
+                record.time_s,
+                record.current_a,
+                soc0,
+                self.effects,
+                record.temperature_degc,
+                self.hold,
+                model=self.model,
+            )
+        except SimulationError as error:
+            if not str(error).endswith(RUN_ON):
+                raise
+            raise SimulationError(f"{str(error).removesuffix(RUN_ON)}{END_BEFORE}") from None
         return error_series(record, run, self.dt_s)
 
     def _with_slopes(self, series: ErrorSeries, record: Measurement, soc0: float) -> ErrorSeries:
@@ -236,22 +252,23 @@ class HybridModel:
 
     def _free_run(self, series: ErrorSeries, error0_v: float) -> Prediction:
         n = len(series)
-        run = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool))
+        run, weight = FreeRun(np.zeros(n), None, np.zeros(n, dtype=bool)), np.full(n, np.nan)
         if self.correction is not None:
-            run = self.correction.free_run(series, error0_v)
+            run, weight = self.correction.free_run(series, error0_v), self.correction.kept(series)
+            run = replace(run, outside=outside_trained(run.outside, series, self.visited))
         low = high = np.full(n, np.nan)
         if self.bands is not None:
             reach = 0.0 if self.correction is None else self.correction.reach(series, error0_v=error0_v)
             band = self.bands.intervals(series, run, reach)
             low, high = band.lower_v, band.upper_v
         alpha = None if self.bands is None else self.bands.alpha
-        return Prediction.of(series, run.error_v, low, high, run.outside, alpha)
+        return Prediction.of(series, run.error_v, low, high, run.outside, weight, alpha)
 
     def _one_step(self, series: ErrorSeries) -> Prediction:
         n = len(series)
         if self.correction is None:
             none = np.full(n, np.nan)
-            return Prediction.of(series, np.zeros(n), none, none, np.zeros(n, dtype=bool), None)
+            return Prediction.of(series, np.zeros(n), none, none, np.zeros(n, dtype=bool), none, None)
         error = self.correction.one_step(series)
         error[0] = 0.0  # nothing was measured before the first sample
         low = high = np.full(n, np.nan)
@@ -261,7 +278,8 @@ class HybridModel:
             band = self.intervals.intervals(residual, series.current_a)
             low, high = (np.concatenate([[np.nan], bound[1:]]) for bound in (band.lower_v, band.upper_v))
         alpha = None if self.intervals is None else self.intervals.alpha
-        return Prediction.of(series, error, low, high, self.correction.outside(series), alpha)
+        outside = outside_trained(self.correction.outside(series), series, self.visited)
+        return Prediction.of(series, error, low, high, outside, self.correction.kept(series), alpha)
 
     def _back(self, prediction: Prediction, record: Measurement, soc0: float) -> Prediction:
         """Onto the record's own rows: the physics simulated there, the correction and its band interpolated."""
@@ -280,6 +298,7 @@ class HybridModel:
             physics_v=physics.model_v,
             soc=physics.soc,
             outside=onto(prediction.outside.astype(float)) > 0,
+            weight=onto(prediction.weight),
         )
 
 

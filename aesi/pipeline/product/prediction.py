@@ -20,8 +20,9 @@ class Prediction:
 
     voltage_v, lower_v, upper_v : (n,) V; the bounds are NaN where the model carries no calibrated band.
     physics_v : (n,) V, the ESPM with its effects alone.  soc : (n,).
-    outside : (n,) True where an input lies outside the range the correction was trained on: the band is not
-    calibrated there.
+    outside : (n,) True where an input, or the temperature, lies outside the range the correction was trained on.
+    weight : (n,) share of the correction that is kept, 0 to 1, where it fades towards the physics with the distance
+    from what it was trained on; 1 of one that does not fade, NaN where the model carries none.
     """
 
     time_s: Array
@@ -31,6 +32,7 @@ class Prediction:
     physics_v: Array
     soc: Array
     outside: BoolArray
+    weight: Array
     nominal: float | None = None
 
     def __len__(self) -> int:
@@ -57,7 +59,7 @@ class Prediction:
         """The prediction as a table, one row a sample."""
         import pandas as pd
 
-        names = ("time_s", "voltage_v", "lower_v", "upper_v", "physics_v", "soc", "outside")
+        names = ("time_s", "voltage_v", "lower_v", "upper_v", "physics_v", "soc", "outside", "weight")
         return pd.DataFrame({name: getattr(self, name) for name in names})
 
     @classmethod
@@ -68,6 +70,7 @@ class Prediction:
         low_v: Array,
         high_v: Array,
         outside: BoolArray,
+        weight: Array,
         alpha: float | None,
     ) -> Prediction:
         """The physics of `series` with an error added to it; low_v, high_v : (n,) V, the band about the sum.
@@ -83,5 +86,6 @@ class Prediction:
             physics_v=series.model_v,
             soc=series.soc,
             outside=outside,
+            weight=weight,
             nominal=None if alpha is None else 1.0 - alpha,
         )

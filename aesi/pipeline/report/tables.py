@@ -11,6 +11,7 @@ absent; beyond the published schema a row may carry
     free_run_intervals   the same keys, in free run; with inside_coverage_pct, and pieces and
                          worst_piece_coverage_pct of the calibration
     bands_by_horizon     {"1": the same keys, ...}, by the time since the last measurement in seconds
+    test_records         {record: rmse_mv, mser_pct, outside_pct, kept_pct, mean_degc, beyond_k}, in free run
     seeds      how many runs the row is the mean of; a group then holds spread, {key: [lowest, highest]}
     seconds    wall time of fit and evaluation
 
@@ -108,6 +109,29 @@ def free_run_band_table(models: Sequence[Row]) -> Table:
     return _table("free-run-bands", caption, columns, rows)
 
 
+def record_table(models: Sequence[Row]) -> Table:
+    """Free run on each test record, where the other tables pool several."""
+    rows = [
+        {"name": f"{row['name']}, {record}", "record": figures}
+        for row in _having(models, "test_records")
+        if len(row["test_records"]) > 1
+        for record, figures in row["test_records"].items()
+    ]
+    columns: list[Column] = [
+        ("RMSE, mV", lambda row: _number(row, "record.rmse_mv", 2)),
+        ("MSER, %", lambda row: _number(row, "record.mser_pct", 2)),
+        ("mean temperature, degC", lambda row: _number(row, "record.mean_degc", 1)),
+        ("outside, %", lambda row: _number(row, "record.outside_pct", 1)),
+        ("kept, %", lambda row: _number(row, "record.kept_pct", 1)),
+    ]
+    caption = (
+        "Each test record by itself. Regime: free run. MSER: against the declared physics. Outside: share of samples "
+        "with an input, or the temperature, outside the range that the correction was trained on. Kept: what is left "
+        "of a correction that fades towards the physics with the distance from there, in the mean."
+    )
+    return _table("records", caption, columns, rows)
+
+
 def one_step_table(models: Sequence[Row]) -> Table:
     """One step ahead, beside persistence."""
     columns: list[Column] = [
@@ -140,6 +164,7 @@ def k_step_table(models: Sequence[Row]) -> Table:
 
 TABLES: tuple[Callable[[Sequence[Row]], Table], ...] = (
     free_run_table,
+    record_table,
     one_step_table,
     k_step_table,
     interval_table,

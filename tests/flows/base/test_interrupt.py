@@ -67,6 +67,29 @@ def ended_by(number, code, closing, tmp_path):
     assert not child.is_running() or child.status() == psutil.STATUS_ZOMBIE
 
 
+TAKEN = """
+import os, signal, sys
+from flows.base.interrupt import ending_soon_on_interrupt, hearing_signals_again, kept_on_interrupt
+class Theirs(BaseException): pass
+def theirs(number, frame): raise Theirs
+with ending_soon_on_interrupt():
+    signal.signal(signal.SIGTERM, theirs)  # as a flow engine does
+    with hearing_signals_again():
+        pass
+    assert signal.getsignal(signal.SIGTERM) is theirs
+    with hearing_signals_again(), kept_on_interrupt("Go on."):
+        os.kill(os.getpid(), signal.SIGTERM)
+"""
+
+
+def test_a_signal_that_a_library_has_taken_said_nothing_of_how_to_go_on():
+    done = subprocess.run(
+        [sys.executable, "-c", TAKEN], env=WITH_US, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 143
+    assert done.stderr == "Stopped. Go on.\n"
+
+
 STARTING = """
 import time
 from flows.base.interrupt import ending_soon_on_interrupt

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import subprocess
 import sys
 from datetime import date
@@ -16,6 +17,7 @@ from hypothesis import strategies as st
 
 import aesi
 from aesi.errors import InputError
+from aesi.pipeline.product.hybrid import HybridModel
 from flows import cli
 from flows.commands.options import dates, day, priors
 
@@ -432,6 +434,21 @@ def test_a_record_that_the_model_cannot_follow_left_the_command_line_with_nothin
     ran_out_s = table.time_s[table.depleted.to_numpy().argmax()]
     assert 0.0 < ran_out_s < table.time_s.iloc[-1]
     assert f"runs empty or full in this model at {ran_out_s:g} s, and is held there" in err
+
+
+def test_a_prediction_that_runs_empty_advised_an_option_that_the_command_lacks(call, cell, current, tmp_path):
+    folder = HybridModel(aesi.Cell.from_bpx(cell)).save(tmp_path / "model")
+    hard = 40.0 * pd.read_csv(current).current_a.abs()
+    pd.read_csv(current).assign(current_a=hard).to_csv(tmp_path / "i.csv", index=False)
+    predict = ("predict", "--model", folder, "--current", tmp_path / "i.csv", "--out", tmp_path / "o.csv")
+    code, _, err = call(*predict, "--soc0", 0.6)
+    assert code == 1
+    assert "run-on" not in err
+    assert "on_depletion" not in err
+    assert "or end the record before that (--to-s on the command line)." in err
+    first_s = min(float(at) for at in re.findall(r"at ([\d.]+) s", err))
+    code, _, err = call(*predict, "--soc0", 0.6, "--to-s", first_s - 1.0)
+    assert code == 0, err
 
 
 def test_the_temperature_of_a_simulated_file_was_not_read_again(call, cell, current, tmp_path):

@@ -37,8 +37,22 @@ def record(tmp_path):
     return tmp_path / "drive.csv"
 
 
-def interrupted(arguments, at, after_s=1.0):
-    """What a command says from the moment on when Ctrl-C reaches it, some time after a line with `at` in it."""
+def to_the_group(number):
+    """As a terminal sends Ctrl-C, and `timeout` SIGTERM."""
+    return number, lambda process: os.killpg(process.pid, number)
+
+
+def to_the_command(number):
+    """As a scheduler sends SIGTERM."""
+    return number, lambda process: process.send_signal(number)
+
+
+CTRL_C = to_the_group(signal.SIGINT)
+
+
+def interrupted(arguments, at, after_s=1.0, by=CTRL_C):
+    """What a command says from the moment on when a signal reaches it, some time after a line with `at` in it."""
+    number, send = by
     process = subprocess.Popen(
         [sys.executable, "-m", "flows.cli", *arguments],
         env=os.environ | {"PYTHONPATH": str(ROOT)},
@@ -51,11 +65,11 @@ def interrupted(arguments, at, after_s=1.0):
     time.sleep(after_s)
     family = psutil.Process(process.pid).children(recursive=True)
     assert family  # Prefect's temporary server at least
-    os.killpg(process.pid, signal.SIGINT)
+    send(process)
     with process.stderr:
         rest = process.stderr.read()
     process.wait(timeout=30)
-    assert process.returncode == 130
+    assert process.returncode == 128 + number
     psutil.wait_procs(family, timeout=1.0)
     assert not [one for one in family if one.is_running() and one.status() != psutil.STATUS_ZOMBIE]
     return [
@@ -71,6 +85,13 @@ def test_a_run_interrupted_in_its_search_goes_on(aesi, arguments, tracked):
     _, said = done.communicate(timeout=240)
     assert done.returncode == 0, said
     assert "resumed" in said
+
+
+@pytest.mark.parametrize("send", [to_the_command, to_the_group])
+def test_a_run_that_a_scheduler_ended_told_no_way_back_or_showed_a_traceback(arguments, tracked, send):
+    said = interrupted(arguments(prefect=True), " started", by=send(signal.SIGTERM))
+    assert len(said) == 1
+    assert said[0].startswith("Stopped. Everything so far is kept; go on with: aesi run")
 
 
 def test_a_discovery_interrupted_in_its_search_goes_on(aesi, record, tracked):

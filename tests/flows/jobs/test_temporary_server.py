@@ -1,5 +1,6 @@
 """Prefect's server may start late or go away: a run whose numbers are fine does not fail of it."""
 
+import sys
 import time
 
 import httpx
@@ -45,6 +46,24 @@ def test_what_the_work_raised_is_raised_where_prefect_cannot_be_told(workspace, 
 
     with pytest.raises(DataError, match="row 3"):
         start._with_or_without(lost_after_a_failure, lambda: pytest.fail("run again"), True)
+
+
+def test_a_job_began_without_prefect_after_a_signal_that_ended_the_server_too(
+    workspace, started, monkeypatch
+):
+    from prefect.exceptions import TerminationSignal
+
+    def before_the_job():
+        try:
+            raise TerminationSignal(signal=15)
+        except TerminationSignal:
+            raise GONE  # noqa: B904 - as it comes
+
+    heard = []
+    monkeypatch.setattr(start.signal, "raise_signal", lambda number: heard.append(number) or sys.exit(143))
+    with pytest.raises(SystemExit):
+        start._with_or_without(before_the_job, lambda: pytest.fail("begun"), True)
+    assert heard == [15]
 
 
 def test_a_mistake_is_no_lost_server(workspace, started):

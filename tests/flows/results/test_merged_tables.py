@@ -95,6 +95,25 @@ def test_runs_of_two_versions_of_the_program_were_averaged_as_seeds_of_one_setti
     assert "do not differ by their seeds alone" in err
 
 
+def test_runs_of_other_settings_were_dropped_without_a_word(call, tracked):
+    store = Store()
+    ids = []
+    for setting, candidates in (("a", 2), ("b", 31), ("b", 31), ("c", 60)):
+        run_id = store.create_run(store.experiment("two"), "two", {KIND: "run", "aesi.setting": setting})
+        for key, value in (("seed", 0), ("search.candidates", candidates), ("chosen_candidate", candidates)):
+            store.client.log_param(run_id, key, value)
+        store.client.log_dict(run_id, {"models": run(30.0, 90.0, None)}, "summary.json")
+        store.client.set_terminated(run_id)
+        ids.append(run_id)
+    _, out, _ = call("tables", "two")
+    others = ", ".join(i[:8] for i in (ids[2], ids[1], ids[0]))
+    assert f"tracked run {ids[3]} (seed 0)." in out
+    assert f"3 runs with other settings (search.candidates) left out: {others}; --run ID takes one." in out
+    _, out, _ = call("tables", "two", "--run", ids[0][:8])
+    assert f"tracked run {ids[0]} (seed 0)." in out
+    assert "left out" not in out
+
+
 @pytest.mark.parametrize(("note", "shown"), [("Our own cell", "(seed 1). Our own cell."), ("", "(seed 1).")])
 def test_the_figures_of_one_seed_stood_below_the_mean_of_an_experiment_without_a_note(
     call, tracked, note, shown

@@ -22,3 +22,10 @@ def test_places_are_kept_once_and_temperatures_that_were_measured():
     assert rows.temperature_degc == (24.0, 26.0)
     assert Visited.of(np.array([0.5]), np.array([np.nan])).temperature_degc is None
     assert Visited.of(np.array([0.5])).temperature_degc is None
+
+
+def test_how_far_a_temperature_lies_above_or_below_the_visited_ones():
+    seen = Visited.of(np.array([0.5, 0.6]), np.array([20.0, 24.0]))
+    beyond = seen.beyond_k(np.array([18.0, 20.0, 22.0, 27.0, np.nan]))
+    np.testing.assert_allclose(beyond, [-2.0, 0.0, 0.0, 3.0, 0.0])
+    assert not Visited.of(np.array([0.5])).beyond_k(np.array([18.0])).any()

@@ -7,7 +7,7 @@ from small_experiment import NOISE_V, experiment, fitted, write_record
 from aesi.errors import DataError
 from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.load import load
-from aesi.pipeline.report.tables import free_run_band_table
+from aesi.pipeline.report.tables import free_run_band_table, record_table
 
 
 @pytest.fixture(scope="module")
@@ -32,6 +32,20 @@ def test_the_error_is_the_missing_resistance(record):
     for series in (*split.train, *split.test):
         rest = series.error_v + 1.5e-3 * series.current_a
         assert np.std(rest) == pytest.approx(NOISE_V, rel=0.1)
+
+
+def test_each_test_record_has_the_figures_that_were_pooled(evaluation):
+    figures = row(evaluation, "AESI I")
+    assert list(figures["test_records"]) == ["repeat 2", "repeat 4"]
+    each = figures["test_records"].values()
+    pooled = np.sqrt(np.mean([one["rmse_mv"] ** 2 for one in each]))  # they are equally long
+    assert figures["free_run"]["test_rmse_mv"] == pytest.approx(pooled)
+    outside = np.mean([one["outside_pct"] for one in each])
+    assert figures["free_run"]["outside_pct"] == pytest.approx(outside)
+    assert {one["kept_pct"] for one in each} == {None}  # it does not fade
+    table = record_table(evaluation.rows)
+    assert [cells[0] for cells in table.rows][2:4] == ["AESI I, repeat 2", "AESI I, repeat 4"]
+    assert not record_table([figures | {"test_records": {"alone": next(iter(each))}}]).rows
 
 
 def test_a_record_that_is_trained_on_may_not_judge(record, tmp_path):

@@ -14,10 +14,13 @@ from aesi.physics.effects import CATALOGUE, activated
 from aesi.physics.folded import folded
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.experiment.load import load
+from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
 from aesi.pipeline.simulation import ProfileRequest, predict_file, reached, simulate_file
 from aesi.sparse import SparseModel
+from aesi.sparse.fade import Fade
+from aesi.sparse.trained_region import TrainedRegion
 
 
 @pytest.fixture(scope="module")
@@ -167,6 +170,62 @@ def test_inputs_beyond_the_trained_range_are_flagged_and_the_band_is_wider_there
     np.testing.assert_allclose(held.lower_v - prediction.lower_v, wider, atol=1e-12)
     assert wider.min() == 0.0
     assert np.mean(wider[beyond]) > 2 * np.mean(wider[~beyond])
+
+
+@pytest.fixture(scope="module")
+def fading(model, data):
+    """The model, as if it had been trained on its record at 24 degC and fades elsewhere."""
+    even = error_series(
+        data, aesi.simulate(model.cell, data.time_s, data.current_a, SOC0, hold="backward"), 1.0
+    )
+    variables = model.correction._variables(even)
+    scaled = model.correction.scaling.apply(variables)[:, 1:]
+    region = TrainedRegion.of(scaled, even.soc, np.full(len(even), 24.0))
+    return replace(model, correction=replace(model.correction, fade=Fade(1.0, region), leverage=None))
+
+
+def test_a_cold_record_had_no_correction_and_nothing_said_so(fading, data, tmp_path):
+    folder = fading.save(tmp_path / "model")
+    rows = {"time_s": data.time_s, "current_a": data.current_a, "voltage_v": data.voltage_v}
+
+    def predicted(degc, measured=False):
+        pd.DataFrame(rows | {"temperature_degc": degc}).to_csv(tmp_path / "drive.csv", index=False)
+        said = []
+        asked = ProfileRequest(soc0=SOC0)
+        predict_file(folder, tmp_path / "drive.csv", tmp_path / "out.csv", asked, measured, said.extend)
+        return pd.read_csv(tmp_path / "out.csv"), " ".join(said)
+
+    table, said = predicted(0.0)
+    assert "100 % of the rows lie outside the range the correction was trained on" in said
+    assert (
+        "at 0.0 degC, 24 K below what it was trained at, it has faded to 0 % of itself: this is the physics"
+        in said
+    )
+    assert table["outside"].all()
+    assert table["weight"].max() < 1e-3
+    np.testing.assert_allclose(table["voltage_v"], table["physics_v"], atol=1e-4)
+    assert "0 % of itself: this is the physics model and its last measured error." in predicted(0.0, True)[1]
+
+    table, said = predicted(18.0)
+    assert table["outside"].all()
+    assert 0.2 < table["weight"].mean() < 0.7
+    share = f"{100 * table['weight'].mean():.2g} %"
+    assert (
+        f"at 18.0 degC, 6 K below what it was trained at, it has faded to {share} of itself in the mean"
+        in said
+    )
+
+    table, said = predicted(24.0)
+    assert table["outside"].mean() < 0.05  # simulated a kelvin colder than it was trained
+    assert table["weight"].mean() > 0.995
+    assert "faded" not in said
+
+
+def test_a_model_that_does_not_fade_keeps_all_and_one_without_a_correction_has_none_to_keep(model, data):
+    assert (model.predict(data.time_s, data.current_a, SOC0).weight == 1.0).all()
+    physics = HybridModel(model.cell)
+    for voltage_v in (None, data.voltage_v):
+        assert np.isnan(physics.predict(data.time_s, data.current_a, SOC0, voltage_v).weight).all()
 
 
 def test_a_missing_voltage_is_refused_with_its_row(model, data):

@@ -124,6 +124,19 @@ def test_extrapolation_is_told_where_there_is_any():
     assert runs.outside_finding({"free_run": {"outside_pct": 0.0}}) == ""
 
 
+def test_a_correction_that_had_faded_to_nothing_was_told_as_held_at_the_edge():
+    cold = {"outside_pct": 100.0, "kept_pct": 0.001, "mean_degc": -0.2, "beyond_k": -23.8}
+    near = {"outside_pct": 41.0, "kept_pct": 93.4, "mean_degc": 24.8, "beyond_k": 0.5}
+    same = {"outside_pct": 0.0, "kept_pct": 100.0, "mean_degc": 24.0, "beyond_k": 0.0}
+    model = {"free_run": {"outside_pct": 47.0}, "test_records": {"cold": cold, "near": near, "same": same}}
+    assert runs.outside_finding(model) == (
+        "cold: 100 % of the rows lie outside the range the correction was trained on; at -0.2 degC, 24 K below what it "
+        "was trained at, it has faded to 0 % of itself: this is the physics model. near: 41 % of the rows lie outside "
+        "the range the correction was trained on; it has faded to 93 % of itself in the mean, the rest is left to the "
+        "physics."
+    )
+
+
 def test_choosing_no_correction_is_said_plainly(views):
     text = runs.run_finding(replace(views.run_view(200), chosen="ESPM"))
     assert text.startswith("No correction")

@@ -93,6 +93,19 @@ def test_far_outside_the_range_little_of_the_correction_is_left():
     np.testing.assert_array_equal(again.free_run(record).error_v, model.free_run(record).error_v)
 
 
+def test_what_is_kept_is_all_at_the_fitted_rows_and_the_part_of_the_correction_that_is_seen_elsewhere():
+    _, candidate = fitted(drives(range(3)))
+    model, record = candidate.bagging, make_record(300, seed=9)
+    unfaded = replace(model, fade=None, memory=0.0)
+    model = replace(model, memory=0.0, fade=replace(model.fade, amplitude=1.0))
+    shifted = replace(record, inputs=record.inputs + 0.7 * np.ptp(record.inputs, axis=0))
+    kept = model.kept(shifted)
+    assert 0.0 < kept.min() < kept.max() < 1.0
+    whole, part = (each.free_run(shifted, 0.0).error_v[1:] for each in (unfaded, model))
+    np.testing.assert_allclose(part, kept[:-1] * whole, atol=1e-12)
+    np.testing.assert_array_equal(unfaded.kept(shifted), 1.0)
+
+
 def test_peers_fit_the_same_rows():
     problem, _ = fitted(drives(range(3)))
     record = make_record(300, seed=9)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, cast
 
@@ -17,13 +17,15 @@ from aesi.conformal import FreeRunBands, Intervals
 from aesi.conformal.horizon_band import HorizonBand
 from aesi.conformal.scores import scores_of
 from aesi.constants import MV_PER_V
-from aesi.numerics.metrics import rmse
+from aesi.numerics.metrics import rms, rmse
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import error_ahead, reach
 from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
+from aesi.pipeline.product.trained import outside_trained, trained_figures, trained_on
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
+from aesi.sparse import SparseModel
 
 HORIZONS_S = (1.0, 10.0, 60.0)
 """A sample, a manoeuvre, a minute: those of the tables."""
@@ -82,6 +84,7 @@ def evaluate_models(
 
 def _judge(one: Fitted, series: ErrorSeries, role: Role) -> _Judged:
     free = one.model.free_run(series)
+    free = replace(free, outside=outside_trained(free.outside, series, trained_on(one.model, one.bands)))
     prediction = one.model.one_step(series)
     residual = series.error_v - prediction
     residual[0] = np.nan  # the first sample has no step before it
@@ -118,6 +121,7 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
     step["persistence_rmse_mv"] = _persistence_mv(test, 1)
     ahead = _ahead(one, test)
     row |= {"free_run": free, "one_step": step, "k_step": _k_step(ahead, test)}
+    row["test_records"] = {r.series.name: _record_figures(one, r) for r in test}
     row["k_step_persistence"] = {_seconds(h): _persistence_mv(test, _steps(test, h)) for h in HORIZONS_S}
     if one.intervals is not None:
         residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
@@ -140,6 +144,19 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
             if band.horizon_s in ahead
         }
     return row
+
+
+def _record_figures(one: Fitted, record: _Judged) -> dict[str, float | None]:
+    """Of one record in free run, and how far it lies from what a correction was trained on."""
+    series, model = record.series, one.model
+    left, declared = series.error_v - record.free.error_v, series.left_by(DECLARED)
+    kept = model.kept(series) if isinstance(model, SparseModel) else np.ones(len(series))
+    visited = trained_on(model, one.bands)
+    return {
+        "rmse_mv": MV_PER_V * rms(left),
+        "mser_pct": 100.0 * (1.0 - float(np.mean(left**2) / np.mean(declared**2))),
+        **trained_figures(record.free.outside, series.temperature_degc, model, visited, kept),
+    }
 
 
 def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.pipeline.product.trained import ALL_PCT, trained_sentence
 from aesi.pipeline.report.views import Row, RunView
 
 NEARLY = 0.98
@@ -159,8 +160,17 @@ def persistence_finding(model: Row) -> str:
 
 
 def outside_finding(model: Row) -> str:
-    """How much of the test data the model was not trained for, in words."""
+    """How much of the test data the model was not trained for, and what is left of it there, in words."""
     share = _figure(model, "free_run", "outside_pct")
+    records = model.get("test_records") or {}
+    fading = {name: one for name, one in records.items() if one.get("kept_pct") is not None}
+    if fading:
+        told = (
+            trained_sentence(name, one)
+            for name, one in fading.items()
+            if one["outside_pct"] or one["kept_pct"] < ALL_PCT
+        )
+        return " ".join(told)
     if not share:
         return ""
     return (

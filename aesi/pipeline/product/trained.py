@@ -1,0 +1,89 @@
+"""How far a record lies from what a correction was trained on, and how much of the correction is left there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from aesi.conformal import FreeRunBands
+from aesi.numerics.typing import Array, BoolArray
+from aesi.numerics.visited import Visited
+from aesi.records import ErrorModel, ErrorSeries
+from aesi.sparse import SparseModel
+
+ALL_PCT, NONE_PCT = 99.5, 0.5
+"""What is told as 100 and as 0 %."""
+TELLING_K = 2.0
+"""What is told of how far the mean temperature is off: by itself so much leaves 94 % of a fading correction at 25 degC,
+and 88 % at -20 degC."""
+
+
+def trained_on(model: ErrorModel | None, bands: FreeRunBands | None) -> Visited | None:
+    """The charges and temperatures that a correction was trained on; None of what is none, or does not know."""
+    if not isinstance(model, SparseModel):
+        return None
+    if model.fade is not None:
+        return model.fade.region.visited
+    return None if bands is None else bands.seen
+
+
+def outside_trained(inputs: BoolArray, series: ErrorSeries, visited: Visited | None) -> BoolArray:
+    """(n,) True where an input lies outside the range that a correction was trained on, or the temperature does.
+
+    inputs : (n,) True where any of its inputs does.
+    """
+    if visited is None or series.temperature_degc is None:
+        return inputs
+    return np.asarray(inputs | (visited.beyond_k(series.temperature_degc) != 0.0))
+
+
+def trained_figures(
+    outside: BoolArray,
+    temperature_degc: Array | None,
+    model: ErrorModel,
+    visited: Visited | None,
+    kept: Array,
+) -> dict[str, float | None]:
+    """How far a record lies from what a correction was trained on.
+
+    outside, kept : (n,), of `outside_trained` and of `SparseModel.kept`.
+    Returns outside_pct; kept_pct of the correction in the mean, None of one that does not fade; mean_degc; beyond_k,
+    how far that lies above the trained temperatures, negative below them. None also stands for what is not known.
+    """
+    fades = isinstance(model, SparseModel) and model.fade is not None
+    mean = None if temperature_degc is None else float(np.mean(temperature_degc))
+    beyond = None if mean is None or visited is None else float(visited.beyond_k(np.array([mean]))[0])
+    return {
+        "outside_pct": 100.0 * float(np.mean(outside)),
+        "kept_pct": 100.0 * float(np.mean(kept)) if fades else None,
+        "mean_degc": mean,
+        "beyond_k": beyond,
+    }
+
+
+def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = False) -> str:
+    """What the figures say of a record of that name, predicted in free run or one step ahead."""
+    share, kept = figures["outside_pct"], figures["kept_pct"]
+    head = f"{name}: {_share(share)} of the rows lie outside the range the correction was trained on"
+    if kept is None:
+        return f"{head}; its inputs are held at the edge there." if share else f"{head}."
+    if kept >= ALL_PCT:
+        return f"{head}."
+    where, beyond = "", figures["beyond_k"] or 0.0
+    if abs(beyond) >= TELLING_K:
+        side = "below" if beyond < 0 else "above"
+        where = f"at {figures['mean_degc']:.1f} degC, {_kelvin(abs(beyond))} {side} what it was trained at, "
+    if kept >= NONE_PCT:
+        return f"{head}; {where}it has faded to {_share(kept)} of itself in the mean, the rest is left to the physics."
+    alone = "the physics model and its last measured error" if one_step else "the physics model"
+    return f"{head}; {where}it has faded to 0 % of itself: this is {alone}."
+
+
+def _share(percent: float) -> str:
+    return f"{percent:.2g} %" if percent < ALL_PCT else "100 %"
+
+
+def _kelvin(size: float) -> str:
+    return f"{size:.0f} K" if size >= 10.0 else f"{size:.2g} K"
