@@ -32,6 +32,7 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace
 from aesi.pipeline.report.words.calibrations import open_line, to_text
+from aesi.pipeline.written import calibration_files
 from aesi.records import Measurement, Spectrum
 from aesi.tracer.case.checks import SHORTEST_S
 
@@ -89,10 +90,11 @@ def calibrate_files(
     spectra, told = held_against(found.cell, asked.impedance, model=model, fitted=conditions.spectra)
     read = [note for m in measurements for note in m.notes]
     content = calibration_content(found, [*effects_left(given), *read, *told], posterior, spectra)
-    write_whole(out, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
-    write_whole(out.with_suffix(".report.json"), json.dumps(content, indent=1, allow_nan=False) + "\n")
-    write_whole(out.with_suffix(".report.md"), to_text(content))
-    _write_page(out.with_suffix(".report.html"), found, content, spectra)
+    cell_file, data, text, page = calibration_files(out)
+    write_whole(cell_file, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
+    write_whole(data, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_whole(text, to_text(content))
+    _write_page(page, found, content, spectra)
     return content
 
 

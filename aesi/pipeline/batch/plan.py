@@ -46,6 +46,11 @@ class Job:
     at: float | None = None
     soh: Soh | None = None
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is read: the cell's file (a saved model is a folder) and the records."""
+        return self.cell, *self.data, *self.tests
+
     def key(self, settings: str) -> str:
         """What identifies the job: the content of its files, what each is for, and the settings it is run with."""
         sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
