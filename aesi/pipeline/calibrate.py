@@ -16,6 +16,7 @@ from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
+from aesi.calibration.rewind import start_soc
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
@@ -113,7 +114,8 @@ def _write_page(
 def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
     """Each record's rows with the voltage of the start file, of the file as it is simulated, and as fitted.
 
-    The state of charge is counted from the fitted start, of the capacity that the cell of the record had.
+    The state of charge is counted from the fitted start, both in the windows and of the capacity that the written cell
+    had when the record was measured.
     """
     model, x = found.model, found.x
     states = model.states(found.declared, x)
@@ -124,8 +126,7 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
             model.run(i, *states[name])[0] for name in ("declared", "simulated", "fitted")
         )
         capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
-        soc0 = record.start.soc + record.soc_sd * float(x[model.layout.soc(i)])
-        soc = soc0 - rows.discharged_ah(record.hold) / capacity_ah
+        soc = start_soc(model, x, i) - rows.discharged_ah(record.hold) / capacity_ah
         out.append(
             DiscoveryTrace(
                 record.name, "fit", rows.time_s, rows.current_a, soc, rows.voltage_v, start, simulated, fitted
