@@ -91,21 +91,32 @@ def _say_compiling() -> None:
     )
 
 
-LISTS = ("--data", "--test", "--good", "--impedance", "--fit-impedance", "--effect-file")
-"""Options that take several files."""
+TAKE_LISTS = ("discover", "calibrate", "simulate", "impedance", "predict")
+"""Commands that take several values after one option: those that read none by its place, or, with an experiment file,
+none beside such an option."""
+LISTS = (
+    *("--data", "--test", "--good", "--impedance", "--fit-impedance", "--effect-file", "--effect", "--only"),
+    *("--without", "--temperature", "--date", "--until", "--prior", "--column", "--unit", "--state-word"),
+)
+"""Their options that may be given again; `--set` stands beside an experiment file, which can follow it."""
 
 
 def repeated(arguments: list[str]) -> list[str]:
-    """`--data A B C` as `--data A --data B --data C`, for the two commands that take lists of files."""
-    if not arguments or arguments[0] not in ("discover", "calibrate"):
+    """`--data A B C` and `--data=A B C` as `--data A --data B --data C`, for every option that may be given again."""
+    if not arguments or arguments[0] not in TAKE_LISTS:
         return arguments
     result: list[str] = []
-    option = ""
-    for argument in arguments:
-        if argument.startswith("-"):
-            option = argument
-        elif option in LISTS and result[-1] != option:
-            result.append(option)
+    option, taken = "", False  # the last option, and whether it has a value
+    for place, argument in enumerate(arguments):
+        if argument == "--":
+            return [*result, *arguments[place:]]
+        if argument.startswith("-") and argument != "-":
+            option, equals, _ = argument.partition("=")
+            taken = bool(equals)
+        else:
+            if option in LISTS and taken:
+                result.append(option)
+            taken = True
         result.append(argument)
     return result
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from aesi.calibration.model import Model
 from aesi.numerics.typing import Array
-from aesi.physics.balance import aged_range
+from aesi.physics.balance import aged_range, same_rest
 from aesi.physics.cell import Cell
 
 
@@ -29,6 +29,16 @@ def capacities(model: Model, x: Array) -> dict[str, float]:
         r.name: _as_aged(model, x, model.material(i, x), model.silicon(i, x)).capacity_ah / written_ah
         for i, r in enumerate(model.records)
     }
+
+
+def start_soc(model: Model, x: Array, index: int) -> float:
+    """State of charge at which a record starts, in the windows of the written cell as that was then: it rests where the
+    cell of the fit does, whose empty need not be at the lower voltage."""
+    record = model.records[index]
+    material, silicon = model.material(index, x), model.silicon(index, x)
+    fitted = model.aged(model.cell_at(x), material, silicon)
+    soc = record.start.soc + record.soc_sd * float(x[model.layout.soc(index)])
+    return same_rest(fitted, _as_aged(model, x, material, silicon), soc)
 
 
 def _as_aged(model: Model, x: Array, material: float, silicon: float) -> Cell:

@@ -258,6 +258,11 @@ def _complete(name: str, folder: Path) -> bool:
 
 
 def _copy(source: Path, out: Path) -> Path:
+    if source.resolve() in out.resolve().parents:
+        raise DataError(
+            f"{out} lies in {source}, from where the set is copied, and its own files would be lost; name a folder "
+            "beside it."
+        )
     try:
         out.mkdir(parents=True, exist_ok=True)
         if out.samefile(source):

@@ -1,9 +1,24 @@
 """Whether a record can be of the cell that a file declares, for every command that simulates or fits one.
 
 A voltage far beyond the file's limits is another cell's. At every row the voltage bounds the state of charge: the cell
-rests somewhere within a drop of it that no cell exceeds. The charge between two rows then bounds the capacity from both
-sides, and a declared capacity well outside these bounds is another cell's, or the record's current or time is in
-another unit.
+rests within a drop d of it that no cell exceeds, so that its state of charge lies between z- = z(V - d) and
+z+ = z(V + d), with z(U) the inverse of the open-circuit voltage of the file:
+
+    d = (DROP_V + DROP_V_PER_C i) (1 + (COLD_FACTOR - 1) c)                        (1)
+    i = max(|I|, AFTER_SHARE I') / C_nominal       1/h; I' the largest current of the AFTER_S before          (2)
+    c = (COLD_DEGC - T) / COLD_SPAN_K, held within 0 and MOST_SPANS                (3)
+
+(Where the current is turned, what I' left counts less by it, on the side that it left alone.) The charge Q_ij that
+leaves the cell between two rows bounds the capacity C from both sides, and a declared capacity well outside these
+bounds is another cell's, or the record's current or time is in another unit:
+
+    Q_ij / max(z+_i - z-_j, FEWEST_SOC) <= C <= Q_ij / (z-_i - z+_j)               (4)
+
+the upper one where z-_i - z+_j > TELLING_SOC, both where Q_ij is more than TELLING_SHARE of the charge moved.
+
+What a limit decides was measured on 36 records of four cells (-10 to 40 degC, from C/20 to drives and pulses), each
+with its own cell's file and with those of the three others, one limit moved at a time. As the limits are, the records
+want 1/1.06 to 1.06 times the capacity of their own file, and 51 of the 108 pairs with another's are refused.
 """
 
 from __future__ import annotations
@@ -28,19 +43,43 @@ SOC_MARGIN = 0.12
 ROWS = 300
 """Of a record that are looked at, evenly spread: each pair of them bounds the capacity."""
 TELLING_SHARE = 0.3
-"""Of the charge moved: less between two rows is within hysteresis and relaxation."""
-TELLING_SOC, FEWEST_SOC = 0.25, 0.02
+"""Of the charge moved: less between two rows is within hysteresis and relaxation. With 0.2 a record wants 1.24 times
+the capacity of its own file, with 0.1 two are refused by theirs."""
+TELLING_SOC = 0.25
+"""State of charge that two voltages have to be apart for an upper bound: less is of the size of what the file's
+open-circuit voltage is off. A convention: from 0.1 to 0.5 no measured record is judged otherwise."""
+FEWEST_SOC = 0.02
+"""State of charge that two voltages are at least apart for a lower bound, which equal voltages would otherwise make
+infinite. A convention: from 0.005 to 0.1 no measured record is judged otherwise."""
 DROP_V = 0.06
+"""V, of a warm cell without a current: hysteresis, slow diffusion and what the file's open-circuit voltage is off. The
+measured records stay within 0.05 V; with 0.03 a C/20 discharge is refused by its own file."""
 DROP_V_PER_C = 0.25
-COLD_DEGC, COLD_SPAN_K, COLD_FACTOR, MOST_SPANS = 15.0, 25.0, 4.0, 2.0
-AFTER_S, AFTER_SHARE = 1800.0, 0.3
-"""Drops that no cell exceeds, DROP_V and DROP_V_PER_C when warm: the measured records stay within
-0.05 V + 0.2 V a C-rate above 15 degC, and within four times that at -10 degC. A record without a temperature is as
-warm as the cell's file declares."""
-TOO_LARGE, TOO_SMALL = 2.0, 1.25
-"""By how much the declared capacity may exceed, or fall short of, what the record allows: a cell may have lost half of
-it, and batches differ by less. The measured records want at most 1.05 times the capacity of their own cell's file, the
-drive of an LG M50T 1.31 times that of a Panasonic NCR18650PF."""
+"""V h, of a warm cell per C-rate. The measured records stay within 0.2 V; with 0.15 the pulses of an LG M50T are
+refused by their own file."""
+COLD_DEGC = 15.0
+"""Above it a cell is warm: with 5 a drive at 0 degC wants 1/1.11 times the capacity of its own file, with 10 or 25 no
+measured record more than now."""
+COLD_SPAN_K = 25.0
+"""K below COLD_DEGC at which the drop is COLD_FACTOR times that of a warm cell: at -10 degC, the coldest of the
+records. From 15 to 50 no measured record is judged otherwise."""
+COLD_FACTOR = 4.0
+"""Times the drop of a warm cell, within which the measured records stay one span below COLD_DEGC. With 1 a discharge of
+an LG 18650HG2 at -10 degC is refused by its own file; with 8 two more pairs with another cell's file pass."""
+MOST_SPANS = 2.0
+"""Spans below COLD_DEGC that count, down to -35 degC. A convention: the measured records reach one span."""
+AFTER_S = 1800.0
+"""s that a current is felt after it, by slow diffusion. With 0 a drive at 0 degC is refused by its own file, from 300
+to 3600 no measured record is judged otherwise."""
+AFTER_SHARE = 0.3
+"""Of the largest current of that time, which counts as if it flowed still. With 0 a drive at 0 degC is refused by its
+own file, with 0.15 a record wants 1.1 times the capacity of its own; from 0.3 to 1 none is judged otherwise."""
+TOO_LARGE = 2.0
+"""Times what the record allows, that the declared capacity may be: a cell may have lost half of it. A convention; the
+measured records allow at least 1/1.06 of the capacity of their own file."""
+TOO_SMALL = 1.25
+"""Times the declared capacity, that the record may want: batches differ by less. The measured records want at most 1.06
+times the capacity of their own cell's file, the drive of an LG M50T 1.31 times that of a Panasonic NCR18650PF."""
 ABOVE_FULL_V = 0.1
 """A voltage at rest further above that of a full cell belongs to another chemistry."""
 SMALL_C_RATE = 0.1
@@ -94,7 +133,8 @@ def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
 
 
 def capacity_bounds(cell: Cell, record: Measurement) -> CapacityBounds:
-    """What the voltages and the charge of a record say of the capacity: 0 and infinity where they say nothing."""
+    """What the voltages and the charge of a record say of the capacity, eq. (4): 0 and infinity where they say
+    nothing."""
     rows = np.unique(np.linspace(0, len(record) - 1, ROWS).astype(int))
     charge = record.discharged_ah("backward")[rows]  # as loggers write
     voltage = record.voltage_v[rows]
@@ -218,9 +258,10 @@ def _cause(ratio: float, record: Measurement) -> str:
 
 
 def _largest_drop_v(cell: Cell, record: Measurement, rows: IntArray, sign: float) -> Array:
-    """(n_rows,) V: how far no cell is below its rest voltage, or above it, under its current, or after that of the half
-    hour before. A smaller current the other way does not undo what came before it: after pulses of 12 A an LG 18650HG2
-    at -7 degC is 0.5 V below rest while a drive puts 0.6 A back.
+    """(n_rows,) V, eq. (1): how far no cell is below its rest voltage, or above it, under its current, or after that of
+    the half hour before. A smaller current the other way does not undo what came before it: after pulses of 12 A an LG
+    18650HG2 at -7 degC is 0.5 V below rest while a drive puts 0.6 A back. A record without a temperature is as warm as
+    the cell's file declares.
 
     sign : 1 for below it, where discharge leaves a cell; -1 for above it.
     """

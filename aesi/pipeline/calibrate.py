@@ -16,6 +16,7 @@ from aesi.calibration.parameters import check_names
 from aesi.calibration.posterior import PosteriorSamples, check_posterior, sampled
 from aesi.calibration.records.prepared import with_temperatures
 from aesi.calibration.records.spectra import BAND_HZ, check_spectra
+from aesi.calibration.rewind import start_soc
 from aesi.calibration.start import sized
 from aesi.constants import MV_PER_V, ZERO_CELSIUS_K
 from aesi.errors import DataError, InputError
@@ -32,6 +33,7 @@ from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace
 from aesi.pipeline.report.words.calibrations import open_line, to_text
+from aesi.pipeline.written import calibration_files
 from aesi.records import Measurement, Spectrum
 from aesi.tracer.case.checks import SHORTEST_S
 
@@ -89,10 +91,11 @@ def calibrate_files(
     spectra, told = held_against(found.cell, asked.impedance, model=model, fitted=conditions.spectra)
     read = [note for m in measurements for note in m.notes]
     content = calibration_content(found, [*effects_left(given), *read, *told], posterior, spectra)
-    write_whole(out, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
-    write_whole(out.with_suffix(".report.json"), json.dumps(content, indent=1, allow_nan=False) + "\n")
-    write_whole(out.with_suffix(".report.md"), to_text(content))
-    _write_page(out.with_suffix(".report.html"), found, content, spectra)
+    cell_file, data, text, page = calibration_files(out)
+    write_whole(cell_file, json.dumps(found.cell.to_bpx(), indent=1) + "\n")
+    write_whole(data, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_whole(text, to_text(content))
+    _write_page(page, found, content, spectra)
     return content
 
 
@@ -111,7 +114,8 @@ def _write_page(
 def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
     """Each record's rows with the voltage of the start file, of the file as it is simulated, and as fitted.
 
-    The state of charge is counted from the fitted start, of the capacity that the cell of the record had.
+    The state of charge is counted from the fitted start, both in the windows and of the capacity that the written cell
+    had when the record was measured.
     """
     model, x = found.model, found.x
     states = model.states(found.declared, x)
@@ -122,8 +126,7 @@ def fit_traces(found: Calibration) -> tuple[DiscoveryTrace, ...]:
             model.run(i, *states[name])[0] for name in ("declared", "simulated", "fitted")
         )
         capacity_ah = found.cell.capacity_ah * found.capacities[record.name]
-        soc0 = record.start.soc + record.soc_sd * float(x[model.layout.soc(i)])
-        soc = soc0 - rows.discharged_ah(record.hold) / capacity_ah
+        soc = start_soc(model, x, i) - rows.discharged_ah(record.hold) / capacity_ah
         out.append(
             DiscoveryTrace(
                 record.name, "fit", rows.time_s, rows.current_a, soc, rows.voltage_v, start, simulated, fitted

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from aesi.errors import InputError
+from aesi.pipeline.written import batch_files
 from flows.commands import options, outputs
 
 
@@ -48,8 +49,13 @@ def batch(
         )
     options.say_reading([source])
     from aesi.pipeline.batch.job import Settings
+    from aesi.pipeline.batch.plan import read_plan
     from flows.jobs.batch import batch as run
 
+    health = options.state_of_health(soh)
+    jobs = read_plan(source, cell, health)
+    read = [file for job in jobs for file in job.files]
+    outputs.check_folder(out, [source, *read], batch_files(out, [job.name for job in jobs]))
     rows = run(
         source,
         out,
@@ -58,7 +64,7 @@ def batch(
         workers,
         runner,
         address,
-        options.state_of_health(soh),
+        health,
     )
     if all(row["status"] == "failed" for row in rows):
         raise InputError(f"no cell of {source} could be used; {out / 'summary.csv'} says why.")

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from aesi.errors import AesiError, InputError
-from flows.commands import complete
+from flows.commands import complete, outputs
 
 
 def bench(
@@ -43,6 +43,9 @@ def bench(
     history = read_history(compare) if compare else []
     if compare and not history:
         raise InputError(f"{compare} holds no recorded benchmarks to compare with.")
+    for option in ("write", "report") if compare else ():
+        if option in keywords:
+            outputs.check_file(Path(str(keywords[option])), [compare], option=f"--set {option}")
     lines = []
     for each in chosen:
         for line in run(each, **keywords):

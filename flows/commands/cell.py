@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from aesi.errors import InputError
+from aesi.pipeline.written import calibration_files, discovery_files
 from flows.commands import options, outputs
 
 BESIDE_AN_EXPERIMENT = ("experiment", "out", "overrides", "prefect")
@@ -38,7 +39,7 @@ def simulate(
     ] = False,
 ) -> None:
     """The physics model alone, under a current profile."""
-    outputs.check_table(out, [cell, current])
+    outputs.check_table(out, [cell, current, *(effect_file or [])])
     from aesi.pipeline.simulation import ProfileRequest, simulate_file
 
     asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh), run_on)
@@ -135,7 +136,8 @@ def calibrate(
     model: options.ModelOption = None,
 ) -> None:
     """Fit the physics model's own parameters to measurements of any temperatures together."""
-    outputs.check_json(out, [cell, *data])
+    read = [cell, *data, *(impedance or []), *(fit_impedance or [])]
+    outputs.check_json(out, read, calibration_files(out))
     options.check_once("--data", data)
     temperatures = options.by_file("--temperature", temperature, data)
     days, day = options.dates(dates, data), options.day("--as-of", as_of)
@@ -170,7 +172,7 @@ def impedance(
     soh: options.SohOption = None,
 ) -> None:
     """The physics model in the frequency domain, at rest."""
-    outputs.check_table(out, [cell, Path(frequencies)])
+    outputs.check_table(out, [cell, Path(frequencies), *(effect_file or [])])
     from aesi.pipeline.impedance import impedance_file
 
     z = impedance_file(
@@ -252,10 +254,12 @@ def discover(
 ) -> None:
     """Close the loop: find what physics the model lacks, add it, and report the error before and after."""
     if out is not None:
-        outputs.check_folder(out, [cell] if cell else [])
+        given = [*([cell] if cell else []), *(data or []), *(test or []), *(good or []), *(effect_file or [])]
+        outputs.check_folder(out, given, discovery_files(out))
     if experiment is not None:
         options.check_unsaid(context, BESIDE_AN_EXPERIMENT)
         options.say_reading([experiment])
+        _check_experiment(experiment, list(overrides or []), out)
         from flows.jobs.start import discover_experiment
 
         discover_experiment(str(experiment), list(overrides or []), out, prefect)
@@ -289,6 +293,17 @@ def discover(
     )
     options.say_notes(note for m in case.records for note in m.notes)
     flow(case, out, prefect)
+
+
+def _check_experiment(experiment: Path, overrides: list[str], out: Path | None) -> None:
+    """Raises InputError where the finding of an experiment would be written over a file that it names."""
+    from aesi.pipeline.experiment.config import read_experiment
+    from aesi.pipeline.experiment.sources import named_files
+    from flows.jobs.discovery import finding_folder
+
+    config = read_experiment(experiment, overrides)
+    place = out or finding_folder(config)
+    outputs.check_folder(place, [experiment, *named_files(config).values()], discovery_files(place))
 
 
 def export(

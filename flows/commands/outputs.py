@@ -2,78 +2,85 @@
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from aesi.errors import InputError
 from aesi.numerics.files.whole import check_writable
+from aesi.pipeline.written import MODEL, SUMMARY
 
-HEAD = "model.json"
-"""Of a saved model, as `aesi.pipeline.product.model_folder` has it, which takes its time to import."""
-MODEL = "model"
-"""The folder of the model within a folder of results."""
+HEAD, ARRAYS, EFFECTS = "model.json", "arrays.npz", "effects"
+"""Of a saved model, as `aesi.pipeline.product.model_folder` has it, which takes its time to import: its head, its
+arrays, and the part that names the files of the user's own effects."""
 PAGES = (".html", ".htm")
-SUMMARY = "summary.json"
-"""Beside a model it is that of a run."""
 OTHER_FORMATS = (
     *(".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5"),
     *(".zip", ".bz2", ".xz", ".zst", ".7z", ".tar", ".tgz"),
 )
 
 
-def check_file(out: Path, inputs: Sequence[Path] = (), written: Sequence[Path] = ()) -> None:
+def check_file(
+    out: Path, inputs: Iterable[Path], written: Sequence[Path] = (), option: str = "--out"
+) -> None:
     """Raises InputError where `out` cannot be a file to write, or what is written is one of the files that are read.
 
     inputs : files, and folders of saved models, whose files are read.  written : the files, where there are more.
     """
-    with _refused(out):
+    with _refused(out, option):
         if out.is_dir():
-            raise InputError(f"--out {out} is a folder; name the file to write.")
-        lost = [
-            file for file in {out, *written} if file.exists() and any(_is_read(file, one) for one in inputs)
-        ]
-        if lost:
-            beside = "" if out in lost else f": {lost[0]}, which is written beside it,"
+            raise InputError(f"{option} {out} is a folder; name the file to write.")
+        lost = first_lost((out, *written), inputs)
+        if lost is not None:
+            beside = "" if lost == out else f": {lost}, which is written beside it,"
             raise InputError(
-                f"--out {out}{beside} is a file that is read, and would be lost; give another name."
+                f"{option} {out}{beside} is a file that is read, and would be lost; give another name."
             )
         if out.exists() and not os.access(out, os.W_OK):
-            raise InputError(f"--out {out} is there and may not be written over; give another name.")
+            raise InputError(f"{option} {out} is there and may not be written over; give another name.")
         check_writable(out)
 
 
-def check_table(out: Path, inputs: Sequence[Path] = ()) -> None:
+def check_table(out: Path, inputs: Iterable[Path]) -> None:
     """As `check_file`, of a CSV.  Raises InputError also where the name promises another format."""
     check_file(out, inputs)
     if out.suffix.lower() in OTHER_FORMATS:
         raise InputError(f"--out {out}: what is written is a CSV; give a name that ends in .csv or .csv.gz.")
 
 
-def check_json(out: Path, inputs: Sequence[Path] = ()) -> None:
+def check_json(out: Path, inputs: Iterable[Path], written: Sequence[Path] = ()) -> None:
     """As `check_file`, of a cell's file.  Raises InputError also where the name promises another format."""
-    check_file(out, inputs)
+    check_file(out, inputs, written)
     if out.suffix.lower() != ".json":
         raise InputError(f"--out {out}: what is written is BPX; give a name that ends in .json.")
 
 
 def check_page(out: Path) -> None:
-    """As `check_file`, of a page.  Raises InputError also where the name promises another format."""
-    check_file(out)
+    """As `check_file`, of a page, beside which no file is read.  Raises InputError also where the name promises another
+    format."""
+    check_file(out, ())
     if out.suffix.lower() not in PAGES:
         raise InputError(f"--out {out}: what is written is a page; give a name that ends in .html.")
 
 
-def check_folder(out: Path, inputs: Sequence[Path] = (), option: str = "--out") -> None:
-    """Raises InputError where `out` cannot be a folder to write to, or the model in it is one that is read; one that is
-    there is kept, and its files may be replaced."""
+def check_folder(
+    out: Path, inputs: Iterable[Path] = (), written: Sequence[Path] = (), option: str = "--out"
+) -> None:
+    """Raises InputError where `out` cannot be a folder to write to, or what is written in it is one of the files that
+    are read; one that is there is kept, and its files may be replaced.
+
+    inputs, written : as in `check_file`.
+    """
     with _refused(out, option):
         if out.exists() and not out.is_dir():
             raise InputError(f"{option} {out} is a file; name a folder.")
-        if any(_lies_in(given, out / MODEL) for given in inputs):
+        lost = first_lost(written, inputs)
+        if lost is not None:
             raise InputError(
-                f"--out {out}: the model in it is the one that is read, and would be lost; name another folder."
+                f"{option} {out}: {lost}, which is written there, is a file that is read, and would be lost; name "
+                "another folder."
             )
         if (out / SUMMARY).is_file() and (out / MODEL).is_dir():
             raise InputError(
@@ -91,14 +98,33 @@ def check_beside(out: Path, source: Path) -> None:
         )
 
 
-def _is_read(file: Path, given: Path) -> bool:
-    """Is a file that is there the one that is given, or of the saved model that is?  Of other folders none is read."""
-    return (not given.is_dir() or (given / HEAD).exists()) and _lies_in(file, given)
+def first_lost(written: Iterable[Path], inputs: Iterable[Path]) -> Path | None:
+    """The first of the files that are written which is there and is read."""
+    read = {file.resolve() for given in inputs for file in _files_read(given)}
+    return next((file for file in written if file.is_file() and file.resolve() in read), None)
 
 
-def _lies_in(file: Path, place: Path) -> bool:
-    """Is a file or folder that is there the place, or in it?"""
-    return place.exists() and file.resolve().is_relative_to(place.resolve())
+def _files_read(given: Path) -> Iterator[Path]:
+    """The file itself; of a folder with a saved model its files, and those of the user's effects that it names."""
+    if not given.is_dir():
+        yield given
+    elif (given / HEAD).is_file():
+        head = _content(given / HEAD)
+        names = head.get("parts") if isinstance(head, dict) else None
+        parts = [f"{name}.json" for name in names] if isinstance(names, list) else []
+        yield from (given / name for name in (HEAD, ARRAYS, *parts))
+        effects = _content(given / f"{EFFECTS}.json")
+        for effect in effects if isinstance(effects, list) else []:
+            if isinstance(effect, dict) and isinstance(effect.get("file"), str):
+                yield Path(effect["file"])
+
+
+def _content(file: Path) -> object:
+    """None of a file that cannot be read, which whoever loads the model says."""
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from aesi.constants import MV_PER_V
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.pipeline.experiment.sections import TrackingConfig
+from aesi.pipeline.written import ARCHIVE
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.folder_lock import alone_in
@@ -64,8 +65,12 @@ def case_and_folder(path: str, overrides: Sequence[str], out: Path | None) -> tu
     from aesi.pipeline.discovery.cases import case_of_experiment
 
     config = read_experiment(path, overrides)
-    folder = out or environment.workspace() / "runs" / config.name / "discovery"
-    return case_of_experiment(config), folder, TrackedUnder.of(config)
+    return case_of_experiment(config), out or finding_folder(config), TrackedUnder.of(config)
+
+
+def finding_folder(config: ExperimentConfig) -> Path:
+    """Where the finding of an experiment goes when no folder is named."""
+    return environment.workspace() / "runs" / config.name / "discovery"
 
 
 def trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder) -> dict[str, Any]:
@@ -75,7 +80,7 @@ def trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedUn
 
 
 def _trace(case: Case, out: Path, run: Stages, console: Console, under: TrackedUnder) -> dict[str, Any]:
-    from aesi.pipeline.discovery.discover import ARCHIVE, run_case, write_discovery
+    from aesi.pipeline.discovery.discover import run_case, write_discovery
 
     started = time.monotonic()
     if (out / ARCHIVE).exists():

@@ -16,6 +16,8 @@ from flows.jobs.temporary_server import KeptWork, no_answer, of_prefect, stop_se
 
 T = TypeVar("T")
 Say = Callable[[str], None]
+PAUSE_S = 2.0
+"""Before a stage is tried again: a convention, long enough for a connection that was reset."""
 
 
 class StageOverdue(AesiError):
@@ -30,7 +32,8 @@ class Stages(Protocol):
     """Runs the stages of a job, and shows what comes of them where there is somebody to show it."""
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
-        """One stage: its name, a function of nothing, and how often it may be tried again."""
+        """One stage: its name, a function of nothing, and how often it may be tried again where a network or a disk
+        failed (OSError); bad input is not."""
         ...
 
     def progress(self, name: str, done: int, total: int) -> None:
@@ -43,12 +46,22 @@ class Stages(Protocol):
 
 
 class PlainStages:
-    """Stages as function calls; nobody watches. Raises StageOverdue where one takes longer than `timeout_s`."""
+    """Stages as function calls; nobody watches. Raises StageOverdue where a try takes longer than `timeout_s`."""
 
     def __init__(self, say: Say, timeout_s: float | None = None) -> None:
         self._say, self._timeout_s = say, timeout_s
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
+        for left in range(retries, 0, -1):
+            try:
+                return self._once(name, work)
+            except OSError as error:
+                times = "once more" if left == 1 else f"up to {left} times more"
+                self._say(f"{name}: failed ({first_line(error)}); it is tried {times}.")
+                time.sleep(PAUSE_S)
+        return self._once(name, work)
+
+    def _once(self, name: str, work: Callable[[], T]) -> T:
         started = time.monotonic()
         try:
             with time_limit(self._timeout_s):
@@ -71,10 +84,12 @@ class PlainStages:
 class PrefectStages:
     """Stages as Prefect tasks, with artifacts, seen in its UI.
 
+    A task is a plain stage: its limit and its tries are the same without Prefect, whose own would be on top of them; a
+    failed try is a line in the log of the task.
     They close over what they need instead of taking it as parameters, because Prefect would walk through
     every array it is handed; what they compute is kept by content (`flows.base.stage_cache`,
-    `flows.evaluation.outcome_store`), with and without Prefect. Bad input is not tried again. An artifact that
-    cannot be stored is said, and costs nothing else; where the server is lost, the run goes on without it.
+    `flows.evaluation.outcome_store`), with and without Prefect. An artifact that cannot be stored is said, and
+    costs nothing else; where the server is lost, the run goes on without it.
     """
 
     def __init__(self, say: Say, timeout_s: float | None = None) -> None:
@@ -84,8 +99,11 @@ class PrefectStages:
         self._lost = False
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
+        def plainly() -> T:
+            return self._plain(name, work, retries)
+
         if self._lost:
-            return self._plain(name, work)
+            return plainly()
         from prefect import task
         from prefect.cache_policies import NO_CACHE
 
@@ -93,19 +111,16 @@ class PrefectStages:
         stage = task(
             name=name,
             task_run_name=name,
-            retries=retries,
-            retry_delay_seconds=2,
-            retry_condition_fn=_passing,
             cache_policy=NO_CACHE,
             persist_result=False,
-        )(lambda: job.do(lambda: self._plain(name, work)))
+        )(lambda: job.do(plainly))
         try:
             result: T = stage()
         except Exception as error:
             if not of_prefect(error):
                 raise
             self._lose(error)
-            return job.outcome(lambda: self._plain(name, work))
+            return job.outcome(plainly)
         return result
 
     def progress(self, name: str, done: int, total: int) -> None:
@@ -160,14 +175,3 @@ def server_in_reach() -> Iterator[None]:
             f"the Prefect server {os.environ.get('PREFECT_API_URL', 'of the active profile')} does not answer; "
             "start it, or unset PREFECT_API_URL to run the stages without it."
         ) from None
-
-
-def _passing(task: object, run: object, state: object) -> bool:
-    """Whether a failed stage is worth another try: a network or disk error is, bad input is not."""
-    try:
-        state.result()  # type: ignore[attr-defined]
-    except OSError:
-        return True
-    except Exception:
-        return False
-    return False

@@ -84,7 +84,7 @@ def stop_sending() -> None:
 
 @dataclass
 class KeptWork(Generic[T]):
-    """What a piece of work came to, whatever Prefect makes of it; a try each where Prefect tries it again."""
+    """What a piece of work came to, whatever Prefect makes of it."""
 
     results: list[T] = field(default_factory=list)
     errors: list[BaseException] = field(default_factory=list)
@@ -102,7 +102,7 @@ class KeptWork(Generic[T]):
     def outcome(self, otherwise: Callable[[], T]) -> T:
         """What came of the work, as it would have come without Prefect; `otherwise`, where it has not begun.
 
-        Raises what the work raised where it was not tried again with success.
+        Raises what the work raised.
         """
         if self.results:
             return self.results[-1]

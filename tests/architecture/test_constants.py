@@ -24,14 +24,16 @@ def numeric(node: ast.expr | None) -> bool:
 
 
 def constants(module: ast.Module) -> list[tuple[int, str, bool]]:
-    """Place in the body, name, and whether a docstring follows, of each number at the top of a module."""
+    """Place in the body, name, and whether a docstring follows, of each number at the top of a module; of several
+    in one line the names together."""
     found = []
     for place, node in enumerate(module.body):
         match node:
             case (
-                ast.Assign(targets=[ast.Name(id=name)], value=value)
-                | ast.AnnAssign(target=ast.Name(id=name), value=value)
+                ast.Assign(targets=[ast.Name() | ast.Tuple() as target], value=value)
+                | ast.AnnAssign(target=ast.Name() as target, value=value)
             ):
+                name = ast.unparse(target).strip("()")
                 if name.isupper() and numeric(value):
                     after = module.body[place + 1] if place + 1 < len(module.body) else None
                     found.append((place, name, text_of(after) != ""))
@@ -58,8 +60,26 @@ def unexplained(source: str) -> Iterator[str]:
         commented = "#" in lines[node.end_lineno - 1] or lines[node.lineno - 2].startswith("#")
         shared = explained.get(place + 1, False)
         explained[place] = has_text or shared
-        if not (explained[place] or commented or name.strip("_") in texts):
+        named = all(each.strip("_ ") in texts for each in name.split(","))
+        if not (explained[place] or commented or named):
             yield name
+
+
+MOST_SHARING = 5
+"""Numbers that one docstring explains together: of ten in a row nobody could tell which it was about."""
+
+
+def crowded(source: str) -> Iterator[str]:
+    """The last of numbers in a row that share one docstring and are too many."""
+    found = {place: (name, has_text) for place, name, has_text in constants(ast.parse(source))}
+    sharing: dict[int, int] = {}
+    for place, (name, has_text) in found.items():
+        above = sharing.get(place - 1, 0)
+        sharing[place] = above + len(name.split(","))
+        if has_text:
+            if sharing[place] > MOST_SHARING and above:
+                yield name
+            sharing[place] = 0
 
 
 def test_every_number_that_decides_says_what_it_rests_on():
@@ -77,3 +97,15 @@ def test_a_silent_number_would_be_seen():
     )
     assert sorted(unexplained(source)) == ["C", "F"]
     assert list(unexplained(source + '"""Ten times less than C."""\n')) == []
+    assert list(unexplained("G, H = 1.0, 2.0\nI = 'text'\n")) == ["G, H"]
+    assert list(unexplained('G, H = 1.0, 2.0\n"""What both are."""\n')) == []
+
+
+def test_ten_limits_of_a_cell_shared_one_docstring():
+    crowds = {
+        path.relative_to(ROOT).as_posix(): names
+        for path in sorted((ROOT / "aesi").rglob("*.py"))
+        if (names := list(crowded(path.read_text(encoding="utf-8"))))
+    }
+    assert crowds == {}, "one number a line, each with its unit and why"
+    assert list(crowded('A, B = 1, 2\nC = 3\nD, E, F = 4, 5, 6\n"""Of all."""\n')) == ["D, E, F"]

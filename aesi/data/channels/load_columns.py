@@ -12,7 +12,7 @@ from aesi.data.channels.checks import Columns, Context
 from aesi.data.channels.columns import QUANTITIES, Mapped, map_columns
 from aesi.data.readers.table import TableFile
 from aesi.data.reading import Duplicates, Reading, bounds
-from aesi.data.state import both_ways, signs
+from aesi.data.state import both_ways, signs, turned
 from aesi.errors import DataError
 from aesi.numerics.typing import AnyArray, Array
 
@@ -88,8 +88,8 @@ def _orient(table: TableFile, data: Columns, mapped: Mapped, reading: Reading, n
         (words,) = table.read_text((mapped.position["state"],))
         way, note = signs(words, current, reading.state_words, table.path.name, mapped.header["state"])
         if asked or np.any(way != 0):
-            data["current_a"] = way * np.abs(current)  # an empty cell stays one, at rest too
-            notes.append(note)
+            data["current_a"], changes = turned(current, way, data["time_s"], bool(signed))
+            notes += [note, *changes]
             return
     elif not signed:
         _check_words(table, current, mapped, reading)

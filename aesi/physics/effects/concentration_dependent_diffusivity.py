@@ -26,6 +26,7 @@ BEYOND_LIMITS = 0.1
 """Of the stoichiometry window: surfaces leave it under load."""
 RANGE = "measured curves span some two orders of magnitude; the slope may go to e**10, so that no steep one is cut off"
 SLOPE, CURVATURE = 10.0, 4.0
+"""Largest size of b1, by RANGE, and of b2, a convention."""
 
 
 def _parameter(default: float, reach: float, side: str, what: str) -> Parameter:

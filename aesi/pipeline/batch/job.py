@@ -19,10 +19,7 @@ from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.discovery.cases import case_of_files
 from aesi.pipeline.discovery.discover import run_case, write_discovery
 from aesi.pipeline.report.words.discoveries import short_finding
-
-ROW = "row.json"
-FINDING = ("discovery.json", "report.html")
-"""What `aesi discover` leaves beside the model: a row without them has been torn out of its folder."""
+from aesi.pipeline.written import CALIBRATED, FINDING, REPORT, ROW
 
 
 @dataclass(frozen=True)
@@ -82,9 +79,10 @@ def of_other_code(jobs: Iterable[Job], out: Path) -> list[str]:
 
 
 def _known(folder: Path, key: str) -> dict[str, Any] | None:
-    """The row of a job that was done with the same files, settings and code, and whose finding is still there."""
+    """The row of a job that was done with the same files, settings and code, and whose finding and page are still
+    there: a row without them has been torn out of its folder."""
     kept = _kept(folder)
-    whole = kept.get("key") == key and all((folder / name).is_file() for name in FINDING)
+    whole = kept.get("key") == key and all((folder / name).is_file() for name in (FINDING, REPORT))
     return kept["row"] if whole else None
 
 
@@ -119,10 +117,10 @@ def _row(job: Job, folder: Path, settings: Settings) -> dict[str, Any]:
             f"{state}_test_mv": content[state]["test"].get("rmse_mv")
             for state in ("before", "recalibrated", "after")
         },
-        "report": f"{job.name}/report.html",
+        "report": f"{job.name}/{REPORT}",
     }
     if job.specimen:
-        calibrated = folder / "calibrated.bpx.json"
+        calibrated = folder / CALIBRATED
         report = calibrate_files(
             job.cell, case.measurements, calibrated, Request(Conditions(soc0=job.soc0, same_cell=True))
         )

@@ -46,6 +46,11 @@ class Job:
     at: float | None = None
     soh: Soh | None = None
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """What is read: the cell's file (a saved model is a folder) and the records."""
+        return self.cell, *self.data, *self.tests
+
     def key(self, settings: str) -> str:
         """What identifies the job: the content of its files, what each is for, and the settings it is run with."""
         sha = hashlib.sha256(f"{settings}|{self.soc0}|{self.soh}|{bool(self.specimen)}".encode())
@@ -173,64 +178,82 @@ def _jobs(table: Path, stream: TextIO, cell: Path | None) -> Iterator[Job]:
                 f"{table}, line {reader.line_num}: more cells than the header has; several files of a cell are "
                 "separated by ;"
             )
-        yield _job(table, row, reader.line_num, cell)
+        yield _job(_Row(table, row, reader.line_num), cell)
 
 
-def _job(table: Path, row: Mapping[str, str | None], line: int, cell: Path | None) -> Job:
-    def files(column: str) -> tuple[Path, ...]:
-        names = [name.strip() for name in (row.get(column) or "").split(";") if name.strip()]
-        return tuple(table.parent / name for name in names)
+@dataclass(frozen=True)
+class _Row:
+    """A row of a table, and where it stands, as sentences begin with."""
 
-    def number(column: str) -> float | None:
-        text = (row.get(column) or "").strip()
+    table: Path
+    cells: Mapping[str, str | None]
+    line: int
+
+    @property
+    def place(self) -> str:
+        return f"{self.table}, line {self.line}"
+
+    def text(self, column: str) -> str:
+        """What stands in a cell; '' where nothing does or there is no such column."""
+        return (self.cells.get(column) or "").strip()
+
+    def files(self, column: str) -> tuple[Path, ...]:
+        """The files of a cell, beside the table."""
+        names = (name.strip() for name in self.text(column).split(";"))
+        return tuple(self.table.parent / name for name in names if name)
+
+    def number(self, column: str) -> float | None:
+        """Raises InputError for what is no number, or no finite one."""
+        text = self.text(column)
         try:
             value = float(text) if text else None
         except ValueError:
             value = math.nan
         if value is not None and not math.isfinite(value):
-            raise InputError(f"{table}, line {line}: {column} = {text!r} is no number.")
+            raise InputError(f"{self.place}: {column} = {text!r} is no number.")
         return value
 
-    def share(column: str) -> float | None:
-        value = number(column)
+    def share(self, column: str) -> float | None:
+        """Raises InputError for what is no share."""
+        value = self.number(column)
         if value is not None and not 0.0 <= value <= 1.0:
             raise InputError(
-                f"{table}, line {line}: {column} = {value:g}: a state of charge is a share of the capacity, from 0 "
-                "(empty) to 1 (full); 90 % is 0.9."
+                f"{self.place}: {column} = {value:g}: a state of charge is a share of the capacity, from 0 (empty) to "
+                "1 (full); 90 % is 0.9."
             )
         return value
 
-    def health(column: str) -> Soh | None:
-        text = (row.get(column) or "").strip()
+    def health(self, column: str) -> Soh | None:
+        """Raises InputError for what is no state of health."""
+        text = self.text(column)
         try:
             return read_soh(text) if text else None
         except CellError as error:
-            raise InputError(f"{table}, line {line}: {column}: {error}") from None
+            raise InputError(f"{self.place}: {column}: {error}") from None
 
-    own = files("cell")
+
+def _job(row: _Row, cell: Path | None) -> Job:
+    own = row.files("cell")
     if not own and cell is None:
-        raise InputError(
-            f"{table}, line {line}: no cell is named; add the column cell, or give --cell for all."
-        )
-    name, data = (row.get("name") or "").strip(), files("data")
+        raise InputError(f"{row.place}: no cell is named; add the column cell, or give --cell for all.")
+    name, data = row.text("name"), row.files("data")
     if not name or not data:
-        raise InputError(f"{table}, line {line}: name and data have to be given.")
-    missing = [path for path in (*own, *data, *files("test")) if not path.exists()]
+        raise InputError(f"{row.place}: name and data have to be given.")
+    missing = [path for path in (*own, *data, *row.files("test")) if not path.exists()]
     if missing:
-        raise InputError(f"{table}, line {line}: there is no file {missing[0]}.")
-    specimen, at = (row.get("specimen") or "").strip(), number("at")
+        raise InputError(f"{row.place}: there is no file {missing[0]}.")
+    specimen, at = row.text("specimen"), row.number("at")
     if bool(specimen) != (at is not None):
         raise InputError(
-            f"{table}, line {line}: a check-up has a specimen and an at, and {name!r} has one of the two; give both, "
-            "or neither."
+            f"{row.place}: a check-up has a specimen and an at, and {name!r} has one of the two; give both, or neither."
         )
     return Job(
         name,
         own[0] if own else cell or Path(),
         data,
-        files("test"),
-        share("soc0"),
+        row.files("test"),
+        row.share("soc0"),
         specimen,
         at,
-        health("soh"),
+        row.health("soh"),
     )

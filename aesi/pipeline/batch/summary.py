@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from aesi.calibration.health import HEALTH_WORDS
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.report.page import write_page
+from aesi.pipeline.written import SUMMARY, SUMMARY_PAGE, SUMMARY_TABLE
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -38,13 +39,13 @@ CellRow = Mapping[str, Any]
 
 def write_summary(out: Path, rows: Sequence[CellRow], title: str) -> Path:
     """Write summary.csv, summary.json and index.html to `out`; returns the page."""
-    write_whole(out / "summary.csv", _csv(rows))
+    write_whole(out / SUMMARY_TABLE, _csv(rows))
     specimens = trends(rows)
     content = {"schema": SCHEMA, "jobs": list(rows), "trends": specimens}
-    write_whole(out / "summary.json", json.dumps(content, indent=1) + "\n")
+    write_whole(out / SUMMARY, json.dumps(content, indent=1) + "\n")
     figures = {"trends": _figure(specimens)} if specimens else {}
     return write_page(
-        out / "index.html",
+        out / SUMMARY_PAGE,
         "batch.html",
         figures,
         title=title,

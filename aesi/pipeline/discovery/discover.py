@@ -23,6 +23,7 @@ from aesi.pipeline.notes import of_day, on_temperatures, temperature_sentence, t
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.report.views import DiscoveryTrace, DiscoveryView, EffectView
+from aesi.pipeline.written import ARCHIVE, FINDING, MODEL, REPORT
 from aesi.records import Measurement
 from aesi.tracer import Discovery, discover
 from aesi.tracer.discovery import Progress
@@ -32,7 +33,6 @@ from aesi.tracer.report.yardstick import POINTS_TO, Pointer
 
 SCHEMA = "aesi.discovery/1"
 STATES: tuple[State, ...] = ("before", "recalibrated", "after")
-ARCHIVE = "hypotheses.jsonl"
 HOLDOUT = 0.3
 """Last share of the data that is kept back where there are no test records and nothing else is said."""
 ABBREVIATIONS = {"ocv": "OCV", "ocp": "OCP"}
@@ -165,10 +165,10 @@ def write_discovery(out: Path, case: Case, found: Discovery, mlflow_run_id: str 
     from aesi.pipeline.report import write_discovery_report
 
     content = discovery_content(found, case.notes)
-    write_whole(out / "discovery.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
-    found_model(found).save(out / "model")
+    write_whole(out / FINDING, json.dumps(content, indent=1, allow_nan=False) + "\n")
+    found_model(found).save(out / MODEL)
     title = ", ".join(m.name for m in case.measurements)
-    write_discovery_report(out / "report.html", view(found, content, title, mlflow_run_id))
+    write_discovery_report(out / REPORT, view(found, content, title, mlflow_run_id))
     return content
 
 

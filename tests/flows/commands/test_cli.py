@@ -559,6 +559,44 @@ def test_lists_of_files_may_follow_one_option():
     assert cli.repeated(["run", "--data", "a", "b"]) == ["run", "--data", "a", "b"]
 
 
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        ("discover --data=a b c --out d", "discover --data=a --data b --data c --out d"),
+        ("discover --data= a", "discover --data= --data a"),
+        ("discover --set a=1 e.yaml", "discover --set a=1 e.yaml"),
+        ("discover --seed 0 e.yaml --out d", "discover --seed 0 e.yaml --out d"),
+        ("discover --data a -- b", "discover --data a -- b"),
+        ("calibrate --until a=5 b=6", "calibrate --until a=5 --until b=6"),
+        ("simulate --effect=a:r=1 b --effect-file a.py b.py",
+         "simulate --effect=a:r=1 --effect b --effect-file a.py --effect-file b.py"),
+    ],
+)  # fmt: skip
+def test_several_values_after_an_equals_sign_were_taken_for_something_else(given, meant):
+    assert cli.repeated(given.split()) == meant.split()
+
+
+def test_a_second_file_after_an_equals_sign_had_another_option_blamed(call):
+    code, _, err = call("discover", "--cell", LG_M50, "--data=dis.csv", "cha.csv", "--out", "d")
+    assert code == 2
+    assert "dis.csv" in err
+    assert "experiment file" not in err
+
+
+def test_every_option_that_may_be_given_again_takes_several_values():
+    from typer.main import get_command
+
+    commands = get_command(cli.app).commands
+    several = {
+        option
+        for name in cli.TAKE_LISTS
+        for parameter in commands[name].params
+        if parameter.multiple and parameter.param_type_name == "option"
+        for option in parameter.opts
+    }
+    assert several - {"--set"} == {*cli.LISTS}
+
+
 def test_bench_prints_json_lines(call, monkeypatch):
     monkeypatch.setattr("flows.benchmarks.run", lambda name, **options: iter([{"ours_s": 1.0, **options}]))
     code, out, _ = call("bench", "espm", "--json", "--set", "n=3")

@@ -158,7 +158,7 @@ def test_a_workspace_that_cannot_be_written_to_ended_a_job_whose_results_lie_els
 
 
 def test_a_worker_evaluated_what_it_could_hand_to_nobody(closed, call, workspace, monkeypatch):
-    monkeypatch.setattr("aesi.pipeline.experiment.load.load", lambda config: pytest.fail("work was begun"))
+    monkeypatch.setattr("flows.jobs.experiment_stages.load", lambda config: pytest.fail("work was begun"))
     path = workspace / "small.yaml"
     path.write_text("name: small\ndata: {kind: virtual}\n")
     code, _, err = call("worker", path)

@@ -123,7 +123,7 @@ def test_a_run_was_gone_on_with_over_an_edited_fallback(experiment, tmp_path, ed
 def test_a_run_that_fell_back_was_gone_on_with_on_other_data(experiment, call, monkeypatch):
     from dataclasses import replace
 
-    from aesi.pipeline.experiment import load as module
+    from flows.jobs import experiment_stages as module
 
     load = module.load
 
@@ -131,7 +131,7 @@ def test_a_run_that_fell_back_was_gone_on_with_on_other_data(experiment, call, m
         raise FitError("no more.")
 
     with monkeypatch.context() as first:
-        first.setattr("aesi.pipeline.experiment.fit.build_problem", fails)
+        first.setattr(module, "build_problem", fails)
         assert call("run", experiment, "--no-prefect")[0] == 1
 
     def others(config):

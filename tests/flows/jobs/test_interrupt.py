@@ -15,7 +15,7 @@ import pytest
 
 import aesi
 from aesi.physics.effects import CATALOGUE
-from aesi.pipeline.discovery.discover import ARCHIVE
+from aesi.pipeline.written import ARCHIVE
 
 ROOT = Path(__file__).resolve().parents[3]
 CELL = ROOT / "experiments" / "cells" / "lg_m50_chen2020.bpx.json"

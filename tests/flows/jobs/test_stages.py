@@ -9,6 +9,7 @@ import pytest
 
 from aesi.errors import DataError
 from flows.base.console import Console
+from flows.jobs import stages
 from flows.jobs.stages import PlainStages, ServerAway, StageOverdue, server_in_reach
 from flows.jobs.temporary_server import CURRENT
 
@@ -59,6 +60,59 @@ def test_the_time_of_one_stage_is_not_taken_from_the_next(said):
     for _ in range(3):
         run("rest", lambda: time.sleep(0.3))
     assert len(said) == 3
+
+
+def away(times):
+    """Work that the network fails at first, and the tries it takes."""
+    tries = []
+
+    def work():
+        tries.append("once")
+        if len(tries) <= times:
+            raise ConnectionError("no route")
+        return "data"
+
+    return work, tries
+
+
+def test_without_prefect_a_stage_was_not_tried_again(said, monkeypatch):
+    monkeypatch.setattr(stages, "PAUSE_S", 0.0)
+    work, tries = away(2)
+    assert PlainStages(said.append)("data", work, retries=2) == "data"
+    assert len(tries) == 3
+    assert said == [
+        "data: failed (no route); it is tried up to 2 times more.",
+        "data: failed (no route); it is tried once more.",
+        "data: done in 0 s",
+    ]
+
+
+def test_a_stage_that_fails_at_every_try_says_so_as_it_did(said, monkeypatch):
+    monkeypatch.setattr(stages, "PAUSE_S", 0.0)
+    work, tries = away(9)
+    with pytest.raises(ConnectionError, match="no route"):
+        PlainStages(said.append)("data", work, retries=1)
+    assert len(tries) == 2
+    with pytest.raises(ConnectionError):
+        PlainStages(said.append)("data", work)
+    assert len(tries) == 3
+
+
+def test_bad_input_and_a_limit_are_not_tried_again(said):
+    tries = []
+
+    def wrong():
+        tries.append("once")
+        raise DataError("row 3 is no number")
+
+    with pytest.raises(DataError, match="row 3"):
+        PlainStages(said.append)("data", wrong, retries=2)
+    with pytest.raises(StageOverdue):
+        PlainStages(said.append, timeout_s=0.1)(
+            "data", lambda: tries.append("once") or time.sleep(30), retries=2
+        )
+    assert len(tries) == 2
+    assert said == []
 
 
 def test_a_server_that_is_away_is_one_sentence(monkeypatch):
@@ -117,6 +171,7 @@ def test_as_tasks_a_passing_failure_is_tried_again_and_bad_input_is_not(said):
     with prefect_test_harness(server_startup_timeout=180):
         assert job() == "data"
     assert tries == {"network": 2, "input": 1}
+    assert said == ["data: failed (no route); it is tried up to 2 times more.", "data: done in 0 s"]
 
 
 @pytest.mark.slow

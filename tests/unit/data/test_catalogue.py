@@ -177,3 +177,14 @@ def test_a_set_that_is_in_the_folder_already_stays_there(tmp_path, monkeypatch):
     monkeypatch.setenv("AESI_DATA", str(tmp_path))
     assert catalogue.get("lg_m50t_w8", folder) == folder
     assert (folder / "udds.csv").read_text() == "x"
+
+
+def test_a_set_that_was_copied_into_itself_lost_files_of_its_own(tmp_path, monkeypatch):
+    folder = tmp_path / "lg_m50t_w8"
+    (folder / "below").mkdir(parents=True)
+    for name in ("udds.csv", "below/udds.csv"):
+        (folder / name).write_text(name)
+    monkeypatch.setenv("AESI_DATA", str(tmp_path))
+    with pytest.raises(DataError, match=r"lies in .*, from where the set is copied"):
+        catalogue.get("lg_m50t_w8", folder / "below")
+    assert (folder / "below" / "udds.csv").read_text() == "below/udds.csv"

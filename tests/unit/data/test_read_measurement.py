@@ -467,6 +467,41 @@ def test_a_unit_without_its_column_and_words_without_theirs_were_passed_over_in_
     assert len(read(path, Reading({"state": "mode"}, state_words=words))) == 4
 
 
+def of_a_slow_discharge(signed, turn=1.0):
+    """4 A of discharge and of charge for 100 s each, and then 2,000 s at 0.04 A in rows that are marked as rest."""
+    kinds = ["D"] * 100 + ["C"] * 100 + ["R"] * 2000
+    current = turn * np.array([4.0] * 100 + [-4.0 if signed else 4.0] * 100 + [0.04] * 2000)
+    volts = {"D": 3.6, "C": 3.8, "R": 3.7}
+    lines = (
+        f"{t},{i},{volts[kind] - 1e-5 * t:.5f},{kind}"
+        for t, (i, kind) in enumerate(zip(current, kinds, strict=True))
+    )
+    return "time_s,current_a,voltage_v,mode\n" + "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize("turn", [1.0, -1.0])
+def test_a_current_with_a_sign_was_zeroed_in_rows_marked_rest(tmp_path, turn):
+    path = written(tmp_path, of_a_slow_discharge(True, turn))
+    record = read(path, Reading({"state": "mode"}))
+    assert record.current_a[[0, 150, 1000]].tolist() == [4.0, -4.0, 0.04]
+    said = " ".join(record.notes)
+    assert "In 2,000 rows up to 0.04 A (22.2 mAh in all) flows at rest; it was kept with its own sign" in said
+
+
+def test_what_was_zeroed_at_rest_was_not_said(tmp_path):
+    record = read(written(tmp_path, of_a_slow_discharge(False)), Reading({"state": "mode"}))
+    assert record.current_a[[0, 150, 1000]].tolist() == [4.0, -4.0, 0.0]
+    said = " ".join(record.notes)
+    assert "In 2,000 rows up to 0.04 A (22.2 mAh in all) flows at rest, in no direction that is told" in said
+
+
+def test_a_column_that_says_another_direction_than_the_current_was_followed_in_silence(tmp_path):
+    body = of_a_slow_discharge(True).replace("\n50,4.0,", "\n50,-2.0,")
+    record = read(written(tmp_path, body), Reading({"state": "mode"}))
+    assert record.current_a[50] == 2.0
+    assert "In 1 row up to 2 A (0.556 mAh in all) the column says another direction" in " ".join(record.notes)
+
+
 @pytest.mark.parametrize("suffix", [".xlsx", ".xls", ".parquet", ".csv.gz"])
 def test_text_under_the_name_of_another_format_was_read_without_a_word(tmp_path, suffix):
     named = suffix.removeprefix(".csv")

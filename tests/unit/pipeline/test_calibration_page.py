@@ -184,3 +184,20 @@ def test_a_calibration_writes_its_page_with_the_errors_that_it_tells(tmp_path, m
     (trace,), (error,) = fit_traces(found), found.errors
     assert drawn_rms_v(trace) == pytest.approx((error.before_v, error.simulated_v, error.after_v), rel=1e-9)
     assert trace.soc[-1] == pytest.approx(trace.soc[0] - data.charge_ah / found.cell.capacity_ah, abs=0.01)
+
+
+def test_the_state_of_charge_was_begun_in_other_windows_than_it_was_counted_in():
+    """The start file is empty below its lower voltage, the file that is written at it: between full, which both have,
+    and the start there is the same charge, of another capacity."""
+    cell = replace(Cell.from_bpx(START), lower_voltage_v=3.0)
+    found = calibrate(cell, [pulses(cell)], evaluations=2)
+    (trace,), model = fit_traces(found), found.model
+    fitted = model.cell_at(found.x)
+    start = model.records[0].start.soc + model.records[0].soc_sd * found.x[model.layout.soc(0)]
+    assert found.cell.capacity_ah < 0.97 * fitted.capacity_ah
+    assert trace.soc[0] == pytest.approx(
+        1.0 - (1.0 - start) * fitted.capacity_ah / found.cell.capacity_ah, abs=1e-6
+    )
+    assert found.cell.rest_voltage_v(trace.soc[:1]) == pytest.approx(
+        fitted.rest_voltage_v(np.array([start])), abs=1e-6
+    )
