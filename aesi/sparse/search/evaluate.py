@@ -106,6 +106,10 @@ class Candidate:
         """AESI I and AESI II, in the order of ENSEMBLES."""
         return self.bagging, self.stability
 
+    def named(self, name: str) -> SparseModel | None:
+        """The ensemble of that name; None where it is that of another model."""
+        return next((model for model in self.ensembles if model.name == name), None)
+
     @property
     def better(self) -> SparseModel:
         """The ensemble of the lower validation loss, AESI I where they are equal."""

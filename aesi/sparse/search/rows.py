@@ -67,7 +67,7 @@ def training_rows(train: Sequence[ErrorSeries], library: Library, outside: Outsi
         )
     parts, which = library.input_products
     soc = np.concatenate([record.soc[:-1] for record in train])
-    temperature_degc = temperatures(train)
+    temperature_degc = np.concatenate([record.degc_or_nan[:-1] for record in train])
     return TrainingRows(
         library,
         scaling,
@@ -108,16 +108,6 @@ def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
     """The rows a to b - 1 in consecutive pieces."""
     edges = np.linspace(a, b, cuts + 1).round().astype(int)
     return [(int(p), int(q)) for p, q in pairwise(edges)]
-
-
-def temperatures(records: Sequence[ErrorSeries]) -> Array:
-    """(n,) degC at each training row, NaN where it was not measured."""
-    return np.concatenate(
-        [
-            np.full(len(r) - 1, np.nan) if r.temperature_degc is None else r.temperature_degc[:-1]
-            for r in records
-        ]
-    )
 
 
 def nearness_of_left_out(inputs: Array, soc: Array, temperature_degc: Array, folds: Sequence[Span]) -> Array:
