@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
+import numpy as np
+
 from aesi.numerics.typing import Array, BoolArray
 from aesi.over_time import extent
 from aesi.records.measurement import digest
@@ -48,6 +50,15 @@ class ErrorSeries:
     def current_a(self) -> Array:
         """(n,) A, discharge positive."""
         return self.inputs[:, self.input_names.index("I")]
+
+    @property
+    def degc_or_nan(self) -> Array:
+        """(n,) degC of the cell, NaN where it was not measured."""
+        return np.full(len(self), np.nan) if self.temperature_degc is None else self.temperature_degc
+
+    def steps(self, horizon_s: float) -> int:
+        """Samples that a prediction so far ahead goes over, at least one."""
+        return max(1, round(horizon_s / self.dt_s))
 
     @property
     def digest(self) -> str:

@@ -1,14 +1,15 @@
 """A correction is shrunk towards the physics: as a whole by its slope on left-out drives, and far from its fitted rows.
 
-    e'(x) = a w(x) e(x),     w = n(x) / (1 + KAPPA max(h(x) / h_u - 1, 0)**2)                               (1)
-    a = b - t s_b,     b = sum_d <e_d, w e'_d> / sum_d (|w e'_d|**2 + DOUBT |e_d|**2)    within [0, 1]              (2)
+    c'(x) = a w(x) c(x),     w = n(x) / (1 + KAPPA max(h(x) / h_u - 1, 0)**2)                               (1)
+    a = b - t s_b,     b = sum_d <e_d, n c_d> / sum_d (|n c_d|**2 + DOUBT |e_d|**2)    within [0, 1]                (2)
 
-e is what the terms say, h the leverage of x in their fit (leverage.py), n its nearness to what they were fitted to
-(trained_region.py). The amplitude a is the slope of the error on the correction over drives d that the terms had not
-seen, less its standard error s_b by the jackknife over drives, whose parts err alike and count as one; t is the
+c is what the terms say, h the leverage of x in their fit (leverage.py), n its nearness to what they were fitted to
+(trained_region.py). The amplitude a is the slope of the error e on the correction over drives d that the terms of c_d
+had not seen, less its standard error s_b by the jackknife over drives, whose parts err alike and count as one; t is the
 quantile of Student's distribution for so many drives where a normal error would have one standard error: two drives
 that agree do so by chance more often than six. DOUBT is a ridge on that slope: where each drive
-lies outside of what the others visit, w e' is all but zero on every one of them, and the slope would rest on nothing.
+lies outside of what the others visit, n c is all but zero on every one of them, and the slope would rest on nothing.
+The leverage is not in (2), nor in what a search judges: only the chosen ensembles get it, and w = n without it.
 The ridge on the coefficients shrinks them for the noise within drives, (2) shrinks their sum for what differs between
 drives. Efron & Morris, J. Am. Stat. Assoc. 68 (1973) 117.
 
@@ -54,7 +55,8 @@ class Fade:
         return self.amplitude * self.kept(scaled, soc, temperature_degc, excess)
 
     def kept(self, scaled: Array, soc: Array, temperature_degc: Array | None, excess: Array | None) -> Array:
-        """(n,) w along scaled inputs (n, n_inputs) that were not held at the edge, with the leverage's excess."""
+        """(n,) w along scaled inputs (n, n_inputs) that were not held at the edge, with the (n,) excess of
+        the leverage, or None, which leaves w = n."""
         leverage = 0.0 if excess is None else KAPPA * excess**2
         near = self.region.nearness(scaled, soc, temperature_degc)
         return np.asarray(near / (1.0 + leverage))
@@ -72,7 +74,7 @@ class Fade:
 def amplitude(
     error: Array, correction: Array, folds: Sequence[Span], drives: IntArray, weights: Array
 ) -> float:
-    """a of (2).  error, correction, weights : (n,) of all folds; each row counts by its weight.
+    """a of (2).  error, correction n c, weights : (n,) of all folds; each row counts by its weight.
     drives : (n_folds,) to which drive each fold belongs."""
     sums = [
         (w @ e**2, w @ (e * c), w @ c**2)
@@ -82,7 +84,7 @@ def amplitude(
 
 
 def shrunken(sums: Array, drives: IntArray) -> float:
-    """a of (2) from (n_folds, 3) sums of e**2, e e' and e'**2; nought where there is nothing to tell it from.
+    """a of (2) from (n_folds, 3) sums of e**2, e n c and (n c)**2; nought where there is nothing to tell it from.
 
     drives : (n_folds,) to which drive each belongs; of a single drive the folds stand for drives. One fold alone has no
     scatter to be wary of.

@@ -43,7 +43,8 @@ class SparseModel:
     memory : see above; 0 for a model with terms in e.
     inclusion : (m,) share of the ensemble's members that hold each term.
     low, high : (m,) 5th and 95th percentile of each coefficient over the ensemble's members.
-    leverage : of the fit, where bands of a free run ask for it.
+    leverage : of the fit. Bands of a free run ask for it, and where there is a `fade` it takes part in that, so that a
+    model says less with it than without.
     fade : how the correction gives way to the physics, of a model without terms in e; None where it does not.
     """
 

@@ -115,7 +115,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
     model = HybridModel(
         cell=rebuilt.declared.cell,
         effects=rebuilt.declared.effects,
-        correction=fitted.model,  # with the leverage that its bands ask for
+        correction=fitted.model,  # with the leverage that its fade and its bands ask for
         intervals=fitted.intervals,
         bands=fitted.bands,
         dt_s=rebuilt.config.data.dt_s,

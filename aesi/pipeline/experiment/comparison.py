@@ -29,12 +29,11 @@ def comparison(result: Result) -> dict[str, Any]:
     chosen = result.best
     shown = published_by(result.loaded.model)
     names = [str(row["name"]) for row in result.evaluation.rows]
-    sparse = result.chosen.stability if chosen == result.chosen.stability.name else result.chosen.bagging
     return {
         "schema": SCHEMA,
         "intervals": {shown(name): _intervals(tests, name, result.config.seed) for name in names},
         "genome": {k: v for k, v in result.chosen.genome.to_dict().items() if k != "terms"},
-        "terms": sparse.coefficient_table() if chosen == sparse.name else {},
+        "terms": result.ensemble.coefficient_table() if result.ensemble else {},
         "maps": {shown(name): _map(tests, name) for name in dict.fromkeys((DECLARED, chosen))},
     }
 

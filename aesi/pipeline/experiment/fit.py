@@ -18,7 +18,7 @@ from aesi.pipeline.experiment.drives import cuts
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.experiment.physics_models import PHYSICS_NAMES
 from aesi.records import ErrorModel
-from aesi.sparse import ENSEMBLES, Candidate, Options, Problem
+from aesi.sparse import Candidate, Options, Problem
 from aesi.sparse.baselines import BASELINES, Judge, Tuning
 from aesi.sparse.yardsticks import Bare
 
@@ -99,8 +99,8 @@ def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) 
 
 
 def _model(name: str, problem: Problem, chosen: Candidate, tuning: Tuning) -> tuple[ErrorModel, int]:
-    if name in ENSEMBLES:
-        ensemble = chosen.ensembles[ENSEMBLES.index(name)]
+    ensemble = chosen.named(name)
+    if ensemble is not None:
         return ensemble, len(ensemble.terms)
     if name in PHYSICS_NAMES:
         return Bare(name), 0

@@ -67,6 +67,11 @@ class Result:
         return self.chosen.better.name
 
     @property
+    def ensemble(self) -> SparseModel | None:
+        """The one that `best` names; None where that is another model."""
+        return self.chosen.named(self.best)
+
+    @property
     def corrected(self) -> str:
         """The physics that corrections are learnt on, which a saved model holds."""
         return RECALIBRATED if self.loaded.config.cell.start == "recalibrated" else DECLARED
@@ -199,11 +204,10 @@ def finite(value: Any) -> Any:
 
 
 def _terms(result: Result) -> list[dict[str, Any]]:
-    """Terms of both ensembles; the importance is that in the ensemble the product is made of."""
+    """Terms of both ensembles; the importance is that in the ensemble the product is made of, or else in AESI I."""
     chosen = result.chosen
     bagging, stability = chosen.bagging.coefficient_table(), chosen.stability.coefficient_table()
-    best = chosen.stability if result.best == chosen.stability.name else chosen.bagging
-    importance = dict(svd_ranking(best, result.problem.split.train))
+    importance = dict(svd_ranking(result.ensemble or chosen.bagging, result.problem.split.train))
     inclusion: dict[str, float] = {}
     for model in (chosen.stability, chosen.bagging):
         if model.inclusion is not None:

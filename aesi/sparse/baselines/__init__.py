@@ -1,4 +1,10 @@
-"""What a user would pick instead, on the same features, splits and regimes; each a function of problem and tuning."""
+"""What a user would pick instead, on the same features and splits; each a function of problem and tuning.
+
+Those that try several settings judge them as the search does: losses in its regime, its weights, its constraints.
+SINDy-C and ridge, where no term holds the error, and boosted trees fade as its candidates do while these are judged.
+None has the leverage in its fade, which the ensembles get once they are chosen; constant, PySINDy's median and DMD do
+not fade.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,7 +16,8 @@ from aesi.sparse.baselines.constant import constant
 from aesi.sparse.baselines.dmd_c import dmd_with_control
 from aesi.sparse.baselines.pysindy_ensemble import pysindy_ensemble
 from aesi.sparse.baselines.ridge import plain_ridge
-from aesi.sparse.baselines.sindy_c import Judge, tuned_sindy_c
+from aesi.sparse.baselines.sindy_c import tuned_sindy_c
+from aesi.sparse.baselines.single import Judge
 from aesi.sparse.search.genome_space import GenomeSpace
 from aesi.sparse.search.problem import Problem
 
@@ -36,10 +43,10 @@ BASELINES: dict[str, Callable[[Problem, Tuning], ErrorModel]] = {
     "SINDy-C": lambda problem, tuning: tuned_sindy_c(
         problem, tuning.seed, tuning.candidates, tuning.population, tuning.space, tuning.judge, tuning.told
     ),
-    "PySINDy ensemble": lambda problem, tuning: pysindy_ensemble(problem, tuning.seed),
+    "PySINDy ensemble": lambda problem, tuning: pysindy_ensemble(problem, tuning.seed, tuning.judge),
     "DMD with control": lambda problem, _: dmd_with_control(problem),
-    "ridge": lambda problem, _: plain_ridge(problem),
-    "gradient boosting": lambda problem, tuning: gradient_boosting(problem, tuning.seed),
+    "ridge": lambda problem, tuning: plain_ridge(problem, tuning.judge),
+    "gradient boosting": lambda problem, tuning: gradient_boosting(problem, tuning.seed, tuning.judge),
 }
 """Name -> function of the problem and the tuning."""
 

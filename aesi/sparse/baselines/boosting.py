@@ -5,7 +5,8 @@
 The trees see the inputs alone: a tree that sees e[k] learns persistence, which is worth nothing in free run. Rows count
 as in every fit of the search. Number of leaves and of trees come from a small grid, judged as candidates of the search
 are: on what physics that has not seen them leaves of the left-out pieces, and on validation records. Where sparse
-corrections fade to the physics, so do the trees, but for the leverage, which is that of a regression.
+corrections fade to the physics, so do the trees, but for the leverage, which is that of a regression. They have no
+terms: in the fitness the sparsity of each counts as nought.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ import numpy as np
 from aesi.numerics.typing import Array
 from aesi.records import ErrorSeries, FreeRun
 from aesi.sparse import free_run
+from aesi.sparse.baselines.single import Judge
 from aesi.sparse.fade import Fade
-from aesi.sparse.search.evaluate import FitnessWeights, fitness
-from aesi.sparse.search.judge import on_validation, runs_without_feedback
+from aesi.sparse.search.evaluate import fitness
+from aesi.sparse.search.judge import Judged, on_validation, runs_without_feedback
 from aesi.sparse.search.problem import Problem
 from aesi.sparse.terms.inputs import with_inputs
 from aesi.sparse.terms.scaling import Scaling
@@ -75,14 +77,22 @@ class BoostedErrorModel:
         return given[:-1]
 
 
-def gradient_boosting(problem: Problem, seed: int = 0) -> BoostedErrorModel:
-    """The fittest of the grid, fitted to all training rows."""
-    tried = [one for leaves in LEAVES for one in _tried(problem, leaves, seed)]
-    return max(tried, key=lambda one: one[0])[1]
+@dataclass(frozen=True, eq=False)
+class _Boosted:
+    fitness: float
+    model: BoostedErrorModel
+    valid: Judged
+    pearson_train: float
 
 
-def _tried(problem: Problem, leaves: int, seed: int) -> Iterator[tuple[float, BoostedErrorModel]]:
-    """Fitness and model for each number of trees."""
+def gradient_boosting(problem: Problem, seed: int = 0, judge: Judge | None = None) -> BoostedErrorModel:
+    """The best of the grid, fitted to all training rows."""
+    judge = judge or Judge()
+    return judge.best(one for leaves in LEAVES for one in _tried(problem, leaves, seed, judge)).model
+
+
+def _tried(problem: Problem, leaves: int, seed: int, judge: Judge) -> Iterator[_Boosted]:
+    """One for each number of trees."""
     left_out = [_left_out(problem, fold, leaves, seed) for fold in range(len(problem.folds))]
     for number, trees in enumerate(TREES):
         given = np.concatenate([each[number] for each in left_out])
@@ -96,8 +106,9 @@ def _tried(problem: Problem, leaves: int, seed: int) -> Iterator[tuple[float, Bo
             Fade(runs.amplitudes[0], problem.region) if problem.options.fade else None,
         )
         (valid,) = on_validation(problem, runs, (model,))
-        losses = runs.judge(problem, 0).loss, valid.loss, 0.0
-        yield fitness(losses, len(problem.library), FitnessWeights()), model
+        folds = runs.judge(problem, 0)
+        losses = folds.loss, valid.loss, 0.0
+        yield _Boosted(fitness(losses, len(problem.library), judge.weights), model, valid, folds.pearson)
 
 
 def _left_out(problem: Problem, fold: int, leaves: int, seed: int) -> list[Array]:

@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from aesi.errors import FitError
-from aesi.sparse.baselines.single import Single, evaluate_single
+from aesi.sparse.baselines.single import Judge, Single, evaluate_single
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import sparse_model
 from aesi.sparse.search.genome import Genome
@@ -31,9 +31,9 @@ _RIDGES = (1.0, 10.0, 100.0, 1000.0)
 """Weights of PySINDy's ridge that are tried."""
 
 
-def pysindy_ensemble(problem: Problem, seed: int = 0) -> SparseModel:
+def pysindy_ensemble(problem: Problem, seed: int = 0, judge: Judge | None = None) -> SparseModel:
     """The median of the ensemble. Raises FitError where no setting of the grid runs freely."""
-    best = _setting(problem)
+    best = _setting(problem, judge or Judge())
     active = np.flatnonzero(best.active(problem.library))
     every = -(-len(problem.target) // MOST_ROWS)
     root = np.sqrt(problem.row_weights[::every])[:, None]
@@ -57,15 +57,15 @@ def _median(theta: np.ndarray, target: np.ndarray, ridge: float, seed: int) -> n
     return np.asarray(np.median([member[0] for member in ensemble.coef_list], axis=0), dtype=float)
 
 
-def _setting(problem: Problem) -> Genome:
+def _setting(problem: Problem, judge: Judge) -> Genome:
     singles = []
     top = int(problem.library.degrees.max())
     for d, ridge in product(range(1, min(2, top) + 1), _RIDGES):
         genome = Genome.whole(problem.library, ridge, THRESHOLD, d=d, feedback=False)
         fit = STRidge(ridge, THRESHOLD).fit_factor
-        single = evaluate_single(problem, genome, fit, NAME)
+        single = evaluate_single(problem, genome, fit, NAME, judge.weights)
         if isinstance(single, Single):
             singles.append(single)
     if not singles:
         raise FitError(f"{NAME}: no setting of its grid runs freely without diverging.")
-    return max(singles, key=lambda single: single.fitness).genome
+    return judge.best(singles).genome

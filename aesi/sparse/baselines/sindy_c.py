@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -21,7 +20,7 @@ import numpy as np
 
 from aesi.numerics.typing import Array
 from aesi.records import Failed
-from aesi.sparse.baselines.single import Single, evaluate_single
+from aesi.sparse.baselines.single import Judge, Single, evaluate_single
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import FitnessWeights
 from aesi.sparse.search.evolution import fittest
@@ -30,19 +29,6 @@ from aesi.sparse.search.genome_space import GenomeSpace
 from aesi.sparse.search.problem import Problem
 
 NAME = "SINDy-C"
-
-
-@dataclass(frozen=True)
-class Judge:
-    """Weights of the fitness and least correlations in free run, those of the search it is compared with."""
-
-    weights: FitnessWeights = field(default_factory=FitnessWeights)
-    pearson_train: float = 0.5
-    pearson_valid: float = 0.5
-
-    def admits(self, one: Single) -> bool:
-        """Whether a candidate keeps to the constraints."""
-        return one.pearson_train > self.pearson_train and one.valid.pearson > self.pearson_valid
 
 
 def tuned_sindy_c(

@@ -1,9 +1,10 @@
-"""One model instead of an ensemble, judged as candidates of the search are."""
+"""One model instead of an ensemble, judged as candidates of the search are: by its weights and its constraints."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -11,12 +12,47 @@ from aesi.numerics.typing import Array
 from aesi.records import Failed
 from aesi.sparse.model import SparseModel
 from aesi.sparse.search.evaluate import FitnessWeights, faded, fitness, sparse_model
+from aesi.sparse.search.evolution import HasFitness, ranked
 from aesi.sparse.search.genome import Genome
 from aesi.sparse.search.judge import Judged, fold_runs, on_validation
 from aesi.sparse.search.problem import Problem
 
 FactorFit = Callable[[Array], Array]
 """Coefficients (m,) from a factor (any, m + 1) of the problem, see `STRidge.fit_factor`."""
+
+
+class Tried(HasFitness, Protocol):
+    """A setting of a baseline that was tried: its fitness, and what the constraints ask of."""
+
+    @property
+    def pearson_train(self) -> float:
+        """Correlation of error and prediction in free run, on left-out pieces."""
+        ...
+
+    @property
+    def valid(self) -> Judged:
+        """How it did on validation."""
+        ...
+
+
+T = TypeVar("T", bound=Tried)
+
+
+@dataclass(frozen=True)
+class Judge:
+    """Weights of the fitness and least correlations in free run, those of the search it is compared with."""
+
+    weights: FitnessWeights = field(default_factory=FitnessWeights)
+    pearson_train: float = 0.5
+    pearson_valid: float = 0.5
+
+    def admits(self, one: Tried) -> bool:
+        """Whether a candidate keeps to the constraints."""
+        return one.pearson_train > self.pearson_train and one.valid.pearson > self.pearson_valid
+
+    def best(self, tried: Iterable[T]) -> T:
+        """The fittest that keeps to the constraints, or of all where none does; of equally fit ones the first."""
+        return ranked(tried, self.admits)[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,10 +38,13 @@ class FitnessWeights:
 
 @dataclass(frozen=True, eq=False)
 class OutOfFoldResiduals:
-    """Out-of-fold prediction errors, for the calibration of intervals: each by models that were not fitted to its row.
+    """Out-of-fold prediction errors, for the calibration of intervals: each by coefficients not fitted to its row.
 
     one_step_v : (n - 1,) V, measured minus predicted error of samples 1 to n - 1 of the record, one step ahead,
-    by models fitted on all rows but the piece around each.  stable_v : the same by fits of the stable terms.
+    by models fitted on all rows but the piece around each.  stable_v : the same by fits of the stable terms, and which
+    terms these are was selected over all rows, the piece's too. So `stable_v` is a little too small: on records of
+    noise alone, where what is selected is chance, by half a per cent of its RMS (a relative squared error of 1.011
+    instead of 1.019, and with fewer terms 0.998 instead of 1.009; standard errors 0.003 to 0.004 over 12 draws).
     """
 
     record: str
@@ -102,6 +105,10 @@ class Candidate:
     def ensembles(self) -> tuple[SparseModel, SparseModel]:
         """AESI I and AESI II, in the order of ENSEMBLES."""
         return self.bagging, self.stability
+
+    def named(self, name: str) -> SparseModel | None:
+        """The ensemble of that name; None where it is that of another model."""
+        return next((model for model in self.ensembles if model.name == name), None)
 
     @property
     def better(self) -> SparseModel:

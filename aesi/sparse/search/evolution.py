@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -14,12 +14,7 @@ from aesi.sparse.search.genome_space import GenomeSpace
 
 
 class HasFitness(Protocol):
-    """What an evaluation gives: its genome, and how fit it is."""
-
-    @property
-    def genome(self) -> Genome:
-        """What was evaluated."""
-        ...
+    """How fit something is."""
 
     @property
     def fitness(self) -> float:
@@ -27,7 +22,22 @@ class HasFitness(Protocol):
         ...
 
 
-T = TypeVar("T", bound=HasFitness)
+class Bred(HasFitness, Protocol):
+    """What an evaluation gives: its genome, and how fit it is."""
+
+    @property
+    def genome(self) -> Genome:
+        """What was evaluated."""
+        ...
+
+
+R = TypeVar("R", bound=HasFitness)
+T = TypeVar("T", bound=Bred)
+
+
+def ranked(tried: Iterable[R], admitted: Callable[[R], bool]) -> list[R]:
+    """The fittest first, those that are not `admitted` after all that are; equally fit ones stay in their order."""
+    return sorted(tried, key=lambda one: (not admitted(one), -one.fitness))
 
 
 def fittest(
@@ -53,15 +63,13 @@ def fittest(
                 reason = outcome.reason
             else:
                 alive.append(outcome)
-        alive.sort(key=lambda scored: (not admitted(scored), -scored.fitness))
+        alive = ranked(alive, admitted)
     if not alive:
         raise FitError(f"none of {candidates} candidates survives (the last one: {reason}).")
     return alive[0]
 
 
-def _proposal(
-    space: GenomeSpace, alive: Sequence[HasFitness], population: int, rng: np.random.Generator
-) -> Genome:
+def _proposal(space: GenomeSpace, alive: Sequence[Bred], population: int, rng: np.random.Generator) -> Genome:
     parents = alive[: population // 2]
     if len(parents) < 2:
         return space.random(rng)

@@ -121,7 +121,7 @@ def _terms(problem: Problem, candidate: Candidate, stable: bool) -> IntArray:
 
 
 def with_leverage(model: SparseModel, problem: Problem, lambda1: float) -> SparseModel:
-    """The model with the leverage of a fit of its terms to all training rows."""
+    """The model with the leverage of a fit of its terms to all training rows, by which it fades, too, if it does."""
     number = {term: j for j, term in enumerate(problem.library.terms)}
     which: IntArray = np.array([number[term] for term in model.library.terms])
     return replace(model, leverage=Leverage.of(problem.full_factor[:, which], lambda1, problem.theta(which)))

@@ -64,7 +64,8 @@ class FoldRuns:
     """(n, 3) scaled predictions in each regime: by the fold's fit, by its refit of the stable terms, and by AESI I.
 
     from_none : free run by the inputs alone, no measured error at its start; `free_run` for models with feedback.
-    amplitudes : (3,) of equation (2) in fade.py.  sums : (3, n_folds, 3), for each of the three and each fold the sums
+    Corrections fade in all of them by nearness and amplitude, not by leverage (fade.py).
+    amplitudes : (3,) of equation (2) there.  sums : (3, n_folds, 3), for each of the three and each fold the sums
     of e**2, e p and p**2, with p the prediction `from_none` before the amplitude; scaled.
     """
 

@@ -1,13 +1,5 @@
 """Everything that a whole search shares, computed once: library, resamples, triangular factors.
 
-All candidates of a search are judged on the same resamples (common random numbers), so their Gram matrices
-can be computed once for the whole library and sliced. Three kinds of row weights are fitted:
-
-- moving-block bootstrap resamples, for the ensemble and its out-of-bag loss;
-- folds: all rows but one contiguous piece, for out-of-fold residuals, and for the validation loss where there
-  are no validation records;
-- all rows, for the refit after stability selection.
-
 Out-of-bag and validation losses are taken in free run inside pieces of `horizon` rows, each started from its measured
 error (`regime="one_step"` for the loss as the paper prints it). One-step losses cannot tell a good simulator from one
 that repeats the last measured error.
@@ -23,31 +15,22 @@ from typing import Literal
 import numpy as np
 
 from aesi.errors import DataError
-from aesi.numerics.blocks import (
-    CountArray,
-    Span,
-    leave_out_weights,
-    moving_block_weights,
-    pieces,
-    starts_mask,
-)
+from aesi.numerics.blocks import CountArray, Span, moving_block_weights, pieces, starts_mask
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
 from aesi.records import HeldOutDrive, Split
-from aesi.sparse.search.prepare import not_finite, prepared_series, variables
+from aesi.sparse.search.factors import Factors, factored
+from aesi.sparse.search.prepare import prepared_series
 from aesi.sparse.search.rows import (
+    TrainingRows,
     balanced_weights,
     default_block,
     left_out_pieces,
     nearness_of_left_out,
-    spans_of,
-    temperatures,
+    training_rows,
 )
 from aesi.sparse.search.unseen import unseen_errors
-from aesi.sparse.terms.basis import FUNCTIONS, values
-from aesi.sparse.terms.library import Library, evaluate_terms
-from aesi.sparse.terms.scaling import Outside, Scaling
-from aesi.sparse.trained_region import TrainedRegion
+from aesi.sparse.terms.library import Library
+from aesi.sparse.terms.scaling import Outside
 
 Regime = Literal["free_run", "one_step"]
 
@@ -90,49 +73,30 @@ class Options:
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
-    """Training rows k -> k + 1 of all records, numbered through, and what was computed from them.
+class Problem(TrainingRows, Factors):
+    """The training rows, what is left out in turn, and factors of both.
 
-    products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
-    error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
-    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  temperature_degc : (n,), NaN where it
-    was not measured.  region : what a fit to all rows is fitted to.
-    unseen_error, unseen_target : the same by physics that has not seen the row's fold (unseen.py).
+    unseen_error, unseen_target : (n,) scaled e[k] and e[k + 1] by physics that has not seen the row's fold (unseen.py).
     fold_targets : (n_folds, n) the target by the physics of each fold, which a fit without that fold learns.
     counts : (resamples, n) how often each resample holds a row.
-    nearness : (n,) what is left of a correction at each row that was fitted without its fold (trained_region.py).
     row_weights : (n,) mean 1, what a row counts in fits and losses (`Options.balance`).
-    factors : (resamples, any, m + 1), and fold_factors likewise.  full_factor : (any, m + 1).
-    A factor is an F with F' F = [Theta y]' W [Theta y]; W is row_weights times counts, y the target (or a fold's).
+    restart : (n,) True where a free run of the losses starts anew.
+    folds : what is left out in turn.
+    nearness : (n,) what is left of a correction at each row that was fitted without its fold (trained_region.py).
     notes : what was left out of the library, and why, one sentence each.
     """
 
     options: Options
     split: Split
-    library: Library
-    scaling: Scaling
     dt_s: float
-    spans: tuple[Span, ...]
-    products: Array
-    which: IntArray
-    error_functions: Array
-    error: Array
-    inputs: Array
-    target: Array
     unseen_error: Array
     unseen_target: Array
     fold_targets: Array
-    soc: Array
-    temperature_degc: Array
-    region: TrainedRegion
     counts: CountArray
     row_weights: Array
     restart: BoolArray
     folds: tuple[Span, ...]
     nearness: Array
-    factors: Array
-    fold_factors: Array
-    full_factor: Array
     notes: tuple[str, ...] = ()
 
     @classmethod
@@ -152,71 +116,37 @@ class Problem:
         """
         options = options or Options()
         train, valid, notes = prepared_series(split, options.inputs, library)
-        inputs = train[0].input_names
         library = library or Library.build(
-            inputs, options.p_c, options.d, options.factors, options.special, options.mixed
+            train[0].input_names, options.p_c, options.d, options.factors, options.special, options.mixed
         )
-        scaling = Scaling.of([variables(record) for record in train], options.outside)
-        scaled = [scaling.apply(variables(record)[:-1]) for record in train]
-        rows = np.vstack(scaled)
-        target = np.concatenate([scaling.error_to_scaled(record.error_v[1:]) for record in train])
-        n = len(target)
-        if n <= len(library):
-            raise DataError(
-                f"a library of {len(library)} terms needs more than the {n} training samples there are; "
-                "lower p_c and d, leave out mixed terms, or give more data."
-            )
-        spans = spans_of([len(block) for block in scaled])
-        parts, which = library.input_products
-        products = evaluate_terms(parts, rows)
-        error_functions = np.stack(
-            [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
-        )
-        block = _checked_block(options.block, spans)
-        cut = _checked_pieces(left_out_pieces(spans, options.fold, options.cuts), options.fold)
-        soc = np.concatenate([record.soc[:-1] for record in train])
-        temperature = temperatures(train)
-        region = TrainedRegion.of(rows[:, 1:], soc, temperature)
-        weights = moving_block_weights(spans, block, options.resamples, np.random.default_rng(options.seed))
-        error = np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train])
-        drives_left_out = options.fold is None and len(left_out) == len(cut)
+        rows = training_rows(train, library, options.outside)
+        n = len(rows.target)
+        block = _checked_block(options.block, rows.spans)
+        folds = _checked_pieces(left_out_pieces(rows.spans, options.fold, options.cuts), options.fold)
+        drives_left_out = options.fold is None and len(left_out) == len(folds)
         if not drives_left_out or options.feedback:  # pieces of a single record, or terms that hold the error
             left_out = ()
-        unseen = unseen_errors(left_out, scaling, error, target, cut)
-        columns = _columns(library, which, products, error_functions, (target, *unseen.targets))
-        zero = float(scaling.error_to_scaled(np.array(0.0)))
-        row_weights = balanced_weights(spans, target - zero) if options.balance else np.ones(n)
-        columns *= np.sqrt(row_weights)[:, None]
-        q_rows, r = orthonormal(columns)
-        m = len(library)
-        every = triangular_factors(weighted_grams(q_rows, np.vstack([weights, leave_out_weights(cut, n)])), r)
+        unseen = unseen_errors(left_out, rows.scaling, rows.error, rows.target, folds)
+        row_weights = balanced_weights(rows.spans, rows.target - rows.zero) if options.balance else np.ones(n)
+        counts = moving_block_weights(
+            rows.spans, block, options.resamples, np.random.default_rng(options.seed)
+        )
         return cls(
+            **vars(rows),
+            **vars(factored(rows, unseen.targets, row_weights, counts, folds)),
             options=options,
             split=replace(split, train=train, valid=valid),
-            library=library,
-            scaling=scaling,
             dt_s=train[0].dt_s,
-            spans=spans,
-            products=products,
-            which=which,
-            error_functions=error_functions,
-            error=error,
-            inputs=rows[:, 1:],
-            target=target,
             unseen_error=unseen.error,
             unseen_target=unseen.target,
-            fold_targets=unseen.targets if len(unseen.targets) else np.broadcast_to(target, (len(cut), n)),
-            soc=soc,
-            temperature_degc=temperature,
-            region=region,
-            counts=weights,
+            fold_targets=unseen.targets
+            if len(unseen.targets)
+            else np.broadcast_to(rows.target, (len(folds), n)),
+            counts=counts,
             row_weights=row_weights,
-            restart=starts_mask(pieces(spans, options.horizon or block), n),
-            folds=cut,
-            nearness=nearness_of_left_out(rows[:, 1:], soc, temperature, cut),
-            factors=every[: len(weights), :, : m + 1],
-            fold_factors=_of_own_target(every[len(weights) :], m, len(unseen.targets)),
-            full_factor=r[:, : m + 1],
+            restart=starts_mask(pieces(rows.spans, options.horizon or block), n),
+            folds=folds,
+            nearness=nearness_of_left_out(rows.inputs, rows.soc, rows.temperature_degc, folds),
             notes=notes,
         )
 
@@ -230,11 +160,6 @@ class Problem:
         """(n_folds,) the number of the training record that each fold is of."""
         ends = [b for _, b in self.spans]
         return np.searchsorted(ends, [a for a, _ in self.folds], side="right")
-
-    @property
-    def zero(self) -> float:
-        """The scaled error at which the physics model is exact."""
-        return float(self.scaling.error_to_scaled(np.array(0.0)))
 
     @property
     def block(self) -> int:
@@ -267,12 +192,6 @@ class Problem:
         """(n,) what each row counts in a resample."""
         return self.counts[resample] * self.row_weights
 
-    def theta(self, which: IntArray) -> Array:
-        """(n_terms, n) the given terms along the training rows."""
-        return np.asarray(
-            self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
-        )
-
 
 def _checked_pieces(cut: tuple[Span, ...], fold: int | None) -> tuple[Span, ...]:
     """What is left out in turn.  Raises DataError for pieces so long that there is but one."""
@@ -293,31 +212,3 @@ def _checked_block(asked: int | None, spans: Sequence[Span]) -> int:
             "that resamples are alike; lower search.block, or leave it out."
         )
     return asked or default_block(spans[-1][1])
-
-
-def _columns(
-    library: Library, which: IntArray, products: Array, error_functions: Array, targets: Sequence[Array]
-) -> Array:
-    """(n, m + n_targets), stored by columns: the terms along the training rows, and what they are fitted to.
-
-    Raises DataError for the first that is not a number.
-    """
-    m = len(library)
-    columns = np.empty((products.shape[1], m + len(targets)), order="F")
-    for j, (product, q) in enumerate(zip(which, library.feedbacks, strict=True)):
-        columns[:, j] = products[product] * error_functions[q]
-    for j, target in enumerate(targets, start=m):
-        columns[:, j] = target
-    if not np.isfinite(columns).all():
-        raise DataError(not_finite(library, columns))
-    return columns
-
-
-def _of_own_target(factors: Array, m: int, targets: int) -> Array:
-    """(n_folds, any, m + 1) factors of the m terms and each fold's own target.
-
-    factors : (n_folds, any, m + 1 + targets), the common target before those of the folds, if any.
-    """
-    if not targets:
-        return factors[:, :, : m + 1]
-    return np.stack([factor[:, [*range(m), m + 1 + k]] for k, factor in enumerate(factors)])

@@ -3,14 +3,87 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from aesi.errors import DataError
 from aesi.numerics.blocks import Span, pieces
-from aesi.numerics.typing import Array
+from aesi.numerics.typing import Array, IntArray
 from aesi.records import ErrorSeries
+from aesi.sparse.search.prepare import variables
+from aesi.sparse.terms.basis import FUNCTIONS, values
+from aesi.sparse.terms.library import Library, evaluate_terms
+from aesi.sparse.terms.scaling import Outside, Scaling
 from aesi.sparse.trained_region import TrainedRegion
+
+
+@dataclass(frozen=True, eq=False)
+class TrainingRows:
+    """Training rows k -> k + 1 of all records, and the library along them.
+
+    spans : the rows of each record.
+    products : (n_products, n) the input parts of the terms; `which` (m,) tells the part of each term.
+    error_functions : (12, n) the functions of the fed-back error.  inputs : (n, n_inputs) scaled.
+    error, target : (n,) scaled e[k] and e[k + 1].  soc : (n,).  temperature_degc : (n,), NaN where it
+    was not measured.  region : what a fit to all rows is fitted to.
+    """
+
+    library: Library
+    scaling: Scaling
+    spans: tuple[Span, ...]
+    products: Array
+    which: IntArray
+    error_functions: Array
+    error: Array
+    inputs: Array
+    target: Array
+    soc: Array
+    temperature_degc: Array
+    region: TrainedRegion
+
+    @property
+    def zero(self) -> float:
+        """The scaled error at which the physics model is exact."""
+        return float(self.scaling.error_to_scaled(np.array(0.0)))
+
+    def theta(self, which: IntArray) -> Array:
+        """(n_terms, n) the given terms along the training rows."""
+        return np.asarray(
+            self.products[self.which[which]] * self.error_functions[self.library.feedbacks[which]]
+        )
+
+
+def training_rows(train: Sequence[ErrorSeries], library: Library, outside: Outside) -> TrainingRows:
+    """Of records with the inputs of the library.  Raises DataError for fewer rows than terms."""
+    scaling = Scaling.of([variables(record) for record in train], outside)
+    scaled = [scaling.apply(variables(record)[:-1]) for record in train]
+    rows = np.vstack(scaled)
+    if len(rows) <= len(library):
+        raise DataError(
+            f"a library of {len(library)} terms needs more than the {len(rows)} training samples there are; "
+            "lower p_c and d, leave out mixed terms, or give more data."
+        )
+    parts, which = library.input_products
+    soc = np.concatenate([record.soc[:-1] for record in train])
+    temperature_degc = np.concatenate([record.degc_or_nan[:-1] for record in train])
+    return TrainingRows(
+        library,
+        scaling,
+        spans=spans_of([len(block) for block in scaled]),
+        products=evaluate_terms(parts, rows),
+        which=which,
+        error_functions=np.stack(
+            [values(q, np.ascontiguousarray(rows[:, 0])) for q in range(len(FUNCTIONS))]
+        ),
+        error=np.concatenate([scaling.error_to_scaled(record.error_v[:-1]) for record in train]),
+        inputs=rows[:, 1:],
+        target=np.concatenate([scaling.error_to_scaled(record.error_v[1:]) for record in train]),
+        soc=soc,
+        temperature_degc=temperature_degc,
+        region=TrainedRegion.of(rows[:, 1:], soc, temperature_degc),
+    )
 
 
 def spans_of(lengths: Sequence[int]) -> tuple[Span, ...]:
@@ -35,16 +108,6 @@ def cut_evenly(a: int, b: int, cuts: int) -> list[Span]:
     """The rows a to b - 1 in consecutive pieces."""
     edges = np.linspace(a, b, cuts + 1).round().astype(int)
     return [(int(p), int(q)) for p, q in pairwise(edges)]
-
-
-def temperatures(records: Sequence[ErrorSeries]) -> Array:
-    """(n,) degC at each training row, NaN where it was not measured."""
-    return np.concatenate(
-        [
-            np.full(len(r) - 1, np.nan) if r.temperature_degc is None else r.temperature_degc[:-1]
-            for r in records
-        ]
-    )
 
 
 def nearness_of_left_out(inputs: Array, soc: Array, temperature_degc: Array, folds: Sequence[Span]) -> Array:

@@ -51,6 +51,14 @@ def test_physics_that_is_saved_keeps_its_bands(record):
     assert covered(hybrid(one), record) > 0.8
 
 
+def test_the_ensemble_of_a_run_is_the_one_that_it_names_best(record):
+    chosen = fitted(record)[1]
+    assert result(record, "ESPM", "AESI I", "AESI II").ensemble is chosen.better
+    assert result(record, "AESI II", "ESPM").ensemble is chosen.stability
+    assert result(record, "AESI I").ensemble is chosen.bagging
+    assert result(record, "ESPM").ensemble is None
+
+
 def test_models_of_which_none_can_be_fitted_are_an_error(record):
     library = {"inputs": ["I"], "p_c": [0, 0], "d": [1, 1], "special": True, "fade": False}
     config = experiment(record, library=library, models=["DMD with control"])

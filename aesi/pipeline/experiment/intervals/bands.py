@@ -98,7 +98,7 @@ class OutOfSampleErrors:
 
 def error_ahead(model: ErrorModel, series: ErrorSeries, horizon_s: float) -> Array:
     """(n,) V left by predictions from a measurement `horizon_s` earlier; NaN where there is none so early."""
-    steps = _steps(series, horizon_s)
+    steps = series.steps(horizon_s)
     left = series.error_v - model.k_step(series, steps)
     left[:steps] = np.nan
     return left
@@ -109,7 +109,7 @@ def reach(model: ErrorModel, series: ErrorSeries, horizon_s: float = WHOLE_DRIVE
     models that hold nothing at an edge."""
     if not isinstance(model, SparseModel):
         return np.zeros(len(series))
-    return model.reach(series, None if horizon_s == WHOLE_DRIVE else _steps(series, horizon_s))
+    return model.reach(series, None if horizon_s == WHOLE_DRIVE else series.steps(horizon_s))
 
 
 def error_of_free_run(series: ErrorSeries, run: FreeRun) -> Array:
@@ -142,9 +142,7 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
 def _seen(train: Sequence[ErrorSeries]) -> Visited:
     return Visited.of(
         np.concatenate([record.soc for record in train]),
-        np.concatenate(
-            [np.full(len(r), np.nan) if r.temperature_degc is None else r.temperature_degc for r in train]
-        ),
+        np.concatenate([record.degc_or_nan for record in train]),
     )
 
 
@@ -166,10 +164,6 @@ def _spread(train: Sequence[ErrorSeries], series: ErrorSeries, rows: slice) -> A
     root = _root(train, series, rows)
     slopes = next((each.slopes_v for each in train if each.name == series.name), series.slopes_v)
     return np.zeros(len(series)) if root is None or slopes is None else spread(slopes[:, : len(root)], root)
-
-
-def _steps(series: ErrorSeries, horizon_s: float) -> int:
-    return max(1, round(horizon_s / series.dt_s))
 
 
 def _others(n: int, rows: slice) -> BoolArray:

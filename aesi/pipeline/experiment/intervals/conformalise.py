@@ -47,18 +47,22 @@ def _conformalised(
     config: ExperimentConfig,
     left_out: LeftOutDrives,
 ) -> Fitted:
+    model = one.model
+    pairs: list[Unseen] = []
     drives: list[Unseen] = []
-    pairs: list[Unseen] = [(one.model, series, WHOLE) for series in problem.split.valid]
-    if isinstance(one.model, SparseModel) and one.model.name in ENSEMBLES:
-        pairs += fold_models(problem, chosen, one.model, left_out.parts)
+    if isinstance(model, SparseModel) and model.name in ENSEMBLES:
+        pairs += fold_models(problem, chosen, model, left_out.parts)
         if left_out.drives and problem.folds_are_drives:
-            drives += fold_models(problem, chosen, one.model, left_out.drives, problem.spans)
-        one = replace(one, model=with_leverage(one.model, problem, chosen.ridge))
-    elif isinstance(one.model, Bare):
-        pairs += [(one.model, each.series, each.rows) for each in left_out.parts]
-        drives += [(one.model, each.series, each.rows) for each in left_out.drives]
+            drives += fold_models(problem, chosen, model, left_out.drives, problem.spans)
+        model = with_leverage(model, problem, chosen.ridge)
+    elif isinstance(model, Bare):
+        pairs += [(model, each.series, each.rows) for each in left_out.parts]
+        drives += [(model, each.series, each.rows) for each in left_out.drives]
         if not left_out.parts:
-            pairs += [(one.model, series, WHOLE) for series in problem.split.train]
+            pairs += [(model, series, WHOLE) for series in problem.split.train]
+    # By the model that is served: its leverage takes part in how a correction fades.
+    pairs = [(model, series, WHOLE) for series in problem.split.valid] + pairs
+    one = replace(one, model=model)
     if not pairs:
         return replace(one, notes=(f"{one.model.name} saw every record, so it has no calibrated intervals.",))
     intervals, bands, notes = None, None, []

@@ -122,7 +122,9 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
     ahead = _ahead(one, test)
     row |= {"free_run": free, "one_step": step, "k_step": _k_step(ahead, test)}
     row["test_records"] = {r.series.name: _record_figures(one, r) for r in test}
-    row["k_step_persistence"] = {_seconds(h): _persistence_mv(test, _steps(test, h)) for h in HORIZONS_S}
+    row["k_step_persistence"] = {
+        _seconds(h): _persistence_mv(test, test[0].series.steps(h)) for h in HORIZONS_S
+    }
     if one.intervals is not None:
         residuals = [_without_first(r.series.error_v - r.one_step) for r in test]
         row["intervals"] = _interval_figures(
@@ -170,7 +172,7 @@ def _ahead(one: Fitted, test: Sequence[_Judged]) -> dict[float, list[Array]]:
 def _k_step(ahead: Mapping[float, Sequence[Array]], test: Sequence[_Judged]) -> dict[str, float]:
     figures = {}
     for horizon in HORIZONS_S:
-        left = _joined(each[_steps(test, horizon) :] for each in ahead[horizon])
+        left = _joined(each[test[0].series.steps(horizon) :] for each in ahead[horizon])
         figures[_seconds(horizon)] = MV_PER_V * rmse(left, np.zeros(len(left)))
     return figures
 
@@ -272,10 +274,6 @@ def _trace(role: Role, series: ErrorSeries, predictions: dict[str, ModelVoltage]
 
 def _without_first(residual: Array) -> Array:
     return np.concatenate([[np.nan], residual[1:]])
-
-
-def _steps(records: Sequence[_Judged], horizon_s: float) -> int:
-    return max(1, round(horizon_s / records[0].series.dt_s))
 
 
 def _seconds(horizon_s: float) -> str:

@@ -1,0 +1,83 @@
+"""Triangular factors of the library along the training rows, once for all candidates of a search.
+
+All candidates are judged on the same resamples (common random numbers), so their Gram matrices can be computed once for
+the whole library and sliced. Three kinds of row weights are fitted:
+
+- moving-block bootstrap resamples, for the ensemble and its out-of-bag loss;
+- folds: all rows but one contiguous piece, for out-of-fold residuals, and for the validation loss where there
+  are no validation records;
+- all rows, for the refit after stability selection.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from aesi.errors import DataError
+from aesi.numerics.blocks import CountArray, Span, leave_out_weights
+from aesi.numerics.typing import Array
+from aesi.numerics.weighted_grams import orthonormal, triangular_factors, weighted_grams
+from aesi.sparse.search.prepare import not_finite
+from aesi.sparse.search.rows import TrainingRows
+
+
+@dataclass(frozen=True, eq=False)
+class Factors:
+    """factors : (resamples, any, m + 1), and fold_factors likewise.  full_factor : (any, m + 1).
+
+    A factor is an F with F' F = [Theta y]' W [Theta y]; W is what each row counts times how often the resample (or
+    all rows but the fold) holds it, y the target (or that of the fold).
+    """
+
+    factors: Array
+    fold_factors: Array
+    full_factor: Array
+
+
+def factored(
+    rows: TrainingRows, own_targets: Array, row_weights: Array, counts: CountArray, folds: Sequence[Span]
+) -> Factors:
+    """own_targets : (n_folds, n) of each fold, or (0, n) where the target of the rows is that of all.
+
+    counts : (resamples, n).  Raises DataError for a term or target that is not a number.
+    """
+    m = len(rows.library)
+    columns = _columns(rows, (rows.target, *own_targets))
+    columns *= np.sqrt(row_weights)[:, None]
+    q_rows, r = orthonormal(columns)
+    held = np.vstack([counts, leave_out_weights(folds, len(rows.target))])
+    every = triangular_factors(weighted_grams(q_rows, held), r)
+    return Factors(
+        factors=every[: len(counts), :, : m + 1],
+        fold_factors=_of_own_target(every[len(counts) :], m, len(own_targets)),
+        full_factor=r[:, : m + 1],
+    )
+
+
+def _columns(rows: TrainingRows, targets: Sequence[Array]) -> Array:
+    """(n, m + n_targets), stored by columns: the terms along the training rows, and what they are fitted to.
+
+    Raises DataError for the first that is not a number.
+    """
+    m = len(rows.library)
+    columns = np.empty((rows.products.shape[1], m + len(targets)), order="F")
+    for j, (product, q) in enumerate(zip(rows.which, rows.library.feedbacks, strict=True)):
+        columns[:, j] = rows.products[product] * rows.error_functions[q]
+    for j, target in enumerate(targets, start=m):
+        columns[:, j] = target
+    if not np.isfinite(columns).all():
+        raise DataError(not_finite(rows.library, columns))
+    return columns
+
+
+def _of_own_target(factors: Array, m: int, targets: int) -> Array:
+    """(n_folds, any, m + 1) factors of the m terms and each fold's own target.
+
+    factors : (n_folds, any, m + 1 + targets), the common target before those of the folds, if any.
+    """
+    if not targets:
+        return factors[:, :, : m + 1]
+    return np.stack([factor[:, [*range(m), m + 1 + k]] for k, factor in enumerate(factors)])
