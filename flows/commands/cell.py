@@ -184,9 +184,8 @@ def impedance(
         options.state_of_health(soh),
         options.say_notes,
     )
-    typer.echo(
-        f"{out}: {len(z):,} frequencies, {1e3 * z.real.min():.4g} to {1e3 * z.real.max():.4g} mOhm", err=True
-    )
+    size = 1e3 * abs(z)
+    typer.echo(f"{out}: {len(z):,} frequencies, |Z| {size.min():.4g} to {size.max():.4g} mOhm", err=True)
 
 
 @options.reads_files

@@ -373,6 +373,17 @@ def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
     assert not (tmp_path / "z.csv").exists()
 
 
+def test_the_range_of_an_impedance_was_that_of_its_real_part_without_a_word(call, cell, tmp_path):
+    out = tmp_path / "z.csv"
+    code, _, err = call(
+        "impedance", "--cell", cell, "--soc", 0.5, "--frequencies", "1e-5:100:9", "--out", out
+    )
+    assert code == 0, err
+    table = pd.read_csv(out)
+    size = 1e3 * np.hypot(table.z_real_ohm, table.z_imag_ohm)
+    assert f"9 frequencies, |Z| {size.min():.4g} to {size.max():.4g} mOhm" in err
+
+
 def test_days_of_records_are_read_by_record():
     file = Path("folder/pulses.csv.gz")
     assert dates([f"{file}=2017-03-11"], [file]) == {"pulses": date(2017, 3, 11)}
