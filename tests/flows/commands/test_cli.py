@@ -442,7 +442,10 @@ def test_a_record_that_the_model_cannot_follow_left_the_command_line_with_nothin
     table = pd.read_csv(tmp_path / "o.csv")
     ran_out_s = table.time_s[table.depleted.to_numpy().argmax()]
     assert 0.0 < ran_out_s < table.time_s.iloc[-1]
-    assert f"runs empty or full in this model at {ran_out_s:g} s, and is held there" in err
+    words = f"runs empty or full in this model at {ran_out_s:g} s. From then on kinetics are held at the edge"
+    assert f"{words}, open-circuit potentials go on at 10 V per unit of stoichiometry" in err
+    whole = table.voltage_v[table.depleted == 0.0]
+    assert f"{whole.min():.3f} to {whole.max():.3f} V until it ran out at {ran_out_s:g} s, " in err
 
 
 def test_the_temperature_of_a_simulated_file_was_not_read_again(call, cell, current, tmp_path):
