@@ -117,14 +117,17 @@ def check_voltage(cell: Cell, data: Measurement) -> None:
 
 
 def check_measured(cell: Cell, records: Sequence[Measurement]) -> None:
-    """Both checks, for what fits a record or is judged on it; a simulation needs only its current."""
-    check_belongs(cell, records)
+    """As `check_belongs`, and of every row of its voltage: for what fits a record or is judged on it, where a
+    simulation needs only its current."""
     for record in records:
+        _check_window(cell, record)
         check_voltage(cell, record)
+        check_belongs(cell, [record])
 
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:
-    """Raises DataError, one sentence, for the first record that cannot be of this cell."""
+    """Raises DataError, one sentence, for the first record that cannot be of this cell: of its voltages, before what
+    these and its charge say of the capacity, which means nothing where they are another cell's."""
     for record in records:
         if not np.all(np.isfinite(record.voltage_v)):
             continue
@@ -161,6 +164,7 @@ def _pair(rows: IntArray, entry: int) -> tuple[int, int]:
 
 
 def _check_window(cell: Cell, record: Measurement) -> None:
+    """Of a voltage at rest, or in discharge, where it is lower still: more than that of a full cell is another's."""
     calm = np.abs(record.current_a) < SMALL_C_RATE * cell.nominal_capacity_ah
     full_v = max(float(cell.rest_voltage_v(np.array([1.0]))[0]), cell.upper_voltage_v)
     first_v = float(record.voltage_v[0])
@@ -170,7 +174,7 @@ def _check_window(cell: Cell, record: Measurement) -> None:
             f"{cell.lower_voltage_v:g} V: leave rows out that are no measurement of the cell (--from-s), or take the "
             "file of this cell."
         )
-    above = calm & (record.voltage_v > full_v + ABOVE_FULL_V)
+    above = (calm | (record.current_a > 0.0)) & (record.voltage_v > full_v + ABOVE_FULL_V)
     if np.any(above):
         row = int(np.argmax(above))
         raise DataError(
@@ -184,6 +188,7 @@ def _check_capacity(cell: Cell, record: Measurement) -> None:
     fault = _capacity_fault(cell, record)
     if fault is None:
         return
+    check_voltage(cell, record)
     coldest = replace(record, temperature_degc=np.full(len(record), COLD_DEGC - MOST_SPANS * COLD_SPAN_K))
     if record.temperature_degc is None and _capacity_fault(cell, coldest) is None:
         fault += (

@@ -45,7 +45,7 @@ def sentence(
             "the unit of the current"
         )
     else:
-        told = _surface_left(model, kelvin, amperes, rows[:, at], what, where)
+        told = _surface_left(model, kelvin, amperes, rows, at, what, where)
     return f"{head}{told}{RUN_ON}"
 
 
@@ -65,24 +65,31 @@ def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str
     return f"{cause}. Check the unit of the current and the electrolyte's diffusivity"
 
 
-def _surface_left(model: EspmModel, kelvin: float, amperes: float, row: Array, what: int, where: str) -> str:
+def _surface_left(
+    model: EspmModel, kelvin: float, amperes: float, rows: Array, at: int, what: int, where: str
+) -> str:
     """Of a surface that is empty or full: by the charge, or by a current that solid diffusion cannot follow.
 
-    row : of `run_plain`, the faulty one.  what : 1 or 2, the electrode.
+    rows : of `run_plain`.  at : the faulty one.  what : 1 or 2, the electrode.
     """
-    cell, electrode = model.cell, (model.cell.negative, model.cell.positive)[what - 1]
-    soc = (float(row[5]) - cell.negative.theta_min) / (cell.negative.theta_max - cell.negative.theta_min)
+    cell, electrode, row = model.cell, (model.cell.negative, model.cell.positive)[what - 1], rows[:, at]
+    every = (rows[5] - cell.negative.theta_min) / (cell.negative.theta_max - cell.negative.theta_min)
+    soc = float(every[at])
     surface = (
         f"the surface of the {LAYERS[what]} left the stoichiometry range [0, 1] {where}, at a state of charge of "
         f"{100 * soc:.1f} %"
     )
     if not 0.0 <= soc <= 1.0:
-        asks = (
-            "asks for more charge than the cell has"
+        # A simulation goes on past its fault, so that all that is asked for is known.
+        asks, by = (
+            ("asks for more charge than the cell has", -np.nanmin(every))
             if soc < 0.0
-            else "brings more charge than the cell can hold"
+            else ("brings more charge than the cell can hold", np.nanmax(every) - 1.0)
         )
-        return f"{surface}: the record {asks}. Check soc0, the capacity and the sign of the current"
+        return (
+            f"{surface}: the record {asks}, by {100 * by:.1f} % of its capacity in all. Check soc0, the capacity and "
+            "the sign of the current"
+        )
     cause = (
         f"{surface}, while its particles hold {100 * float(row[4 + what]):.1f} % in the mean: solid diffusion cannot "
         f"follow {amperes:.3g} A"
@@ -101,10 +108,13 @@ def ran_out(name: str, at_s: Mapping[str, float]) -> str:
 
     at_s : what was simulated, in words, to when it ran out, s.
     """
+    from aesi.physics.espm.kernels import BEYOND_RANGE_V  # compiled code, which is read when it is first used
+
     where = ", ".join(f"in {model} at {stamp(when)} s" for model, when in at_s.items())
     return (
-        f"{name}: a particle's surface or the electrolyte runs empty or full {where}, and is held there: from then on "
-        "an error says that it ran out, not by how much the model is off."
+        f"{name}: a particle's surface or the electrolyte runs empty or full {where}. From then on kinetics "
+        f"are held at the edge, open-circuit potentials go on at {BEYOND_RANGE_V:g} V per unit of stoichiometry and "
+        "concentrations beyond what there is: an error says that it ran out, not by how much the model is off."
     )
 
 

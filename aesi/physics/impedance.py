@@ -88,7 +88,7 @@ def impedance(
     kelvin = _shifted(active, float(degc) + ZERO_CELSIUS_K)
     check_choice("model", model, ModelName)
     changed = model_with(cell, active)
-    rest = np.array(changed.cell.stoichiometries(same_rest(cell, changed.cell, soc)))
+    rest = _at_rest(cell, changed, soc)
     if not ((rest > 0.0) & (rest < 1.0)).all():
         raise DataError(
             f"{cell.name} has no state of charge of {soc:g}: a stoichiometry leaves (0, 1) there."
@@ -111,6 +111,45 @@ def impedance(
     really = kelvin - ZERO_CELSIUS_K
     rest_run = simulate(cell, INSTANT_S, np.zeros(2), soc, on_model, really, "backward", model=model)
     return z + sum(_series_ohm(changed, one, function, rest_run) for one, function in acting)
+
+
+def slowest_diffusion_hz(
+    cell: Cell, soc: float, temperature_degc: float = 25.0, effects: Iterable[ActiveEffect] = ()
+) -> float:
+    """Hz, at which the slowest diffusion of `cell` at rest, of a particle or of the salt, lags by an eighth of a turn:
+    its rate over 2 pi. Well below it all diffusion keeps up with the current, and Z is that of a capacity.
+
+    Arguments as of `impedance`; both models have the same particles and salt.
+    """
+    active = checked_effects(effects)
+    model = model_with(cell, active)
+    kelvin = _shifted(active, float(temperature_degc) + ZERO_CELSIUS_K)
+    rest, units = _at_rest(cell, model, soc), particle_units(model)
+    faster = [_faster(model, side, float(rest[side]), kelvin) for side in units.place[:, 0]]
+    solid = float(np.min(np.array(faster)[:, None] * units.rates))
+    return min(solid, float(np.min(_salt_rates(model, kelvin)[1:]))) / (2.0 * np.pi)
+
+
+def _at_rest(cell: Cell, model: EspmModel, soc: float) -> Array:
+    """(2,) stoichiometries at rest, of the cell that effects made of it."""
+    return np.array(model.cell.stoichiometries(same_rest(cell, model.cell, soc)))
+
+
+def _faster(model: EspmModel, side: int, at: float, kelvin: float) -> float:
+    """Factor of an electrode's rates of diffusion at a stoichiometry and a temperature."""
+    cell = model.cell
+    electrode = (cell.negative, cell.positive)[side]
+    faster = rate_factor(electrode.diffusivity_ea_j_mol, kelvin, cell.reference_temperature_k)
+    return (
+        faster * float(electrode.diffusivity(np.array([at]))[0]) / solid_diffusion(electrode.diffusivity).d0
+    )
+
+
+def _salt_rates(model: EspmModel, kelvin: float) -> Array:
+    """(modes,) 1/s of the salt at rest; the first is its mean, which stays."""
+    e = model.cell.electrolyte
+    faster = rate_factor(e.diffusivity_ea_j_mol, kelvin, model.cell.reference_temperature_k)
+    return stack_of(model).lam * float(e.diffusivity(np.array([e.c0_mol_m3]))[0]) * faster
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,10 +207,7 @@ class _Linear:
             slope = slopes[side]
             kinetic = rate_factor(electrode.rate_ea_j_mol, self.kelvin, cell.reference_temperature_k)
             thermal = GAS_CONSTANT_J_MOL_K * self.kelvin / FARADAY_C_MOL
-            faster = rate_factor(electrode.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
-            faster *= (
-                float(electrode.diffusivity(np.array([at]))[0]) / solid_diffusion(electrode.diffusivity).d0
-            )
+            faster = _faster(self.model, side, float(at), self.kelvin)
             factor = float(electrode.rate_factor(np.array([at]))[0])
             film = float(electrode.film_ohm_m2(np.array([at]))[0])
             film /= rate_factor(electrode.film_ea_j_mol, self.kelvin, cell.reference_temperature_k)
@@ -184,10 +220,8 @@ class _Linear:
 
     def _salt(self, s: ComplexArray) -> ComplexArray:
         """(frequencies, 2 regions, 2 regions) ohm m2: potential of a region's salt per current that enters a region."""
-        cell, regions = self.model.cell, self.model.regions
-        e, stack = cell.electrolyte, stack_of(self.model)
-        faster = rate_factor(e.diffusivity_ea_j_mol, self.kelvin, cell.reference_temperature_k)
-        rates = stack.lam * float(e.diffusivity(np.array([e.c0_mol_m3]))[0]) * faster
+        regions, e, stack = self.model.regions, self.model.cell.electrolyte, stack_of(self.model)
+        rates = _salt_rates(self.model, self.kelvin)
         enters = (1.0 - e.transference) / FARADAY_C_MOL * stack.gain[:, 1:]
         gauss = stack.gauss[: 6 * regions].reshape(2 * regions, 3, -1)
         seen = (np.array([5.0, 8.0, 5.0]) / 18.0 @ gauss) @ stack.to_nodes[:, 1:] / e.c0_mol_m3

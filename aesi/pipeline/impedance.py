@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from aesi.calibration.records.spectra import degc_of, in_band, state_of, usable
+from aesi.calibration.records.spectra import BAND_HZ, degc_of, in_band, state_of, usable
 from aesi.data.readers import open_table
 from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
@@ -16,6 +16,7 @@ from aesi.numerics.typing import Array, ComplexArray
 from aesi.physics import Cell, ModelName, impedance
 from aesi.physics.cell import Soh
 from aesi.physics.effect import ActiveEffect
+from aesi.physics.impedance import slowest_diffusion_hz
 from aesi.physics.simulation import model_with
 from aesi.pipeline.notes import of_another_model, of_day, on_temperatures
 from aesi.pipeline.product.declared import declared_model
@@ -53,7 +54,8 @@ def impedance_file(
     frequencies : LOW:HIGH:N in Hz, log-spaced, or a CSV with a column frequency_hz.
     model : "espm" or "dfn"; None takes that of a saved model, or that the cell's file was fitted with, else "espm".
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
-    say_notes : is given a sentence where the model has no double layer, and frequencies at which that shows.
+    say_notes : is given a sentence where the model has no double layer, and frequencies at which that shows, and on
+    frequencies too low and too high for it.
     """
     declared = declared_model(cell).with_soh(soh)
     hz = read_frequencies(frequencies)
@@ -66,7 +68,24 @@ def impedance_file(
         say_notes([*declared.cell.unread, *told])
         if hz.max() > INSTANT_HZ and not _has_double_layer(declared.cell, active):
             say_notes([NO_DOUBLE_LAYER])
+        say_notes(_out_of_reach(hz, slowest_diffusion_hz(declared.cell, soc, temperature_degc, active)))
     return z
+
+
+def _out_of_reach(hz: Array, slowest_hz: float) -> list[str]:
+    """Sentences on frequencies that are too low or too high for the model.  slowest_hz : of its diffusion."""
+    below, above, said = int(np.sum(hz < slowest_hz)), int(np.sum(hz > BAND_HZ[1])), []
+    if below:
+        said.append(
+            f"{below:,} of the frequencies lie below {slowest_hz:.2g} Hz, where the slowest diffusion in the model "
+            "keeps up: Z tends to the slope of the open-circuit voltage alone, and |Z| to 1/f without end."
+        )
+    if above:
+        said.append(
+            f"{above:,} of the frequencies lie above {BAND_HZ[1]:g} Hz, where a measured spectrum is of leads and "
+            "windings, too: the model has no inductance."
+        )
+    return said
 
 
 def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:

@@ -7,6 +7,7 @@ from datetime import date
 
 import numpy as np
 
+from aesi.calibration.records.zero import zero_of
 from aesi.constants import ZERO_CELSIUS_K
 from aesi.numerics.typing import Array
 from aesi.physics import ActiveEffect, Cell, ModelName
@@ -108,6 +109,35 @@ def of_day(cell: Cell, soh: Soh | None) -> tuple[str, ...]:
     return (
         f"the cell as of {soh}: {cell.soh_on(soh):.3f} of its file's capacity, by the records that it was fitted to.",
     )
+
+
+def of_fitted(
+    cell: Cell, record: Measurement, soh: Soh | None, effects: Iterable[ActiveEffect] = ()
+) -> tuple[str, ...]:
+    """Sentences where the cell's file was fitted to a record of this name: the share of its capacity that the cell had
+    then, unless a state of health is given, and what the fit takes out of the current of a slow cycle."""
+    share = dict(cell.capacity_shares).get(record.name)
+    if share is None:
+        return ()
+    of_then = soh is None and f"{share:.3f}" != "1.000"
+    said = [
+        f"{record.name}: the cell's file was fitted to a record of this name"
+        + (
+            f", in which the cell had {share:.3f} of its capacity (--soh {share:.3f} takes it)."
+            if of_then
+            else "."
+        )
+    ]
+    if np.all(np.isfinite(record.voltage_v)) and not any(
+        one.id == "current_sensor_offset" for one in effects
+    ):
+        zero = zero_of(cell, [record])
+        said += [
+            f"{sentence} A fit takes that out, a simulation does not: the effect current_sensor_offset with "
+            f"offset_a={zero.mean_a:.2g} does."
+            for sentence in zero.sentences
+        ]
+    return tuple(said)
 
 
 def of_another_model(declared: HybridModel, asked: ModelName | None) -> tuple[str, ...]:

@@ -18,13 +18,14 @@ from aesi.data.resample import DENSE
 from aesi.errors import DataError, InputError
 from aesi.numerics.metrics import rms
 from aesi.numerics.typing import Array, BoolArray
+from aesi.over_time import stamp
 from aesi.physics import ActiveEffect, Cell, InitialState, ModelName, initial_state, simulate
 from aesi.physics.belongs import check_belongs
 from aesi.physics.cell import Soh
 from aesi.physics.depletion import ran_out
 from aesi.physics.effects.self_heating import of_file
 from aesi.physics.rest.open_circuit import GIVEN_SD
-from aesi.pipeline.notes import of_another_model, of_day, on_temperatures, temperature_sentence
+from aesi.pipeline.notes import of_another_model, of_day, of_fitted, on_temperatures, temperature_sentence
 from aesi.pipeline.product.declared import declared_model
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.prediction import Prediction
@@ -50,7 +51,8 @@ class ProfileRequest:
     reading : how the file is read.
     self_heating : the cell warms itself, by the thermal data of its file.
     soh : share of the file's capacity that the cell had then, or the day of the test; None takes all of it.
-    run_on : of `simulate_file` alone: where a surface or the electrolyte runs empty or full, it is held there.
+    run_on : of `simulate_file` alone: go on where a surface or the electrolyte runs empty or full, as `simulate` does
+    with on_depletion="clip".
     """
 
     soc0: float | None = None
@@ -184,6 +186,7 @@ def _placed(
     say(
         [
             *model.cell.unread,
+            *of_fitted(model.cell, record, asked.soh, model.effects),
             start.sentence,
             hold_sentence(record.name, model.hold, asked.hold is not None, saved=saved),
             temperature_sentence(model.cell, record, model.effects),
@@ -220,12 +223,36 @@ def reached(cell: Cell, record: Measurement, voltage_v: Array, soc: Array) -> li
     beyond = (soc < -GIVEN_SD) | (soc > 1.0 + GIVEN_SD)  # as closely as any is known
     window = (voltage_v < cell.lower_voltage_v) | (voltage_v > cell.upper_voltage_v)
     for rows, words in (
-        (beyond, "a state of charge outside 0 to 1"),
+        (beyond, f"a state of charge outside 0 to 1{_too_much(soc)}"),
         (window, f"a voltage outside the cell's {cell.lower_voltage_v:g} to {cell.upper_voltage_v:g} V"),
     ):
         if np.any(rows):
             said.append(f"{record.name}: {_percent(rows)} of the simulated rows have {words}.")
     return said
+
+
+def _too_much(soc: Array) -> str:
+    """By how much a record empties, or fills, a cell beyond what it has; from ': ' on.  soc : (n,) simulated."""
+    said = []
+    if (low := -float(np.min(soc))) > GIVEN_SD:
+        said.append(f"asks for more charge than the cell has, by {100 * low:.1f} % of its capacity")
+    if (high := float(np.max(soc)) - 1.0) > GIVEN_SD:
+        said.append(f"brings more charge than the cell can hold, by {100 * high:.1f} %")
+    return f": the record {' and '.join(said)}" if said else ""
+
+
+def voltage_words(run: Run) -> str:
+    """'2.5 to 4.1 V' of a run; of one that went on where it ran out, until then, and beyond."""
+    voltage, depleted = run.voltage_v, run.series.get("depleted")
+    if depleted is None or not np.any(depleted):
+        return _range_v(voltage)
+    at = int(np.argmax(depleted))
+    until = f"{_range_v(voltage[:at])} until" if at else "no row before"
+    return f"{until} it ran out at {stamp(run.time_s[at])} s, {_range_v(voltage[at:])} beyond, of no cell"
+
+
+def _range_v(voltage_v: Array) -> str:
+    return f"{np.min(voltage_v):.3f} to {np.max(voltage_v):.3f} V"
 
 
 def _of_band(record: Measurement, prediction: Prediction, model: HybridModel, measured: bool) -> list[str]:

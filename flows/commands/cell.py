@@ -33,22 +33,21 @@ def simulate(
         bool,
         typer.Option(
             "--run-on",
-            help="Where a particle's surface or the electrolyte runs empty or full, hold it there and go on; from when "
-            "is said.",
+            help="Go on where a particle's surface or the electrolyte runs empty or full: kinetics are held there, "
+            "open-circuit potentials go on at 10 V per unit of stoichiometry, as of no cell; from when is said.",
         ),
     ] = False,
 ) -> None:
     """The physics model alone, under a current profile."""
     outputs.check_table(out, [cell, current, *(effect_file or [])])
-    from aesi.pipeline.simulation import ProfileRequest, simulate_file
+    from aesi.pipeline.simulation import ProfileRequest, simulate_file, voltage_words
 
     asked = ProfileRequest(soc0, hold, reading, self_heating, options.state_of_health(soh), run_on)
     added = options.added_effects(effect, effect_file)
     run = simulate_file(cell, current, out, asked, added, model, options.say_notes)
     from aesi.over_time import extent
 
-    low, high = float(run.voltage_v.min()), float(run.voltage_v.max())
-    typer.echo(f"{out}: {extent(run.time_s)}, {low:.3f} to {high:.3f} V", err=True)
+    typer.echo(f"{out}: {extent(run.time_s)}, {voltage_words(run)}", err=True)
 
 
 @options.reads_files
@@ -186,9 +185,8 @@ def impedance(
         options.state_of_health(soh),
         options.say_notes,
     )
-    typer.echo(
-        f"{out}: {len(z):,} frequencies, {1e3 * z.real.min():.4g} to {1e3 * z.real.max():.4g} mOhm", err=True
-    )
+    size = 1e3 * abs(z)
+    typer.echo(f"{out}: {len(z):,} frequencies, |Z| {size.min():.4g} to {size.max():.4g} mOhm", err=True)
 
 
 @options.reads_files

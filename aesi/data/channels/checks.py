@@ -7,7 +7,7 @@ The limits are those of one lithium cell, wide enough for anything sold: 0 to 6 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -31,11 +31,13 @@ MOST_RELAXED_V = 0.5
 
 @dataclass(frozen=True)
 class Context:
-    """Names for the sentences: the file, each quantity's column there, and where a row is."""
+    """Names for the sentences: the file, each quantity's column there, where a row is, and what unit a column was taken
+    in, SI where none is there."""
 
     file: str
     header: Mapping[str, str]
     where: Callable[[int], str]
+    unit: Mapping[str, str] = field(default_factory=dict)
 
     def at(self, quantity: str, row: int) -> str:
         """'drive.csv, row 5 (line 6), column voltage_v'."""
@@ -135,7 +137,8 @@ def check_ranges(columns: Columns, context: Context) -> None:
         absurd = (temperature < COLDEST_DEGC) | (temperature > WARMEST_DEGC)
         if np.any(absurd):
             row = int(np.argmax(absurd))
-            kelvin = " (in kelvin? --unit temperature_degc=K)" if temperature[row] > WARMEST_DEGC else ""
+            warm = temperature[row] > WARMEST_DEGC and context.unit.get("temperature_degc") != "K"
+            kelvin = " (in kelvin? --unit temperature_degc=K)" if warm else ""
             raise DataError(
                 f"{context.at('temperature_degc', row)}: {temperature[row]:.6g} degC is outside "
                 f"{COLDEST_DEGC:g} to {WARMEST_DEGC:g} degC{kelvin}; correct the column or leave it "

@@ -73,11 +73,12 @@ def map_columns(
     """Find the quantities among the names of a table's columns.
 
     columns : quantity or selector -> name, or None to leave it out; goes before the known names.
-    declared : quantity -> unit, as the user says; goes before what names and formats say.
+    declared : quantity -> unit, as the user says; goes before what names and formats say, but may not contradict a
+    name's unit that is not SI.
     required : what has to be there; the rest is found where it is.
     selectors : of `state`, `cycle`, `step`, those that rows are told apart by; a maker's `state` is always found.
-    Raises DataError for an unknown quantity, a name that is missing or there twice, and a unit that is not SI and
-    was neither declared nor is a maker's.
+    Raises DataError for an unknown quantity, a name that is missing or there twice, a unit that is not SI and
+    was neither declared nor is a maker's, and one that was declared for a column in another that is not SI.
     """
     told = {q: units.declared(q, u) for q, u in (declared or {}).items()}
     finder = _Finder(table, dict(columns or {}), told, required)
@@ -269,7 +270,9 @@ class _Finder:
         below = self._table.units[self.position[quantity]] if self._table.units else ""
         if quantity in self._declared:
             unit = self._declared[quantity]
-            self.notes.append(f"{quantity} was converted from {unit} as declared.")
+            self._take_declared(
+                quantity, units.spelt(quantity, below) or headers.unit_of(quantity, name), known
+            )
         elif units.spelt(quantity, below):
             unit = units.spelt(quantity, below) or ""
         elif known:
@@ -278,6 +281,26 @@ class _Finder:
             unit = units.SI[quantity]
             self._refuse_other_unit(quantity, name)
         self.unit[quantity] = unit
+
+    def _take_declared(self, quantity: str, said: str | None, known: str) -> None:
+        """A unit that the user declares; one of a column in another by its header is a slip, and refused.
+
+        said : by the header.  SI there is what exports and this project's own names have by default, whatever the
+        column holds, and what checks of the values may find wrong: a note says that it was overruled, as of what is
+        `known` of a maker. Of clock times and dates the cells themselves tell.
+        """
+        name, unit = self._table.header[self.position[quantity]], self._declared[quantity]
+        numbers, though = units.FACTORS[quantity], ""
+        if unit in numbers and said in numbers and said != unit:
+            if said != units.SI[quantity]:
+                raise DataError(
+                    f"{self._file}: column {name!r} is in {said} by its header, and {unit} was declared for "
+                    f"{quantity}; declare --unit {quantity}={said}, or rename the column if its header is wrong."
+                )
+            though = f", though column {name!r} is in {said} by its header"
+        elif unit in numbers and said is None and known in numbers and known != unit:
+            though = f", though column {name!r} of such an export is in {known}"
+        self.notes.append(f"{quantity} was converted from {unit} as declared{though}.")
 
     def _refuse_other_unit(self, quantity: str, name: str) -> None:
         said = headers.unit_of(quantity, name)

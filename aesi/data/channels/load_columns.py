@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -31,7 +32,7 @@ def load_columns(
             f"{table.path.name} has too few rows below its header ({len(data['time_s'])}); a measurement needs at "
             "least two."
         )
-    context = Context(table.path.name, mapped.header, table.where)
+    context = Context(table.path.name, mapped.header, table.where, mapped.unit)
     notes = [*table.notes, *mapped.notes]
     _orient(table, data, mapped, reading, notes)
     for name in reading.selectors:
@@ -126,7 +127,7 @@ def _check_words(table: TableFile, current: Array, mapped: Mapped, reading: Read
 def keep_rows(columns: Columns, context: Context, keep: AnyArray) -> tuple[Columns, Context]:
     """The rows of an index array, with the file's own row numbers kept for later sentences."""
     where = partial(_where_kept, context, keep)
-    return {q: v[keep] for q, v in columns.items()}, Context(context.file, context.header, where)
+    return {q: v[keep] for q, v in columns.items()}, replace(context, where=where)
 
 
 def _where_kept(context: Context, kept: AnyArray, row: int) -> str:

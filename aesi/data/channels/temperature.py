@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from aesi.constants import COLDEST_DEGC
+from aesi.data import units
 from aesi.data.channels.checks import Columns, Context
 
 WARMEST_START_DEGC = 62.0
 """Tests of cells are at most at 60 degC; a room is at 68 to 77 degF."""
 JUMP_K, JUMP_S = 5.0, 60.0
 """Between two rows no further apart: the measured records have 3.4 K in 60 s and 0.6 K in a second at most."""
+
+WORDS = {"degF": "Fahrenheit", "degC": "degC", "K": "kelvin"}
+"""Units of a temperature in words, the one that is mistaken most first."""
 
 
 def temperature_doubts(data: Columns, context: Context) -> list[str]:
@@ -23,9 +28,14 @@ def temperature_doubts(data: Columns, context: Context) -> list[str]:
             "--column temperature_degc= leaves it out."
         ]
     if temperature_degc[0] > WARMEST_START_DEGC:
+        likely = _likely_unit(float(temperature_degc[0]), context.unit.get("temperature_degc", "degC"))
+        advice = (
+            f"if that is in {WORDS[likely]}: --unit temperature_degc={likely}"
+            if likely
+            else "check the column"
+        )
         return [
-            f"Its temperature starts at {temperature_degc[0]:.4g} degC, warmer than cells are tested; if that is in "
-            "Fahrenheit: --unit temperature_degc=F."
+            f"Its temperature starts at {temperature_degc[0]:.4g} degC, warmer than cells are tested; {advice}."
         ]
     jump = np.where(np.diff(time_s) <= JUMP_S, np.abs(np.diff(temperature_degc)), 0.0)
     if np.any(jump > JUMP_K):
@@ -37,3 +47,14 @@ def temperature_doubts(data: Columns, context: Context) -> list[str]:
             "--column temperature_degc= leaves it out."
         ]
     return []
+
+
+def _likely_unit(degc: float, unit: str) -> str | None:
+    """Another unit than that in which a temperature was taken, in which it would be a test's; None without one."""
+    temperature = units.FACTORS["temperature_degc"]
+    number = degc / temperature[unit] - units.OFFSETS.get(unit, 0.0)
+    for other in WORDS:
+        (there,) = units.to_si("temperature_degc", np.array([number]), other)
+        if other != unit and COLDEST_DEGC <= there <= WARMEST_START_DEGC:
+            return other
+    return None

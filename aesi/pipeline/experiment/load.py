@@ -147,9 +147,7 @@ def _load(config: ExperimentConfig) -> Loaded:
     for name in empty:
         if name not in sources.roles["test"]:
             _refuse(physics, name, records[name], hold)
-        notes.append(
-            f"{name} runs empty in the model; its stoichiometries were held at the edge from there on."
-        )
+        notes.append(f"{name} runs empty in the model; its kinetics were held at the edge from there on.")
     split = by_role(config.data, series, sources.roles)
     chosen = physics.chosen
     return Loaded(
@@ -223,7 +221,7 @@ def _refuse(physics: PhysicsModels, name: str, record: FitRecord, hold: Hold) ->
     except SimulationError as error:
         raise SimulationError(
             f"{Path(name).name}: {str(error).removesuffix(RUN_ON)}, or end the file before that, or give it as a test, "
-            "where stoichiometries are held at the edge from there on."
+            "where kinetics are held at the edge from there on."
         ) from error
 
 

@@ -375,6 +375,17 @@ def test_a_temperature_in_kelvin_is_asked_about(call, cell, tmp_path):
     assert not (tmp_path / "z.csv").exists()
 
 
+def test_the_range_of_an_impedance_was_that_of_its_real_part_without_a_word(call, cell, tmp_path):
+    out = tmp_path / "z.csv"
+    code, _, err = call(
+        "impedance", "--cell", cell, "--soc", 0.5, "--frequencies", "1e-5:100:9", "--out", out
+    )
+    assert code == 0, err
+    table = pd.read_csv(out)
+    size = 1e3 * np.hypot(table.z_real_ohm, table.z_imag_ohm)
+    assert f"9 frequencies, |Z| {size.min():.4g} to {size.max():.4g} mOhm" in err
+
+
 def test_days_of_records_are_read_by_record():
     file = Path("folder/pulses.csv.gz")
     assert dates([f"{file}=2017-03-11"], [file]) == {"pulses": date(2017, 3, 11)}
@@ -433,7 +444,10 @@ def test_a_record_that_the_model_cannot_follow_left_the_command_line_with_nothin
     table = pd.read_csv(tmp_path / "o.csv")
     ran_out_s = table.time_s[table.depleted.to_numpy().argmax()]
     assert 0.0 < ran_out_s < table.time_s.iloc[-1]
-    assert f"runs empty or full in this model at {ran_out_s:g} s, and is held there" in err
+    words = f"runs empty or full in this model at {ran_out_s:g} s. From then on kinetics are held at the edge"
+    assert f"{words}, open-circuit potentials go on at 10 V per unit of stoichiometry" in err
+    whole = table.voltage_v[table.depleted == 0.0]
+    assert f"{whole.min():.3f} to {whole.max():.3f} V until it ran out at {ran_out_s:g} s, " in err
 
 
 def test_a_prediction_that_runs_empty_advised_an_option_that_the_command_lacks(call, cell, current, tmp_path):

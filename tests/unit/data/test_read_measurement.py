@@ -417,6 +417,68 @@ def test_a_room_in_fahrenheit_is_doubted(tmp_path):
     assert not any("starts at" in note for note in converted.notes)
 
 
+@pytest.mark.parametrize(
+    ("number", "unit", "advice"),
+    [
+        (298.15, "F", "if that is in kelvin: --unit temperature_degc=K."),
+        (77, None, "if that is in Fahrenheit: --unit temperature_degc=degF."),
+        (140 + 273.15, "K", "check the column."),
+        (170, "F", "check the column."),
+    ],
+)
+def test_a_doubted_temperature_was_advised_the_unit_in_which_it_was_taken(tmp_path, number, unit, advice):
+    rows = "".join(f"{t},{i},{v},{number}\n" for t, i, v in zip(TIME, CURRENT, VOLTAGE, strict=True))
+    path = written(tmp_path, f"{HEADER},temp\n{rows}")
+    said = read(
+        path, Reading({"temperature_degc": "temp"}, {} if unit is None else {"temperature_degc": unit})
+    )
+    assert said.notes[-1].endswith(f"warmer than cells are tested; {advice}")
+
+
+def test_a_temperature_in_kelvin_that_is_none_was_asked_whether_it_is_in_kelvin(tmp_path):
+    rows = "".join(f"{t},{i},{v},700\n" for t, i, v in zip(TIME, CURRENT, VOLTAGE, strict=True))
+    path = written(tmp_path, f"{HEADER},temp\n{rows}")
+    for unit, asked in ((None, True), ("K", False)):
+        reading = Reading({"temperature_degc": "temp"}, {} if unit is None else {"temperature_degc": unit})
+        with pytest.raises(DataError, match="is outside -60 to 150 degC") as caught:
+            read(path, reading)
+        assert ("in kelvin?" in str(caught.value)) is asked
+
+
+LOGGER = {"time_s": "Zeit/min", "current_a": "Strom/mA", "voltage_v": "Spannung/V", "temperature_degc": "T/K"}
+LOGGED = {"time_s": "min", "current_a": "mA", "voltage_v": "V", "temperature_degc": "K"}
+
+
+@pytest.mark.parametrize(
+    ("quantity", "declared", "words"),
+    [
+        (
+            "time_s",
+            "h",
+            "column 'Zeit/min' is in min by its header, and h was declared for time_s; declare --unit",
+        ),
+        ("current_a", "uA", "column 'Strom/mA' is in mA by its header, and uA was declared"),
+        ("current_a", "A", "column 'Strom/mA' is in mA by its header, and A was declared"),
+        ("temperature_degc", "degF", "column 'T/K' is in K by its header, and degF was declared"),
+    ],
+)
+def test_a_unit_that_contradicts_the_header_was_taken_in_silence(tmp_path, quantity, declared, words):
+    rows = zip(TIME / 60.0, 1e3 * CURRENT, VOLTAGE, strict=True)
+    path = written(
+        tmp_path, ",".join(LOGGER.values()) + "\n" + "".join(f"{t},{i},{v},298\n" for t, i, v in rows)
+    )
+    np.testing.assert_allclose(read(path, Reading(LOGGER, LOGGED)).current_a, CURRENT)
+    with pytest.raises(DataError, match=words):
+        read(path, Reading(LOGGER, LOGGED | {quantity: declared}))
+
+
+def test_an_si_unit_of_the_header_was_overruled_in_silence(tmp_path):
+    """What the checks advise of a column in SI by its name, whose values are plainly not."""
+    path = written(tmp_path, text(time=1e3 * TIME))
+    note = "time_s was converted from ms as declared, though column 'time_s' is in s by its header."
+    assert read_measurement(path, units={"time_s": "ms"}).notes[-1].endswith(note)
+
+
 def test_a_time_in_hours_is_doubted(tmp_path):
     path = written(tmp_path, text(time=TIME / 3600.0))
     (note,) = read_measurement(path).notes

@@ -117,6 +117,26 @@ def test_a_first_voltage_that_no_such_cell_has_was_taken_for_another_capacity(m5
         check_belongs(m50, [replace(record, voltage_v=voltage)])
 
 
+def test_a_discharge_of_another_chemistry_was_taken_for_a_current_in_ma():
+    """Of an NMC cell from its first row on, so that no row is at rest: 4 V on a cell that is full at 3.6 V."""
+    nmc, lfp = (aesi.Cell.from_bpx(CELLS / f"{n}.bpx.json") for n in ("lg_m50_chen2020", "lfp_prada2013"))
+    time_s = np.arange(0.0, 1200.0, 2.0)
+    current_a = np.full(len(time_s), 4.0)
+    voltage_v = aesi.simulate(nmc, time_s, current_a, soc0=1.0).voltage_v
+    told = Measurement(time_s, current_a, voltage_v, name="drive")
+    for check in (check_belongs, check_measured):
+        with pytest.raises(DataError, match=r"^drive, 0 s: 4\.\d+ V at 4 A, but .* is full at 3.600 V"):
+            check(lfp, [told])
+
+
+def test_a_voltage_below_another_cells_was_taken_for_another_unit(m50, record):
+    """Rows at 1.9 V, of an LFP cell, that the cell file does not admit: no charge between them says anything."""
+    low = replace(record, current_a=60.0 * record.current_a, voltage_v=record.voltage_v - 1.3)
+    for check in (check_belongs, check_measured):
+        with pytest.raises(DataError, match=r"outside the range of .* \(2.5 to 4.2 V\): .*different cells"):
+            check(m50, [low])
+
+
 def test_two_rows_say_where_the_charge_contradicts_the_voltage(m50, record):
     voltage = record.voltage_v.copy()
     voltage[0] = 2.45

@@ -138,6 +138,12 @@ def test_a_current_asked_of_an_empty_cell_is_named_as_charge():
         simulate(cell, time, np.full(len(time), 5.0), 0.9)
     assert "passed the lower cut-off (2.5 V)" in str(caught.value)
     assert "soc0" in str(caught.value)
+    missing = (
+        5.0 * time[-1] / 3600.0 / cell.capacity_ah - 0.9
+    )  # of all that is asked for, not up to the fault
+    assert f"than the cell has, by {100 * missing:.1f} % of its capacity in all. Check soc0" in str(
+        caught.value
+    )
     with pytest.raises(SimulationError, match="brings more charge than the cell can hold") as caught:
         simulate(cell, time, np.full(len(time), -5.0), 0.9)
     assert "passed the upper cut-off (4.2 V)" in str(caught.value)

@@ -1,6 +1,7 @@
 """The saved product: data alone, the same predictions after a round trip, and stated behaviour off its path."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -17,7 +18,8 @@ from aesi.pipeline.experiment.load import load
 from aesi.pipeline.product.error_series import error_series
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.pipeline.product.model_folder import SCHEMA
-from aesi.pipeline.simulation import ProfileRequest, predict_file, reached, simulate_file
+from aesi.pipeline.simulation import ProfileRequest, predict_file, reached, simulate_file, voltage_words
+from aesi.records import Run
 from aesi.sparse import SparseModel
 from aesi.sparse.fade import Fade
 from aesi.sparse.trained_region import TrainedRegion
@@ -462,6 +464,50 @@ def test_round_off_at_a_full_charge_was_told_as_rows_beyond_it(model, data):
     for above, said in ((1e-12, False), (0.01, True)):
         told = reached(model.cell, data, voltage, np.linspace(1.0 + above, 0.9, len(data)))
         assert any("a state of charge outside 0 to 1" in note for note in told) == said
+
+
+def test_by_how_much_a_record_emptied_or_overfilled_a_cell_was_not_told(model, data):
+    voltage = np.full(len(data), 3.9)
+    for soc, words in (
+        (
+            np.linspace(0.5, -0.036, len(data)),
+            "asks for more charge than the cell has, by 3.6 % of its capacity.",
+        ),
+        (np.linspace(0.5, 1.04, len(data)), "brings more charge than the cell can hold, by 4.0 %."),
+    ):
+        assert any(note.endswith(f": the record {words}") for note in reached(model.cell, data, voltage, soc))
+
+
+def test_the_voltages_of_no_cell_were_in_the_range_of_a_run_that_ran_out():
+    voltage, time = np.array([4.0, 3.0, -17.7, 2.0]), np.arange(0.0, 40.0, 10.0)
+    run = Run(time, np.ones(4), voltage, {"depleted": np.array([0.0, 0.0, 1.0, 1.0])})
+    words = "3.000 to 4.000 V until it ran out at 20 s, -17.700 to 2.000 V beyond, of no cell"
+    assert voltage_words(run) == words
+    assert voltage_words(replace(run, series={})) == "-17.700 to 4.000 V"
+    at_once = replace(run, series={"depleted": np.ones(4)})
+    assert voltage_words(at_once) == "no row before it ran out at 0 s, -17.700 to 4.000 V beyond, of no cell"
+
+
+def test_a_record_that_the_file_was_fitted_to_was_simulated_as_if_its_cell_were_whole(
+    model, record, tmp_path
+):
+    cell = replace(model.cell, capacity_shares=((record.stem, 0.974), ("other", 0.9)))
+    HybridModel(cell).save(tmp_path / "model")
+    words = f"{record.stem}: the cell's file was fitted to a record of this name"
+    for soh, end in (
+        (None, ", in which the cell had 0.974 of its capacity (--soh 0.974 takes it)."),
+        (0.95, "."),
+    ):
+        for use in (predict_file, simulate_file):
+            said: list[str] = []
+            use(
+                tmp_path / "model", record, tmp_path / "o.csv", ProfileRequest(soh=soh), say_notes=said.extend
+            )
+            assert words + end in said
+    shutil.copy(record, tmp_path / "another.csv")
+    said = []
+    simulate_file(tmp_path / "model", tmp_path / "another.csv", tmp_path / "o.csv", say_notes=said.extend)
+    assert not any("fitted to a record" in note for note in said)
 
 
 @pytest.mark.parametrize("banded", [True, False])

@@ -9,7 +9,9 @@ import pytest
 import aesi
 from aesi.calibration.records.spectra import check_spectra
 from aesi.errors import DataError, InputError
+from aesi.physics.cell.relations import Constant
 from aesi.physics.effects import activated
+from aesi.physics.impedance import slowest_diffusion_hz
 from aesi.pipeline.distinct import check_distinct_spectra
 from aesi.pipeline.impedance import held_against, impedance_file, read_frequencies
 from aesi.records import Spectrum
@@ -78,9 +80,9 @@ def test_an_assumed_temperature_is_said_and_a_state_is_not_assumed(cell):
 def test_a_spectrum_without_an_arc_was_written_without_a_word(tmp_path):
     said = []
     for effects, frequencies in (
-        ((), "1:1000:4"),
+        ((), "1:100:3"),
         ((), "0.01:1:4"),
-        (activated([("double_layer", {})]), "1:1000:4"),
+        (activated([("double_layer", {})]), "1:100:3"),
     ):
         impedance_file(
             CELLS / "lg_m50_chen2020.bpx.json",
@@ -92,6 +94,32 @@ def test_a_spectrum_without_an_arc_was_written_without_a_word(tmp_path):
         )
     (note,) = said
     assert "double layers (--effect double_layer does)" in note
+
+
+def test_frequencies_at_which_the_model_says_nothing_of_a_cell_were_written_without_a_word(cell, tmp_path):
+    said = []
+    layer = activated([("double_layer", {})])
+    file = CELLS / "lg_m50_chen2020.bpx.json"
+    impedance_file(file, 0.5, "1e-9:1e9:5", tmp_path / "z.csv", effects=layer, say_notes=said.extend)
+    low, high = said
+    hz = slowest_diffusion_hz(cell, 0.5)
+    assert low.startswith(f"2 of the frequencies lie below {hz:.2g} Hz, where the slowest diffusion")
+    assert high.startswith("2 of the frequencies lie above 100 Hz")
+    assert "no inductance" in high
+    impedance_file(file, 0.5, "0.001:100:9", tmp_path / "z.csv", effects=layer, say_notes=said.extend)
+    assert said == [low, high]
+
+
+def test_the_slowest_diffusion_is_that_of_the_larger_of_two_slow_particles(cell):
+    """Rate x**2 D/R**2 with the first root x of tan x = x, 4.4934; slower in the cold by an activation energy."""
+    slow = cell.with_positive(particle_radius_m=20e-6, diffusivity=Constant(1e-15), diffusivity_ea_j_mol=20e3)
+    rate = 4.4934**2 * 1e-15 / (20e-6) ** 2
+    assert slowest_diffusion_hz(slow, 0.5) == pytest.approx(rate / (2.0 * np.pi), rel=1e-4)
+    factor = np.exp(20e3 / 8.314462618 * (1.0 / 298.15 - 1.0 / 273.15))
+    assert slowest_diffusion_hz(slow, 0.5, 0.0) == pytest.approx(factor * rate / (2.0 * np.pi), rel=1e-4)
+    below = slowest_diffusion_hz(slow, 0.5) / np.array([100.0, 1000.0])
+    z = aesi.impedance(slow, below, 0.5)
+    assert np.abs(z[1] / z[0]) == pytest.approx(10.0, rel=0.02)  # a capacity
 
 
 def test_a_shift_of_the_temperature_was_left_out_of_an_impedance_without_a_word(tmp_path):

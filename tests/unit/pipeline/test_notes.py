@@ -4,14 +4,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from aesi.physics import Cell
 from aesi.physics.effects import CATALOGUE
-from aesi.physics.simulation import model_with
+from aesi.physics.simulation import model_with, simulate
 from aesi.pipeline import notes
 from aesi.pipeline.notes import (
     beyond_fitted,
     of_another_model,
+    of_fitted,
     on_temperatures,
     temperature_sentence,
     together,
@@ -102,3 +104,24 @@ def test_a_model_that_was_found_with_the_single_particle_was_simulated_with_the_
     assert sentence.startswith("the cell's file was fitted with the porous electrode (dfn)")
     for as_it_is in ((found, None), (found, "espm"), (HybridModel(cell), "dfn")):
         assert of_another_model(*as_it_is) == ()
+
+
+def test_what_a_fit_took_out_of_the_current_of_a_slow_cycle_was_told_by_its_report_alone():
+    """C/20 from full to empty and back, on a cycler that reads a fiftieth of it too much."""
+    cell = replace(Cell.from_bpx(NMC), capacity_shares=(("c20", 0.974),))
+    hours = np.arange(0.0, 44.0, 1 / 30)
+    rate, offset = cell.capacity_ah / 20, cell.capacity_ah / 1000
+    true = np.select([hours < 1, hours < 20, hours < 21, hours < 40], [0, rate, 0, -rate], 0.0)
+    run = simulate(cell, 3600 * hours, true, 1.0, hold="backward")
+    read = true + offset * (true != 0)
+    cycle = Measurement(
+        3600 * hours, read, run.voltage_v, np.full(len(hours), 25.0), name="c20", hold="backward"
+    )
+    first, zero = of_fitted(cell, cycle, None)
+    assert first.endswith("in which the cell had 0.974 of its capacity (--soh 0.974 takes it).")
+    assert zero.startswith("c20: nearly full at both ends")
+    assert float(zero.rpartition("offset_a=")[2].removesuffix(" does.")) == pytest.approx(offset, rel=0.1)
+    taken = CATALOGUE["current_sensor_offset"].activate(offset_a=offset)
+    assert of_fitted(cell, cycle, None, (taken,)) == (first,)
+    assert of_fitted(cell, replace(cycle, voltage_v=np.full(len(hours), np.nan)), None) == (first,)
+    assert of_fitted(cell, replace(cycle, name="another"), None) == ()
