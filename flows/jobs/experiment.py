@@ -1,6 +1,6 @@
 """The stages of an experiment, as the paper's table of contents.
 
-    data and physics -> search -> final models -> intervals -> evaluation -> report
+    data and physics -> search -> final models -> intervals -> validation -> evaluation -> report -> comparison
 
 Killed at any moment and started again with --resume, it finds finished candidates by their content, evaluates
 the rest, tracks each once, and ends with the result of an uninterrupted run.
@@ -98,7 +98,9 @@ def _stages(
     key = (config.digest, found.key)
     models = run(
         "final models",
-        lambda: cache.get("final models", key, lambda: final_models(problem, found.chosen, config)),
+        lambda: final_models(
+            problem, found.chosen, config, lambda name, fit: cache.get(f"model {name}", key, fit)
+        ),
     )
     for note in models.unfitted:
         console.say(f"  {note}")
@@ -107,7 +109,7 @@ def _stages(
     fitted = run(
         "intervals", lambda: conformalise(models.fitted, problem, found.chosen, config, loaded.left_out)
     )
-    validation = validation_mser(loaded, problem, found.candidates())
+    validation = run("validation", lambda: validation_mser(loaded, problem, found.candidates()))
     evaluation = run("evaluation", lambda: evaluate_models(fitted, loaded.split, validation))
     seconds = time.monotonic() - started
     rows = found.rows()
@@ -126,7 +128,7 @@ def _stages(
     )
     summary = run("report", lambda: write_outputs(folder, result))
     console.say(summary["finding"])
-    tracker.json("comparison.json", comparison(result))
+    tracker.json("comparison.json", run("comparison", lambda: comparison(result)))
     track_result(tracker, folder, summary, found.number, fitted, config.note)
     slug = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")
     run.publish(f"{slug}-report", _page(folder, summary, tracker), f"What came of {config.name}")
