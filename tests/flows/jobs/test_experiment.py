@@ -18,6 +18,7 @@ METRICS = {
     "pearson/train",
     "pearson/valid",
     "free_run/valid_mser_pct",
+    "free_run/valid_mser_recalibrated_pct",
     "one_step/valid_rmse_mv",
     "intervals/valid_coverage_pct",
     "intervals/valid_width_v",
