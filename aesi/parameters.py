@@ -78,26 +78,30 @@ class Parameter:
             raise ParameterError(
                 "the standard deviation of a logarithm is that of a cell of any size; leave capacity_power out."
             )
-        self.check("default", self.default)
+        own = "Give one within, or wider bounds"
+        self.check("default", self.default, own)
         if self.neutral is not None and not self.log:
-            self.check("neutral", self.neutral)
+            self.check("neutral", self.neutral, own)
 
-    def check(self, name: str, value: float) -> float:
+    def check(self, name: str, value: float, otherwise: str = "") -> float:
         """Return `value` if it lies within the bounds, or is the nought that the lower one stands for.
 
+        otherwise : what can be done where the value is meant.
         Raises ParameterError naming the value, the range and its source.
         """
         low, high = self.bounds
         if low <= value <= high or (self.low_is_limit and value == 0.0):  # this way round, NaN fails too
             return value
         raise ParameterError(
-            f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit} ({self.source}). "
-            f"If the cell warrants it, widen it where {name} is declared."
+            f"{name} = {value:g} {self.unit} is outside [{low:g}, {high:g}] {self.unit} ({self.source})"
+            f"{otherwise and '. '}{otherwise}."
         )
 
 
-def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> dict[str, float]:
-    """Defaults overlaid with `values`, each within its bounds.
+def checked(
+    parameters: Mapping[str, Parameter], values: Mapping[str, float], otherwise: str = ""
+) -> dict[str, float]:
+    """Defaults overlaid with `values`, each within its bounds; otherwise : what can be done where one is not.
 
     Raises ParameterError for an unknown name (with the nearest match), no number, or a value out of bounds.
     """
@@ -106,7 +110,10 @@ def checked(parameters: Mapping[str, Parameter], values: Mapping[str, float]) ->
             raise ParameterError(
                 f"unknown parameter {name!r}{did_you_mean(name, parameters)} Known: {', '.join(parameters) or 'none'}."
             )
-    return {name: p.check(name, _number(name, values.get(name, p.default))) for name, p in parameters.items()}
+    return {
+        name: p.check(name, _number(name, values.get(name, p.default)), otherwise)
+        for name, p in parameters.items()
+    }
 
 
 def _number(name: str, value: object) -> float:

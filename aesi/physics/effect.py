@@ -121,7 +121,7 @@ class Effect:
         Raises ParameterError for an unknown name or a value out of bounds.
         """
         try:
-            return ActiveEffect(self, tuple(checked(self.parameters, values).items()))
+            return ActiveEffect(self, tuple(checked(self.parameters, values, self._wider).items()))
         except ParameterError as error:
             raise ParameterError(f"{self.id}: {error}") from None
 
@@ -129,6 +129,16 @@ class Effect:
         """This effect with the given parameters, and the others at their neutral values, where they have one."""
         still = {name: p.neutral for name, p in self.parameters.items() if p.neutral is not None}
         return self.activate(**{**still, **values})
+
+    @property
+    def _wider(self) -> str:
+        """What to do for a value beyond the bounds: those of the catalogue are no user's to change."""
+        if self.file is not None:
+            return f"If the cell warrants it, widen the bounds in {self.file}"
+        return (
+            "If the cell warrants it, an effect of your own can have wider bounds: a file with the same equation and "
+            "another id (--effect-file, in Python load_effect)"
+        )
 
     @property
     def summary(self) -> str:

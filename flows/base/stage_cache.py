@@ -24,7 +24,7 @@ class Cache:
         """What the stage gave for these parts before, or what it gives now.
 
         A damaged entry is computed again, and said. A result that is no plain data, or that does not fit on
-        the disk, is not kept.
+        the disk, is not kept, which is said too.
         """
         path = self._folder / f"{stage}-{fingerprint.key(source_digest(), *parts)}.bin"
         if self._reuse and path.is_file():
@@ -40,8 +40,10 @@ class Cache:
         result = compute()
         try:
             write_whole(path, codec.dumps(result))
-        except codec.Uncodable:
-            pass  # a fitted object of another library: cheap to make again, unsafe to unpickle
+        except codec.Uncodable as error:  # a fitted object of another library would be unsafe to unpickle
+            self._say(
+                f"cache: the result of {stage!r} is not kept, and made again where it is wanted ({error})."
+            )
         except OSError as error:
             self._say(f"cache: the result of {stage!r} could not be stored ({error.strerror or error}).")
         return result

@@ -23,6 +23,9 @@ from flows.evaluation.spread import in_processes, on_dask
 if TYPE_CHECKING:
     from flows.tracking.tracker import Tracker
 
+NO_FIGURES = ("seed", "cases", "summary")
+"""Keys of the last line that are parameters of the run, or tell the line apart."""
+
 
 @dataclass(frozen=True)
 class Cases:
@@ -67,7 +70,7 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
         rows.sort(key=lambda row: str(row["case"]))
         last = {"seed": cases.seed, **cases.summary(rows)}
         if tracker is not None:
-            tracker.metrics({k: v for k, v in last.items() if isinstance(v, float)})
+            tracker.metrics(_other_numbers(last, NO_FIGURES))
             if "confusion" in last:
                 tracker.json("confusion.json", last["confusion"])
             tracker.json("summary.json", last)
@@ -141,5 +144,10 @@ def _judged(cases: Cases, workers: int, address: str | None) -> Iterator[CaseRow
 
 def _track(tracker: Tracker, row: CaseRow, shown: tuple[str, ...]) -> None:
     parameters = {k: v if isinstance(v, str) else json.dumps(v) for k, v in row.items() if k in shown}
-    metrics = {k: float(v) for k, v in row.items() if isinstance(v, bool | float) and k not in shown}
+    metrics = _other_numbers(row, shown)
     tracker.nested(f"case:{row['case']}", row["case"], "case", parameters, metrics, seconds=row["ours_s"])
+
+
+def _other_numbers(row: CaseRow, without: tuple[str, ...]) -> dict[str, float]:
+    """The numbers of a row, what is true among them as 1, but those of the given keys."""
+    return {k: float(v) for k, v in row.items() if isinstance(v, int | float) and k not in without}

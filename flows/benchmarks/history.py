@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,8 @@ class Watch:
     """What is compared of a benchmark.
 
     case : fields that tell its lines apart.  higher, lower : figures that should not fall, or rise, by more than
-    the given share of what they were.  together : the lines of a run are one picture: all are kept beside the one that
-    sums them up, and only the newest run's count.
+    the given share of what they were, whatever their sign.  together : the lines of a run are one picture: all are kept
+    beside the one that sums them up, and only the newest run's count.
     """
 
     case: tuple[str, ...] = ()
@@ -140,7 +141,7 @@ def figures(line: Mapping[str, Any]) -> dict[str, float]:
 
 
 def regressions(entries: Sequence[Entry], lines: Iterable[Line]) -> list[str]:
-    """One sentence for each watched figure that is worse than when it was last recorded."""
+    """One sentence for each watched figure that is worse than when it was last recorded, or no number any more."""
     known = latest(entries)
     found = []
     for line in lines:
@@ -156,10 +157,10 @@ def _worse(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     old, new = figures(before), figures(now)
     found = []
     for name in [each for each in old if each in new]:
-        share = watch.higher.get(name, watch.lower.get(name, 0.0))
-        fell = name in watch.higher and new[name] < old[name] * (1 - share)
-        rose = name in watch.lower and new[name] > old[name] * (1 + share)
-        if fell or rose:
+        room = watch.higher.get(name, watch.lower.get(name, 0.0)) * abs(old[name])
+        fell = name in watch.higher and new[name] < old[name] - room
+        rose = name in watch.lower and new[name] > old[name] + room
+        if fell or rose or (isfinite(old[name]) and not isfinite(new[name])):
             found.append(f"{name} was {old[name]:.4g} and is {new[name]:.4g}")
     return found
 

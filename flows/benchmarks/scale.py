@@ -77,7 +77,8 @@ def _measured(config: ExperimentConfig, genomes: Sequence[Genome], workers: int)
     """Wall seconds of all candidates, and the processor seconds of each worker."""
     from flows.evaluation.dask_pool import DaskPool
 
-    pool = DaskPool(config.model_dump_json(), str(config.base), None, workers, config.search.timeout_s)
+    limits = config.search.timeout_s, config.search.memory_mb
+    pool = DaskPool(config.model_dump_json(), str(config.base), None, workers, *limits)
     try:
         _all(pool, [genomes[0]] * (2 * workers))  # each worker builds the problem
         before = pool.processor_s()

@@ -16,7 +16,7 @@ from typing import Any
 from aesi.errors import AesiError, InputError
 from aesi.records import Failed
 from flows.base import codec
-from flows.evaluation.pool import guarded
+from flows.evaluation.pool import MemoryOfThreads, guarded
 from flows.evaluation.scorer_recipe import build_scorer
 
 CONNECT_S = 15
@@ -119,6 +119,8 @@ class DaskPool:
     """See `flows.evaluation.pool.Pool`.
 
     content, base : the experiment as JSON, and the folder its paths start from (which the workers must see).
+    memory_mb : address space that a worker's process may take for each of its threads while they evaluate, beyond what
+    it has (Linux).
     study : content key of the study: a worker that lives on builds its problem again where the files are others.
     """
 
@@ -129,9 +131,10 @@ class DaskPool:
         address: str | None,
         workers: int,
         timeout_s: float,
+        memory_mb: float,
         study: str = "",
     ) -> None:
-        self._recipe, self._timeout_s = (content, base, study), timeout_s
+        self._recipe, self._timeout_s, self._memory_mb = (content, base, study), timeout_s, memory_mb
         self._client, self._cluster = connect(address, workers)
         self._handed: dict[str, _Handed] = {}
         self._finished: Queue[Any] = Queue()
@@ -151,7 +154,7 @@ class DaskPool:
         """Hand a genome to the scheduler."""
         key = f"candidate-{uuid.uuid4().hex}"
         handed = self._handed[key] = _Handed(tag)  # before it is submitted: it may begin at once
-        given = (self._topic, key, *self._recipe, codec.dumps(genome))
+        given = (self._topic, key, self._memory_mb, *self._recipe, codec.dumps(genome))
         handed.future = self._client.submit(_evaluate_timed, *given, key=key, pure=False)
         handed.future.add_done_callback(self._finished.put)
 
@@ -200,8 +203,15 @@ class DaskPool:
         return found
 
 
-def _evaluate_timed(topic: str, key: str, content: str, base: str, study: str, genome: bytes) -> bytes:
-    """As `evaluate_bytes`; tells the pool when the candidate begins, once the problem is built, as `LocalPool` counts.
+_MEMORY = MemoryOfThreads()
+"""Of a worker's process."""
+
+
+def _evaluate_timed(
+    topic: str, key: str, memory_mb: float, content: str, base: str, study: str, genome: bytes
+) -> bytes:
+    """As `evaluate_bytes`, within what it may take of memory and, told to the pool, of time: both count from when the
+    problem is built, as in `LocalPool`.
 
     Two candidates a thread are handed over, and one that waits behind another has used none of its time.
     """
@@ -210,7 +220,8 @@ def _evaluate_timed(topic: str, key: str, content: str, base: str, study: str, g
     _scorer(content, base, study)
     worker = get_worker()
     worker.log_event(topic, {"key": key, "worker": worker.address})
-    return evaluate_bytes(content, base, study, genome)
+    with _MEMORY.limited(memory_mb, worker.state.nthreads):
+        return evaluate_bytes(content, base, study, genome)
 
 
 def evaluate_bytes(content: str, base: str, study: str, genome: bytes) -> bytes:

@@ -22,11 +22,10 @@ from typing import Any
 
 from aesi.records import Failed
 from flows.base.interrupt import leaving_interrupts_to_us
-from flows.evaluation.pool import Evaluate, guarded
+from flows.evaluation.pool import Evaluate, guarded, limit_memory
 
 WATCH_S = 1.0
 """How often a worker's memory and its parent are looked at."""
-MEGABYTE = 1 << 20
 
 
 @dataclass
@@ -145,7 +144,7 @@ def _serve(pipe: Connection, build: Callable[[], Evaluate], memory_mb: float, pa
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # where it is not held back
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_leave_with, args=(parent,), daemon=True).start()
-    _limit_memory(memory_mb)
+    limit_memory(memory_mb)
     evaluate = build()
     while True:
         try:
@@ -160,19 +159,6 @@ def _leave_with(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(WATCH_S)
     os._exit(1)
-
-
-def _limit_memory(memory_mb: float) -> None:
-    if sys.platform != "linux":
-        return
-    import resource
-
-    with open("/proc/self/statm") as statm:
-        now = int(statm.read().split()[0]) * resource.getpagesize()
-    limit = now + int(memory_mb * MEGABYTE)
-    _, hard = resource.getrlimit(resource.RLIMIT_AS)
-    if hard == resource.RLIM_INFINITY or limit < hard:
-        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
 
 
 def _end(one: _Process) -> None:

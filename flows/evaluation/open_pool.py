@@ -21,8 +21,8 @@ def open_pool(problem: Problem, config: ExperimentConfig, study: str) -> Pool:
     if config.runner.kind == "dask":
         from flows.evaluation.dask_pool import DaskPool
 
-        where, workers = config.runner.address, search.workers
-        return DaskPool(content, str(config.base), where, workers, search.timeout_s, study)
+        where, limits = config.runner.address, (search.timeout_s, search.memory_mb)
+        return DaskPool(content, str(config.base), where, search.workers, *limits, study)
     build = _Builder(partial(scorer, problem, config), partial(build_scorer, content, str(config.base)))
     return LocalPool(build, search.workers, search.timeout_s, search.memory_mb)
 

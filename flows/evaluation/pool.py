@@ -1,15 +1,21 @@
-"""What a pool of evaluating processes offers, and how an exception inside a candidate fails that candidate alone."""
+"""What a pool of evaluating processes offers, and how an exception inside a candidate, or one for want of the memory
+that it may take, fails that candidate alone.
+"""
 
 from __future__ import annotations
 
 import os
+import sys
+import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any, Protocol
 
 from aesi.errors import AesiError
 from aesi.records import Failed
 
+MEGABYTE = 1 << 20
 Evaluate = Callable[[Any], Any]
 """A genome in, a Candidate or Failed out."""
 
@@ -43,3 +49,51 @@ def guarded(evaluate: Evaluate, genome: Any) -> Any:
         return Failed(
             f"{type(error).__name__}: {error} (in {os.path.basename(where.filename)}:{where.lineno})"
         )
+
+
+def limit_memory(memory_mb: float) -> int | None:
+    """Let this process take that much address space beyond what it has (Linux); the limit before in bytes, None where
+    it is left as it is."""
+    if sys.platform != "linux":
+        return None
+    import resource
+
+    with open("/proc/self/statm") as statm:
+        now = int(statm.read().split()[0]) * resource.getpagesize()
+    limit = now + int(memory_mb * MEGABYTE)
+    before, hard = resource.getrlimit(resource.RLIMIT_AS)
+    if hard != resource.RLIM_INFINITY and limit >= hard:
+        return None
+    resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+    return before
+
+
+class MemoryOfThreads:
+    """The limit of a process whose threads evaluate, and which does other things between: it holds while any does."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._inside = 0
+        self._before: int | None = None
+
+    @contextmanager
+    def limited(self, memory_mb: float, threads: int) -> Iterator[None]:
+        """Within, the process may take that much for each of its threads beyond what it has."""
+        with self._lock:
+            self._inside += 1
+            if self._inside == 1:
+                self._before = limit_memory(threads * memory_mb)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._inside -= 1
+                if not self._inside:
+                    self._restore()
+
+    def _restore(self) -> None:
+        if self._before is None:
+            return
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (self._before, resource.getrlimit(resource.RLIMIT_AS)[1]))

@@ -110,7 +110,7 @@ def _track_summary(tracker: Tracker | None, rows: dict[str, dict[str, Any]], out
     done = [row for row in rows.values() if row["status"] == "done"]
     tracker.metrics({"done": float(len(done)), "failed": float(len(rows) - len(done))})
     for name in ("summary.csv", "index.html"):
-        tracker.files(out.resolve() / name)
+        tracker.files(out / name)
 
 
 def _ordered(jobs: Sequence[Job], rows: dict[str, dict[str, Any]]) -> list[dict[str, Any]]:

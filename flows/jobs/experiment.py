@@ -1,6 +1,6 @@
 """`aesi run` as a flow: the stages of an experiment, as the paper's table of contents.
 
-    data and physics -> search -> final models -> intervals -> evaluation -> report
+    data and physics -> search -> final models -> intervals -> validation -> evaluation -> report -> comparison
 
 Killed at any moment and started again with --resume, it finds finished candidates by their content, evaluates
 the rest, tracks each once, and ends with the result of an uninterrupted run.

@@ -98,7 +98,9 @@ class ExperimentJob:
         key = (config.digest, found.key)
         models = self.run(
             "final models",
-            lambda: cache.get("final models", key, lambda: final_models(problem, found.chosen, config)),
+            lambda: final_models(
+                problem, found.chosen, config, lambda name, fit: cache.get(f"model {name}", key, fit)
+            ),
         )
         for note in models.unfitted:
             self.console.say(f"  {note}")
@@ -116,7 +118,7 @@ class ExperimentJob:
     def _evaluate(
         self, fitted: Sequence[Fitted], found: Found, problem: Problem, loaded: Loaded
     ) -> EvaluatedModels:
-        validation = validation_mser(loaded, problem, found.candidates())
+        validation = self.run("validation", lambda: validation_mser(loaded, problem, found.candidates()))
         return self.run("evaluation", lambda: evaluate_models(fitted, loaded.split, validation))
 
     def _result(
@@ -147,7 +149,7 @@ class ExperimentJob:
     def _report(self, folder: Path, result: Result, found: Found) -> Mapping[str, Any]:
         summary = self.run("report", lambda: write_outputs(folder, result))
         self.console.say(summary["finding"])
-        self.tracker.json("comparison.json", comparison(result))
+        self.tracker.json("comparison.json", self.run("comparison", lambda: comparison(result)))
         track_result(self.tracker, folder, summary, found.number, result.fitted, result.config.note)
         return summary
 

@@ -55,8 +55,10 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
     """A tracked run of a job that is no experiment, closed as what it becomes; None, which is said, where the store is
     away or nothing can be written in the workspace: the job's results lie elsewhere.
 
-    title : what the run is called.  Runs of the same name that were killed before are closed first.
+    title : what the run is called.  Runs of the same name that were killed before are closed first, and what any run
+    could not deliver is delivered.
     """
+    from flows.tracking.leftovers import deliver_leftovers
     from flows.tracking.store import Store, StoreAway
     from flows.tracking.tracker import Tracker
 
@@ -71,6 +73,7 @@ def tracked_job(subject: Subject, title: str, console: Console) -> Iterator[Trac
     try:
         store = Store(subject.tracking.uri)
         _close_killed(subject.name, store, console)
+        deliver_leftovers(store, console.say)
         tracker = Tracker(store, subject, console.say, title=title)
     except StoreAway as error:
         console.say(f"not tracked: {error}")

@@ -25,6 +25,7 @@ from aesi.pipeline.experiment.candidate import weights
 from aesi.pipeline.experiment.config import ExperimentConfig, parse_experiment
 from aesi.pipeline.experiment.fit import build_problem, final_models
 from aesi.pipeline.experiment.intervals.conformalise import conformalise
+from aesi.pipeline.experiment.judging.reductions import AGAINST, valid_shares
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import Failed, LeftOutDrives
@@ -37,6 +38,7 @@ from flows.tracking.experiment_log import (
     RECORDS,
     candidate_metrics,
     coefficients,
+    reduced,
 )
 from flows.tracking.store import KIND, PARENT, Store, without_login
 
@@ -95,7 +97,8 @@ def rebuild(run_id: str, uri: str | None = None) -> Rebuilt:
         raise FitError(
             f"candidate {run_id} comes to nothing here ({candidate.reason}); it was made by an earlier version."
         )
-    metrics = {name: float(value) for name, value in candidate_metrics(candidate).items()}
+    judged = candidate_metrics(candidate, valid_shares(problem, left_out))
+    metrics = {name: float(value) for name, value in judged.items()}
     return Rebuilt(
         run.info.run_id, number, config, declared, problem, candidate, left_out, run.data.metrics, metrics
     )
@@ -140,10 +143,10 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
 def said(rebuilt: Rebuilt, out: Path) -> str:
     """What came back, in one line."""
     candidate = rebuilt.candidate
-    less = candidate.free_run_valid_mser_pct
+    declared, recalibrated = (rebuilt.metrics[f"free_run/valid_{name}"] for name in AGAINST)
     return (
         f"candidate {rebuilt.number}: {len(candidate.bagging.terms)} and {len(candidate.stability.terms)} terms, "
-        f"{abs(less):.2f} % {'less' if less >= 0.0 else 'more'} squared error on validation in free run; "
+        f"{reduced(declared)} squared error on validation in free run, {reduced(recalibrated)} than recalibrated; "
         f"{candidate.better.name} is in {out / 'model'}"
     )
 

@@ -105,7 +105,7 @@ class PublishedStudy:
         one = outcome.candidate
         noted |= {
             "fitness": one.fitness,
-            "free run on validation, MSER in %": one.free_run_valid_mser_pct,
+            "free run on validation, MSER in % of the corrected physics": one.free_run_valid_mser_pct,
             "coverage on validation, %": outcome.coverage_pct,
         }
         return create_trial(

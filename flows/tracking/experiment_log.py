@@ -14,6 +14,7 @@ from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.candidate import ScoredCandidate
 from aesi.pipeline.experiment.config import ExperimentConfig
 from aesi.pipeline.experiment.fit import Fitted
+from aesi.pipeline.experiment.judging.reductions import valid_reductions, valid_shares
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
 from aesi.records import ROLES, Failed
@@ -95,6 +96,7 @@ class CandidateTracker:
     def __init__(self, tracker: Tracker, config: ExperimentConfig, loaded: Loaded, problem: Problem) -> None:
         self._tracker = tracker
         self._problem = problem
+        self._valid_shares = valid_shares(problem, loaded.left_out)
         self._shared = {
             "seed": config.seed,
             "data_hashes": loaded.digests,
@@ -124,7 +126,7 @@ class CandidateTracker:
             name=f"candidate {number:03d}",
             kind="candidate",
             params=params,
-            metrics={} if isinstance(outcome, Failed) else _metrics(outcome),
+            metrics={} if isinstance(outcome, Failed) else _metrics(outcome, self._valid_shares),
             files={}
             if isinstance(outcome, Failed)
             else {"coefficients.json": coefficients(outcome.candidate)},
@@ -172,17 +174,17 @@ def track_result(
 def result_line(row: Mapping[str, Any]) -> str:
     """What came of a run, in one sentence, from the chosen model's row of the summary."""
     free, step = row["free_run"], row.get("intervals") or {}
-    line = f"{row['name']}: {_reduced(free['test_mser_pct'])} squared error on test in free run"
+    line = f"{row['name']}: {reduced(free['test_mser_pct'])} squared error on test in free run"
     line += f" ({free['test_rmse_mv']:.2f} mV)"
     beyond = free.get("test_mser_recalibrated_pct")
     if beyond is not None and isfinite(beyond):
-        line += f", {_reduced(beyond)} than recalibrated"
+        line += f", {reduced(beyond)} than recalibrated"
     if step:
         line += f"; {step['coverage_pct']:.1f} % covered one step ahead at {step['nominal_pct']:.0f} %"
     return f"{line}."
 
 
-def _reduced(percent: float) -> str:
+def reduced(percent: float) -> str:
     """'1.7 % less', or more."""
     return f"{abs(percent):.1f} % {'more' if percent < 0.0 else 'less'}"
 
@@ -197,8 +199,9 @@ def coefficients(candidate: Candidate) -> dict[str, dict[str, float]]:
     }
 
 
-def candidate_metrics(candidate: Candidate) -> dict[str, float]:
-    """What a candidate is judged by, without its intervals."""
+def candidate_metrics(candidate: Candidate, shares: Mapping[str, float]) -> dict[str, float]:
+    """What a candidate is judged by, without its intervals; shares : `valid_shares` of its problem."""
+    reductions = valid_reductions(candidate, shares)
     return {
         "loss/oob": candidate.loss_oob,
         "loss/valid": candidate.loss_valid,
@@ -208,13 +211,13 @@ def candidate_metrics(candidate: Candidate) -> dict[str, float]:
         "fitness": candidate.fitness,
         "pearson/train": candidate.pearson_train,
         "pearson/valid": candidate.pearson_valid,
-        "free_run/valid_mser_pct": candidate.free_run_valid_mser_pct,
+        **{f"free_run/valid_{name}": value for name, value in reductions.items()},
         "one_step/valid_rmse_mv": MV_PER_V * candidate.one_step_valid_rmse_v,
     }
 
 
-def _metrics(scored: ScoredCandidate) -> dict[str, Any]:
-    return candidate_metrics(scored.candidate) | {
+def _metrics(scored: ScoredCandidate, shares: Mapping[str, float]) -> dict[str, Any]:
+    return candidate_metrics(scored.candidate, shares) | {
         "intervals/valid_coverage_pct": scored.coverage_pct,
         "intervals/valid_width_v": scored.width_v,
         "intervals/valid_width_mv": None if scored.width_v is None else MV_PER_V * scored.width_v,

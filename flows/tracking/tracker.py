@@ -194,8 +194,8 @@ class Tracker:
         self._outbox.put({"kind": "experiment", "experiment_id": self._experiment_id, "tags": dict(tags)})
 
     def files(self, path: Path, to: str | None = None) -> None:
-        """A file or a folder as artifacts of the parent run."""
-        self._outbox.put({"kind": "files", "run_id": self.run_id, "path": str(path), "to": to})
+        """A file or a folder as artifacts of the parent run; they may be delivered from another folder later."""
+        self._outbox.put({"kind": "files", "run_id": self.run_id, "path": str(path.resolve()), "to": to})
 
     def json(self, name: str, content: Any) -> None:
         """A JSON artifact of the parent run."""
@@ -210,7 +210,7 @@ class Tracker:
             {
                 "kind": "model",
                 "run_id": self.run_id,
-                "path": str(folder),
+                "path": str(folder.resolve()),
                 "registered_as": name,
             }
         )

@@ -45,7 +45,8 @@ HOW_TO_READ = (
     "candidates would fill. With the filter ``tags.`aesi.kind` = 'candidate'`` it lists candidates (the one that the "
     "models come from is tagged `aesi.chosen`), with `'model'` the final models. `free_run/` is without any measured "
     "voltage after the first sample, `one_step/` and `intervals/` are one step ahead. Sort candidates by "
-    "`free_run/valid_mser_pct`: selection never meets the test records."
+    "`free_run/valid_mser_pct` (against the declared model; `free_run/valid_mser_recalibrated_pct` against the "
+    "recalibrated one): selection never meets the test records."
 )
 HOW_TO_READ_DISCOVERIES = (
     "A run is one `aesi discover`, and the table lists those alone; without the filter it also lists the hypotheses "

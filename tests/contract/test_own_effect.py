@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import aesi
-from aesi.errors import ConfigError, InputError, NoNumberError, OwnEffectError
+from aesi.errors import ConfigError, InputError, NoNumberError, OwnEffectError, ParameterError
 from aesi.physics import Effect
 from aesi.physics.effects import CATALOGUE, activated, known_effects, load_effect
 from aesi.pipeline.discovery.discover import Case, write_discovery
@@ -247,10 +247,60 @@ def test_what_an_effect_of_ones_own_raises_names_file_and_line(
     assert caught.value.exit_code == 2
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "(0.0, 0.01)",
+            "(0.01, 0.0)",
+            "parameter 'lead_ohm': bounds [0.01, 0] ohm are empty; give low < high.",
+        ),
+        (
+            "Parameter(1e-3",
+            "Parameter(1.0",
+            "parameter 'lead_ohm': default = 1 ohm is outside [0, 0.01] ohm (a lead). Give one within, or wider",
+        ),
+        (
+            ', "a lead"',
+            "",
+            "parameter 'lead_ohm': TypeError: Parameter.__init__() missing 1 required positional",
+        ),
+        (
+            "Parameter(1e-3",
+            "Parameter(1e-3 / 0",
+            "parameter 'lead_ohm': ZeroDivisionError: float division by zero.",
+        ),
+    ],
+)
+def test_a_mistake_among_the_parameters_was_told_without_its_place(tmp_path, old, new, sentence):
+    path = tmp_path / "mine.py"
+    other = 'PARAMETERS = {"other_ohm": Parameter(1e-3, "ohm", (0.0, 0.01), "another"), "lead_ohm"'
+    path.write_text(OWN.replace(old, new).replace('PARAMETERS = {"lead_ohm"', other))
+    line = next(n for n, text in enumerate(path.read_text().splitlines(), 1) if text.startswith("PARAMETERS"))
+    with pytest.raises(
+        InputError, match=re.escape(f"the effect file {path} fails in line {line}, {sentence}")
+    ):
+        load_effect(path)
+
+
+def test_a_failure_elsewhere_in_the_file_was_told_without_its_line(tmp_path):
+    path = tmp_path / "mine.py"
+    path.write_text("import numpy\nimport nunpy\n")
+    with pytest.raises(InputError, match=r"fails in line 2: ModuleNotFoundError: No module named 'nunpy'\.$"):
+        load_effect(path)
+
+
+def test_a_value_beyond_the_bounds_sent_users_into_the_installed_package(file):
+    with pytest.raises(ParameterError, match=re.escape(f"widen the bounds in {file}.")):
+        load_effect(file).activate(lead_ohm=1.0)
+    with pytest.raises(ParameterError, match="an effect of your own can have wider bounds"):
+        CATALOGUE["series_resistance"].activate(resistance_ohm=10.0)
+
+
 def test_a_file_that_ends_python_ended_the_command_as_if_all_were_done(tmp_path):
     path = tmp_path / "mine.py"
     path.write_text("import sys\n\nsys.exit()\n")
-    with pytest.raises(InputError, match=f"the effect file {path} fails: SystemExit"):
+    with pytest.raises(InputError, match=f"the effect file {path} fails in line 3: SystemExit"):
         load_effect(path)
 
 

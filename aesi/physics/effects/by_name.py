@@ -17,7 +17,7 @@ from typing import Any
 from aesi.errors import InputError
 from aesi.physics.effect import ActiveEffect, Effect
 from aesi.physics.effects.catalogue import CATALOGUE, no_such_effect
-from aesi.physics.effects.own_effect import check_own
+from aesi.physics.effects.own_effect import check_own, load_failure
 
 
 def find_effect(name: str, file: str | None = None) -> Effect:
@@ -112,8 +112,7 @@ def _load(path: str, content: bytes) -> Effect:
         # Not by the loader, whose kept byte code is told by a time in whole seconds and a size.
         exec(spec.loader.source_to_code(content, path), module.__dict__)
     except (Exception, SystemExit) as error:  # an exit would end the command as if all were done
-        said = str(error).rstrip(".")
-        raise InputError(f"the effect file {path} fails: {type(error).__name__}: {said}.") from error
+        raise InputError(load_failure(path, content, error)) from error
     effect = getattr(module, "EFFECT", None)
     if not isinstance(effect, Effect):
         raise InputError(f"{path} defines no EFFECT of type aesi.physics.Effect.")

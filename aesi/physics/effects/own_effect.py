@@ -1,14 +1,21 @@
-"""What a user's own effect has to be, checked when its file is read and not in the middle of a search."""
+"""What a user's own effect has to be, checked when its file is read and not in the middle of a search, and where in the
+file a mistake is."""
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
+import traceback
+from collections.abc import Iterator
 from typing import get_args
 
-from aesi.errors import InputError
+from aesi.errors import AesiError, InputError
+from aesi.parameters import Parameter
 from aesi.physics.effect import Effect, Kind
 
+Place = tuple[int, int]
+"""Line, counted from one, and column of a source text."""
 PLACES = ("on_model", "on_record", "on_voltage", "on_reading")
 
 
@@ -35,3 +42,36 @@ def check_own(effect: Effect, path: str) -> None:
             raise InputError(
                 f"{path}: {place} cannot be called with what EFFECT declares (parameters: {names}): {error}."
             ) from None
+
+
+def load_failure(path: str, content: bytes, error: BaseException) -> str:
+    """One sentence: in which line of the file and, where it is one that is declared there, at which parameter it
+    failed, and how."""
+    places = [
+        (frame.lineno or 0, frame.colno or 0)
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename == path
+    ]
+    where = f" in line {places[-1][0]}" if places else ""
+    if places:  # else it could not be read as Python, and the error says where
+        for name, begin, end in _declared_parameters(content, path):
+            if any(begin <= place < end for place in places):
+                where += f", parameter {name!r}"
+    said = str(error).rstrip(".")
+    kind = "" if isinstance(error, AesiError) else type(error).__name__
+    return f"the effect file {path} fails{where}: {': '.join(filter(None, (kind, said)))}."
+
+
+def _declared_parameters(content: bytes, path: str) -> Iterator[tuple[str, Place, Place]]:
+    """Names that dictionaries in the file give to parameters, and where each begins and ends."""
+    for node in ast.walk(ast.parse(content, path)):
+        if not isinstance(node, ast.Dict):
+            continue
+        for key, value in zip(node.keys, node.values, strict=True):
+            if isinstance(key, ast.Constant) and isinstance(value, ast.Call) and _makes_parameter(value):
+                end = value.end_lineno or value.lineno, value.end_col_offset or value.col_offset
+                yield str(key.value), (value.lineno, value.col_offset), end
+
+
+def _makes_parameter(call: ast.Call) -> bool:
+    return ast.unparse(call.func).split(".")[-1] == Parameter.__name__

@@ -42,6 +42,8 @@ def run_job(job: Job, out: Path, settings: Settings) -> dict[str, Any]:
 
     A job that cannot be done is a row with its reason, so that one bad file does not stop a hundred cells.
     """
+    if job.unusable:
+        return _about(job, "failed") | {"reason": job.unusable}
     folder = out / job.name
     try:
         key = job.key(settings.key)
@@ -74,7 +76,7 @@ def _about(job: Job, status: str) -> dict[str, Any]:
 
 def of_other_code(jobs: Iterable[Job], out: Path) -> list[str]:
     """The names of those jobs that another version of the program did before; they are done again."""
-    kept = {job.name: _kept(out / job.name) for job in jobs}
+    kept = {job.name: _kept(out / job.name) for job in jobs if not job.unusable}
     return [name for name, one in kept.items() if one and one.get("code") != source_digest()]
 
 

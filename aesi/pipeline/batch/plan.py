@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from aesi.data.reading import SUFFIXES
 from aesi.errors import CellError, InputError
@@ -35,6 +35,7 @@ class Job:
     specimen, at : which physical cell a check-up is of, and when; empty and None where it is none.
     soh : share of the cell file's capacity that the cell had in its discovery, or the day of the test; None for all of
     it.
+    unusable : why the job cannot be done, as far as the plan tells; empty where it can.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Job:
     specimen: str = ""
     at: float | None = None
     soh: Soh | None = None
+    unusable: str = ""
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -65,7 +67,8 @@ def read_plan(source: Path, cell: Path | None = None, soh: Soh | None = None) ->
     """The jobs of a folder or a table.
 
     cell : the BPX file (or model folder) of every job that names none.  soh : of every job that names none.
-    Raises InputError, one sentence, for what is missing.
+    What is missing of one job alone makes that `unusable`.  Raises InputError, one sentence, for what concerns the
+    whole plan, and where no job can be done.
     """
     if soh is not None:
         checked_soh(soh)
@@ -92,6 +95,8 @@ def read_plan(source: Path, cell: Path | None = None, soh: Soh | None = None) ->
         )
     if not jobs:
         raise InputError(f"{source} holds no cell: one subfolder each with its records, or a table of them.")
+    if all(job.unusable for job in jobs):
+        raise InputError(jobs[0].unusable)
     return tuple(job if job.soh is not None else replace(job, soh=soh) for job in jobs)
 
 
@@ -99,7 +104,7 @@ def _check_one_cell(source: Path, jobs: tuple[Job, ...]) -> None:
     """Raises InputError where check-ups of one specimen start from different cell files: what was lost between two is
     told from the same beginning, or it is the difference of the files."""
     first: dict[str, Job] = {}
-    for job in jobs:
+    for job in (each for each in jobs if not each.unusable):
         begun = first.setdefault(job.specimen, job) if job.specimen else job
         if job.cell != begun.cell and contents([job.cell]) != contents([begun.cell]):
             raise InputError(
@@ -116,11 +121,14 @@ def without_records(source: Path) -> tuple[str, ...]:
 
 
 def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
-    return tuple(
-        Job(each.name, _cell_in(each, cell), data)
-        for each in _subfolders(folder)
-        if (data := _records_in(each))
-    )
+    return tuple(_of_subfolder(each, cell) for each in _subfolders(folder) if _records_in(each))
+
+
+def _of_subfolder(folder: Path, cell: Path | None) -> Job:
+    try:
+        return Job(folder.name, _cell_in(folder, cell), _records_in(folder))
+    except InputError as error:
+        return Job(folder.name, Path(), (), unusable=str(error))
 
 
 def _subfolders(folder: Path) -> list[Path]:
@@ -173,12 +181,14 @@ def _jobs(table: Path, stream: TextIO, cell: Path | None) -> Iterator[Job]:
             f"{', '.join(header) or 'none'}."
         )
     for row in reader:
-        if None in row:
-            raise InputError(
-                f"{table}, line {reader.line_num}: more cells than the header has; several files of a cell are "
-                "separated by ;"
-            )
-        yield _job(_Row(table, row, reader.line_num), cell)
+        plan_row = _Row(table, row, reader.line_num)
+        name = plan_row.text("name")
+        if not name:
+            raise InputError(f"{plan_row.place}: name and data have to be given.")
+        try:
+            yield _job(plan_row, cell, name)
+        except InputError as error:
+            yield Job(name, Path(), (), unusable=str(error))
 
 
 @dataclass(frozen=True)
@@ -186,7 +196,7 @@ class _Row:
     """A row of a table, and where it stands, as sentences begin with."""
 
     table: Path
-    cells: Mapping[str, str | None]
+    cells: Mapping[str | None, Any]
     line: int
 
     @property
@@ -232,12 +242,17 @@ class _Row:
             raise InputError(f"{self.place}: {column}: {error}") from None
 
 
-def _job(row: _Row, cell: Path | None) -> Job:
+def _job(row: _Row, cell: Path | None, name: str) -> Job:
+    """Raises InputError, which begins with the place of the row, for what cannot be used of it."""
+    if None in row.cells:
+        raise InputError(
+            f"{row.place}: more cells than the header has; several files of a cell are separated by ;"
+        )
     own = row.files("cell")
     if not own and cell is None:
         raise InputError(f"{row.place}: no cell is named; add the column cell, or give --cell for all.")
-    name, data = row.text("name"), row.files("data")
-    if not name or not data:
+    data = row.files("data")
+    if not data:
         raise InputError(f"{row.place}: name and data have to be given.")
     missing = [path for path in (*own, *data, *row.files("test")) if not path.exists()]
     if missing:

@@ -6,8 +6,9 @@ Nothing here looks at `Split.test`.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 from aesi.conformal import Calibrated, FreeRunBands, RefittedIntervals
@@ -43,6 +44,10 @@ class Fitted:
     trials: tuple[Mapping[str, Any], ...] = ()
 
 
+KeepModel = Callable[[str, Callable[[], Fitted]], Fitted]
+"""Name of a model and its fit -> the model, from an earlier fit to the same where there is one."""
+
+
 @dataclass(frozen=True, eq=False)
 class FinalModels:
     """fitted : in the experiment's order.  unfitted : a sentence each baseline that could not be fitted."""
@@ -75,27 +80,36 @@ def build_problem(loaded: Loaded, config: ExperimentConfig) -> Problem:
     return Problem.build(loaded.split, options, left_out=loaded.left_out.parts)
 
 
-def final_models(problem: Problem, chosen: Candidate, config: ExperimentConfig) -> FinalModels:
+def _anew(name: str, fit: Callable[[], Fitted]) -> Fitted:
+    return fit()
+
+
+def final_models(
+    problem: Problem, chosen: Candidate, config: ExperimentConfig, keep: KeepModel = _anew
+) -> FinalModels:
     """The chosen candidate's two ensembles, and the baselines that the experiment names, in its order.
 
+    keep : asked for each baseline; what else there is takes no fit.
     A baseline that cannot be fitted is left out: it is what the rest is compared with, and no reason to lose the
     search. Raises FitError where nothing else is to be judged.
     """
     fitted, unfitted = [], []
     for name in config.models:
-        started = time.monotonic()
-        trials: list[Mapping[str, Any]] = []
+        fit = partial(_fit, name, problem, chosen, config)
         try:
-            model, terms = _model(
-                name, problem, chosen, replace(_tuning(problem, config), told=trials.append)
-            )
+            fitted.append(keep(name, fit) if name in BASELINES else fit())
         except FitError as error:
             unfitted.append(f"{name} could not be fitted and is left out: {error}")
-        else:
-            fitted.append(Fitted(model, terms, time.monotonic() - started, trials=tuple(trials)))
     if not fitted:
         raise FitError(" ".join(unfitted))
     return FinalModels(tuple(fitted), tuple(unfitted))
+
+
+def _fit(name: str, problem: Problem, chosen: Candidate, config: ExperimentConfig) -> Fitted:
+    started = time.monotonic()
+    trials: list[Mapping[str, Any]] = []
+    model, terms = _model(name, problem, chosen, replace(_tuning(problem, config), told=trials.append))
+    return Fitted(model, terms, time.monotonic() - started, trials=tuple(trials))
 
 
 def _model(name: str, problem: Problem, chosen: Candidate, tuning: Tuning) -> tuple[ErrorModel, int]:

@@ -218,7 +218,8 @@ class SearchConfig(Section):
     warm_start : begin with a few plain candidates (strong ridge on the whole library).
     top_share : of the resamples, the best of which make an ensemble, and of the candidates, the fittest of which are
     averaged where corrections are not shrunk (`library.fade`).
-    timeout_s, memory_mb : what one candidate may take before it counts as failed.
+    timeout_s, memory_mb : what one candidate may take before it counts as failed; memory on Linux, and under Dask for
+    each thread of a worker, whose threads share what they may take together.
     """
 
     candidates: Count = 40

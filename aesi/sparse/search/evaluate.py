@@ -70,7 +70,7 @@ class Candidate:
     pearson_train, pearson_valid : correlation of error and prediction of AESI I, in free run (on training
     rows, started anew with each fold).
     free_run_valid_mser_pct, one_step_valid_rmse_v : of AESI I on the validation records (of the fold models
-    on the folds where there are none).
+    on the folds where there are none); the first against the physics that is corrected.
     fold_sums : (2, n_folds, 3) for `aesi.sparse.search.pick.nested`, of AESI I and II.
     members : the candidates that this one is the mean of (average.py); none where it is one by itself.
     """

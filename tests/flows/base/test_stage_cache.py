@@ -52,10 +52,14 @@ def test_without_reuse_it_is_computed_and_kept(workspace, counted, said):
     assert len(stored(workspace)) == 1
 
 
-def test_what_is_no_data_is_not_kept(workspace, said):
+def test_what_is_no_data_is_not_kept_and_said(workspace, said):
     fitted = object()
     assert Cache(said.append).get("models", ("a",), lambda: fitted) is fitted
     assert not stored(workspace)
+    assert said == [
+        "cache: the result of 'models' is not kept, and made again where it is wanted "
+        "(a builtins.object is not data)."
+    ]
 
 
 def test_a_full_disk_is_said_and_costs_nothing_else(workspace, said, monkeypatch):

@@ -86,6 +86,21 @@ def test_a_benchmark_that_was_killed_was_tracked_as_running_for_ever(tracked):
     }
 
 
+def test_counts_in_the_rows_of_cases_were_not_tracked(tracked):
+    def judge(spec):
+        return {"case": spec, "ours_s": 0.5, "verdict": "found", "simulations": 120, "silent": True}
+
+    cases = Cases("small", 0, ["a"], judge, lambda rows: {"summary": True, "no_worse": 17}, ("verdict",))
+    list(of_cases(cases))
+    store = Store()
+    runs = store.runs(store.find_experiment("small"), "")
+    found = {run.data.tags[KIND]: run.data.metrics for run in runs}
+    assert found == {
+        "run": {"no_worse": 17.0},
+        "case": {"ours_s": 0.5, "simulations": 120.0, "silent": 1.0},
+    }
+
+
 @pytest.mark.slow
 def test_two_dask_workers_share_the_work_evenly(workspace):
     smoke = Path(__file__).resolve().parents[3] / "experiments" / "smoke.yaml"
@@ -225,12 +240,21 @@ def test_a_history_is_read_as_it_was_written(tmp_path):
         ({"ratio": 1.0, "rmse_mv": 1.0}, 2),
         ({"ratio": 1.0, "case": "another"}, 0),
         ({"ratio": None}, 0),
+        ({"ratio": float("nan")}, 1),
+        ({"rmse_mv": float("inf")}, 1),
     ],
 )
 def test_what_is_worse_than_when_it_was_last_recorded_is_named(now, worse):
     found = regressions([entry("2025-01-01", ratio=1.0), entry()], [{**SPEED, **now}])
     assert len(found) == worse
     assert all("espm (drive): " in text and "2026-01-01, abcdef0" in text for text in found)
+
+
+@pytest.mark.parametrize(("now", "worse"), [(-5.0, 0), (-4.9, 0), (-5.1, 0), (-5.2, 1), (1.0, 0)])
+def test_a_negative_figure_was_worse_than_itself(now, worse):
+    line = {"bench": "design", "setting": "paper", "aesi_i_mean_pct": -5.0}
+    recorded = Entry("2026-01-01", "abcdef0", "a machine", 0.5, (line,))
+    assert len(regressions([recorded], [line | {"aesi_i_mean_pct": now}])) == worse
 
 
 def test_a_benchmark_that_nobody_watches_is_recorded_again():

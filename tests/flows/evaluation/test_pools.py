@@ -12,6 +12,7 @@ import pytest
 from aesi.errors import FitError, InputError
 from aesi.records import Failed
 from flows.evaluation.local_pool import LocalPool
+from flows.evaluation.pool import guarded
 
 
 def behave(genome):
@@ -124,6 +125,7 @@ def test_closing_ends_the_processes_at_once(pool):
 ORPHANS = """
 import os, time, sys
 from flows.evaluation.local_pool import LocalPool
+from flows.evaluation.pool import guarded
 pool = LocalPool(lambda: time.sleep, 2, 600, 1000)
 pool.start(0, 600)
 print(*[p.process.pid for p in pool._processes], flush=True)
@@ -150,7 +152,7 @@ def test_without_dask_it_says_what_to_install(monkeypatch):
 
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(InputError, match=r"pip install 'dask\[distributed\]'"):
-        DaskPool("{}", "", None, workers=1, timeout_s=1.0)
+        DaskPool("{}", "", None, workers=1, timeout_s=1.0, memory_mb=500)
 
 
 def test_a_worker_that_lives_on_evaluated_on_the_data_of_an_earlier_study(monkeypatch):
@@ -199,7 +201,7 @@ def dask_pool(monkeypatch):
         made = []
 
         def make(timeout_s):
-            made.append(dask_pool.DaskPool("{}", "", None, workers=1, timeout_s=timeout_s))
+            made.append(dask_pool.DaskPool("{}", "", None, workers=1, timeout_s=timeout_s, memory_mb=500))
             return made[-1]
 
         yield make
@@ -219,3 +221,21 @@ def test_a_hang_on_dask_is_cut_off_on_its_own_worker(dask_pool, monkeypatch):
     )
     assert outcomes(pool, [3.0, 0.1]) == [Failed("took longer than 1.5 s", of_machine=True), 0.1]
     assert restarted == list(pool._client.scheduler_info()["workers"])
+
+
+def evaluate_hungrily(content, base, study, genome):
+    """A genome says how many numbers it takes."""
+    from flows.base import codec
+
+    return codec.dumps(guarded(behave, ("eat", codec.loads(genome))))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is limited on Linux")
+def test_what_a_candidate_may_take_of_memory_did_not_count_on_dask(dask_pool, monkeypatch):
+    import resource
+
+    monkeypatch.setattr("flows.evaluation.dask_pool.evaluate_bytes", evaluate_hungrily)
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    eaten = 150_000_000  # 1.2 GB of the 500 MB that it may take
+    assert outcomes(dask_pool(5.0), [eaten, 1000]) == [Failed("ran out of memory (search.memory_mb)"), 1000.0]
+    assert resource.getrlimit(resource.RLIMIT_AS) == before

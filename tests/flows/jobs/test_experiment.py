@@ -18,6 +18,7 @@ METRICS = {
     "pearson/train",
     "pearson/valid",
     "free_run/valid_mser_pct",
+    "free_run/valid_mser_recalibrated_pct",
     "one_step/valid_rmse_mv",
     "intervals/valid_coverage_pct",
     "intervals/valid_width_v",
@@ -264,6 +265,21 @@ def test_a_baseline_that_cannot_be_fitted_ended_a_run_after_its_search(run):
     _, parent, _ = tracked_runs()
     assert parent.data.tags["aesi.unfitted"] == note
     assert note in tables_of("smoke")
+
+
+def test_a_baseline_was_searched_again_by_every_run_that_went_on(run, monkeypatch, capsys):
+    from aesi.sparse.baselines import BASELINES
+
+    models = 'models=["ESPM", "AESI I", "SINDy-C", "gradient boosting"]'
+    first = run(models)
+    said = capsys.readouterr().err
+    assert said.count("'model gradient boosting' is not kept") == 1
+    assert {"validation: done", "comparison: done"} <= set(re.findall(r"\w+: done", said))
+    monkeypatch.setitem(BASELINES, "SINDy-C", lambda *_: pytest.fail("it was searched again"))
+    again = run(models)
+    assert "model SINDy-C: from the cache" in capsys.readouterr().err
+    one, two = (json.loads((folder / "summary.json").read_text())["models"] for folder in (first, again))
+    assert [row["free_run"] for row in one] == [row["free_run"] for row in two]
 
 
 def test_two_workers_give_the_candidates_of_one(run, finished):

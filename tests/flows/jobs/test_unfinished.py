@@ -3,6 +3,7 @@
 import time
 from contextlib import ExitStack
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -140,6 +141,30 @@ def test_a_run_that_others_work_on_is_neither_closed_nor_delivered(store, unfini
     assert said == []
     assert (box / "00000001.json").exists()
     assert record.again().status == "running"
+
+
+def test_a_file_that_a_job_left_over_was_sought_from_the_folder_of_the_next(
+    store, workspace, monkeypatch, capsys
+):
+    there, elsewhere = workspace / "there", workspace / "elsewhere"
+    for folder in (there, elsewhere):
+        folder.mkdir()
+    (there / "report.html").write_text("found")
+    monkeypatch.chdir(there)
+    with monkeypatch.context() as away:
+        away.setattr("flows.tracking.tracker.deliver", _away)
+        tracker = Tracker(store, Subject("job", 0, "key"), print)
+        tracker.files(Path("report.html"))
+        assert tracker.end("FINISHED", wait_s=0.0) > 0
+    monkeypatch.chdir(elsewhere)
+    with tracked_job(Subject("another", 0, "key"), "title", Console()):
+        pass
+    assert f"what run {tracker.run_id[:8]} had left over is delivered" in capsys.readouterr().err
+    assert [one.path for one in store.client.list_artifacts(tracker.run_id)] == ["report.html"]
+
+
+def _away(store, item, again):
+    raise ConnectionError("away")
 
 
 def test_a_run_that_ended_while_its_lock_was_asked_for_was_closed_as_killed(

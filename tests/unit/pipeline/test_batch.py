@@ -38,8 +38,7 @@ def test_a_folder_is_one_cell_a_subfolder(tmp_path):
     jobs = read_plan(tmp_path, CELL)
     assert [(job.name, job.cell, len(job.data)) for job in jobs] == [("a", CELL, 2), ("b", own, 1)]
     assert without_records(tmp_path) == ("notes",)
-    with pytest.raises(InputError, match="--cell"):
-        read_plan(tmp_path)
+    assert "--cell" in read_plan(tmp_path)[0].unusable
 
 
 def test_records_of_some_kinds_were_passed_over_and_what_systems_lay_beside_them_read(tmp_path):
@@ -122,6 +121,35 @@ def test_a_table_that_cannot_be_used_is_one_sentence(tmp_path, content, words):
     table.write_text(content)
     with pytest.raises(InputError, match=words):
         read_plan(table, CELL)
+
+
+def test_a_line_that_cannot_be_used_ended_the_whole_batch(tmp_path):
+    touched(tmp_path / "s.csv")
+    table = tmp_path / "plan.csv"
+    table.write_text(
+        "name,data,soc0,specimen,at\ngood,s.csv,0.9,,\ngone,nowhere.csv,,,\nhigh,s.csv,90,,\nhalf,s.csv,,one,\n"
+        "long,s.csv,,,,t.csv\n"
+    )
+    jobs = {job.name: job for job in read_plan(table, CELL)}
+    assert not jobs["good"].unusable
+    for name, words in (
+        ("gone", "line 3: there is no file"),
+        ("high", "line 4: soc0 = 90"),
+        ("half", "line 5: a check-up has a specimen and an at"),
+        ("long", "line 6: more cells than the header has"),
+    ):
+        row = run_job(jobs[name], tmp_path / "out", Settings())
+        assert row["status"] == "failed"
+        assert words in row["reason"]
+    assert of_other_code(jobs.values(), tmp_path / "out") == []
+
+
+def test_a_subfolder_without_a_cell_file_ended_the_whole_batch(tmp_path):
+    for name in ("a/1.csv", "a/a.bpx.json", "b/1.csv"):
+        touched(tmp_path / name)
+    good, bad = read_plan(tmp_path)
+    assert not good.unusable
+    assert "holds no BPX file" in bad.unusable
 
 
 def test_a_cell_file_that_is_not_there_is_told_once_not_job_by_job(tmp_path):

@@ -21,7 +21,8 @@ from aesi.numerics.metrics import rms, rmse
 from aesi.numerics.typing import Array
 from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.intervals.bands import error_ahead, reach
-from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
+from aesi.pipeline.experiment.judging.reductions import AGAINST
+from aesi.pipeline.experiment.physics_models import DECLARED
 from aesi.pipeline.product.trained import outside_trained, trained_figures, trained_on
 from aesi.pipeline.report.views import ModelVoltage, RecordTrace
 from aesi.records import ROLES, ErrorSeries, FreeRun, Role, Split
@@ -109,7 +110,7 @@ def _row(one: Fitted, judged: Mapping[Role, Sequence[_Judged]], seconds: float) 
             continue
         error = _joined(r.series.error_v for r in records)
         left = error - _joined(r.free.error_v for r in records)
-        for key, against in (("mser_pct", DECLARED), ("mser_recalibrated_pct", RECALIBRATED)):
+        for key, against in AGAINST.items():
             physics = _joined(r.series.left_by(against) for r in records)
             free[f"{role}_{key}"] = 100.0 * (1.0 - float(np.mean(left**2) / np.mean(physics**2)))
         free[f"{role}_rmse_mv"] = MV_PER_V * rmse(error, _joined(r.free.error_v for r in records))
