@@ -124,6 +124,6 @@ def test_the_slopes_follow_a_shared_course(start, records):
         jacobian = each.jacobian(x)
         for j in each.layout.ages:
             step = np.zeros_like(x)
-            step[j] = 1e-4
-            slope = (each.residual(x + step) - each.residual(x - step)) / 2e-4
+            step[j] = 1e-2  # residuals jump by some 1e-5 where the solver takes another step
+            slope = (each.residual(x + step) - each.residual(x - step)) / 2e-2
             assert np.abs(jacobian[:, j] - slope).max() < 0.01 * np.abs(slope).max()
