@@ -40,10 +40,8 @@ class Cache:
         result = compute()
         try:
             write_whole(path, codec.dumps(result))
-        except codec.Uncodable as error:  # a fitted object of another library would be unsafe to unpickle
-            self._say(
-                f"cache: the result of {stage!r} is not kept, and made again where it is wanted ({error})."
-            )
+        except codec.Uncodable:  # a fitted object of another library would be unsafe to unpickle
+            self._say(f"{stage}: not kept for a resumed run, which makes it again")
         except OSError as error:
             self._say(f"cache: the result of {stage!r} could not be stored ({error.strerror or error}).")
         return result

@@ -56,10 +56,7 @@ def test_what_is_no_data_is_not_kept_and_said(workspace, said):
     fitted = object()
     assert Cache(said.append).get("models", ("a",), lambda: fitted) is fitted
     assert not stored(workspace)
-    assert said == [
-        "cache: the result of 'models' is not kept, and made again where it is wanted "
-        "(a builtins.object is not data)."
-    ]
+    assert said == ["models: not kept for a resumed run, which makes it again"]
 
 
 def test_a_full_disk_is_said_and_costs_nothing_else(workspace, said, monkeypatch):
