@@ -39,7 +39,7 @@ from aesi.physics.cell import Cell
 from aesi.physics.cell.energies import SPAN_K
 from aesi.physics.cell.health import day_of
 from aesi.physics.depletion import ran_out
-from aesi.records import Measurement, Spectrum
+from aesi.records import Measurement, Spectrum, measured_on_case
 
 EVALUATIONS = 100
 """At most: the descents to the shipped files of the Panasonic NCR18650PF and of the LG 18650HG2 end before."""
@@ -150,7 +150,7 @@ def problem(
             else "a single record does not tell how the cell answers to temperature"
         )
         told = (*told, f"{apart}: activation energies and entropy stay as they are.")
-    on_case = any(r.kelvin is not None and np.ptp(r.kelvin) > 0.0 for r in ready)
+    on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in ready)
     start = with_interfaces(start, on_case)
     ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
     model = Model(

@@ -29,6 +29,8 @@ LEAST_RISE_K = 2.0
 AMBIENT_SD_K = 5.0
 """Of the surroundings about where a cell starts, beside records that count as one reading each. Loose: with a tenth of
 it what is left of the measured temperatures is 0.15 and 0.32 K (LG HG2, Panasonic) instead of 0.12 and 0.31."""
+SURROUNDINGS_UNIT = 0.1
+"""Of their deviation, that a step of the surroundings is worth in the descent: half a kelvin."""
 READING_K = 0.3
 """Of a thermocouple."""
 TYPICAL_W_K = 0.1
@@ -77,11 +79,11 @@ def fitted(cell: Cell, records: Sequence[Prepared], start_j_k: float) -> HeatFit
         parts = []
         for (record, watts), shift in zip(driven, z[2:], strict=True):
             assert record.kelvin is not None
-            ambient = record.kelvin[0] + AMBIENT_SD_K * shift
+            ambient = record.kelvin[0] + SURROUNDINGS_UNIT * AMBIENT_SD_K * shift
             winding = temperature_k(record.rows.time_s, watts, record.kelvin[0], ambient, capacity, through)
             course = ambient + share * (winding - ambient)
             parts.append((course - record.kelvin) / READING_K / len(course) ** 0.5)
-        return np.concatenate([*parts, z[2:]])
+        return np.concatenate([*parts, SURROUNDINGS_UNIT * z[2:]])
 
     z = least_squares(off, np.zeros(2 + len(driven)), loss="soft_l1").x
     rows = sum(len(watts) for _, watts in driven)

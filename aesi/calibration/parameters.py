@@ -251,8 +251,8 @@ def course(side: str, what: str, place: int) -> str:
 def with_interfaces(cell: Cell, on_case: bool = False) -> Cell:
     """The cell with typical contacts and films where its file has none: a calibration moves them from there.
 
-    on_case : a temperature was measured on the case, to which heat is conducted from within. One that never moves was
-    stated: it is a chamber's, or what the cell was taken to be at.
+    on_case : a temperature was measured on the case (`aesi.records.measured_on_case`), to which heat is conducted from
+    within.
     """
     if on_case and cell.thermal_conductivity_w_m_k is None:
         cell = replace(cell, thermal_conductivity_w_m_k=CONDUCTIVITY_W_M_K)

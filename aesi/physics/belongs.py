@@ -122,7 +122,8 @@ def check_measured(cell: Cell, records: Sequence[Measurement]) -> None:
     for record in records:
         _check_window(cell, record)
         check_voltage(cell, record)
-        check_belongs(cell, [record])
+        if np.all(np.isfinite(record.voltage_v)):
+            _check_capacity(cell, record)
 
 
 def check_belongs(cell: Cell, records: Iterable[Measurement]) -> None:

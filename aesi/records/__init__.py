@@ -13,6 +13,7 @@ from aesi.records.measurement import (
     at_its_temperature,
     digest,
     hold_sentence,
+    measured_on_case,
 )
 from aesi.records.run import Run
 from aesi.records.split import ROLES, HeldOutDrive, LeftOutDrives, Role, Split
@@ -36,4 +37,5 @@ __all__ = [
     "at_its_temperature",
     "digest",
     "hold_sentence",
+    "measured_on_case",
 ]

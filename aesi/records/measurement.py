@@ -43,10 +43,15 @@ def hold_sentence(
     return f"{name}: the current is taken {words[hold]}{writer}; {option}{other} takes it otherwise."
 
 
+def measured_on_case(temperature_degc: Array) -> bool:
+    """Was this column (n,) measured? One that never moves was stated: a chamber's, or what a cell was taken at."""
+    return bool(np.ptp(temperature_degc) > 0.0)
+
+
 def at_its_temperature(temperature_degc: Array) -> str:
-    """What a record with this column (n,) is taken at, for a reader. One that never moves was stated, not measured."""
+    """What a record with this column (n,) is taken at, for a reader."""
     low, high = float(np.min(temperature_degc)), float(np.max(temperature_degc))
-    if low == high:
+    if not measured_on_case(temperature_degc):
         return f"at {low:.4g} degC in every row, as its column states"
     return f"at its measured temperature, {low:.1f} to {high:.1f} degC"
 

@@ -80,9 +80,9 @@ class MemoryOfThreads:
     def limited(self, memory_mb: float, threads: int) -> Iterator[None]:
         """Within, the process may take that much for each of its threads beyond what it has."""
         with self._lock:
-            self._inside += 1
-            if self._inside == 1:
+            if not self._inside:
                 self._before = limit_memory(threads * memory_mb)
+            self._inside += 1
         try:
             yield
         finally:

@@ -31,9 +31,8 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
     console.say(f"{config.name}: {config.note}" if config.note else config.name)
     store = Store(config.tracking.uri)
     with working_on(request, store, console) as tracker:
-        from flows.jobs.experiment_stages import (
-            ExperimentJob,
-        )  # seconds, which the line above is not kept for
+        # Seconds, which the first line of a run is not kept for.
+        from flows.jobs.experiment_stages import ExperimentJob
 
         folder = ExperimentJob(request, tracker, run, console, started).results()
     console.say(f"Finished in {duration(time.monotonic() - started)}.")

@@ -32,8 +32,8 @@ class Stages(Protocol):
     """Runs the stages of a job, and shows what comes of them where there is somebody to show it."""
 
     def __call__(self, name: str, work: Callable[[], T], retries: int = 0) -> T:
-        """One stage: its name, a function of nothing, and how often it may be tried again where a network or a disk
-        failed (OSError); bad input is not."""
+        """One stage: its name, a function of nothing, and how often it may be tried again where a disk or a network
+        failed (OSError); bad input is not, nor data that cannot be fetched, which a fallback may stand in for."""
         ...
 
     def progress(self, name: str, done: int, total: int) -> None:

@@ -89,6 +89,8 @@ def zero_of(cell: Cell, records: Sequence[Measurement]) -> Zero:
 def _of_cycle(cell: Cell, data: Measurement) -> tuple[float, float] | None:
     """(1) and its standard deviation, A; None of a record that is no cycle from full to full."""
     flows = flowing(data.current_a)
+    if not flows.any():
+        return None
     steps_s = np.diff(data.time_s, prepend=data.time_s[0])
     moved_ah = steps_s * data.current_a / SECONDS_PER_HOUR
     each_way = min(moved_ah[moved_ah > 0.0].sum(), -moved_ah[moved_ah < 0.0].sum())

@@ -5,8 +5,8 @@
 over the initial state of charge (one shift for all records), the contact resistance, factors of the solid
 diffusivities, of the reaction rates and of the electrolyte's conductivity and diffusivity, the balance of the
 electrodes, and the shape of their potentials over the state of charge. d_j is what a parametrisation leaves open that
-is to serve other drives as well (`deviations.KNOBS`), s what the model misses anyway, at least what the fit leaves, T
-the time over which it misses the same.
+is to serve other drives as well (`deviations.KNOBS`), s what the model misses anyway, about what the fit leaves but
+no less than 10 mV, T the time over which it misses the same.
 
 All of it was measured by the squared error that it takes off drives not trained on, over the ten development splits
 of the NMC drive in `aesi bench splits` (mean, worst). A drive says little of the charge until it ends, so the initial

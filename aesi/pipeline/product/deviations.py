@@ -96,7 +96,7 @@ class PhysicsStart:
         return same_rest(self.declared, self.cell, soc0 + self.shift)
 
     def simulate(self, record: Measurement, soc0: float, hold: Hold) -> Run:
-        """The record under this physics; where it runs empty, stoichiometries are held and `depleted` says so."""
+        """The record under this physics; where it runs empty, it is clipped (`simulate`) and `depleted` says so."""
         return simulate(
             self.cell,
             record.time_s,
@@ -151,7 +151,7 @@ def slopes_v(
 ) -> Array:
     """(n, n_slopes) V a deviation, how the voltage_v (n,) of the record under the cell moves with each knob and film.
 
-    soc0 : in the windows of the cell.  Where a neighbour runs empty its stoichiometries are held.
+    soc0 : in the windows of the cell.  Where a neighbour runs empty it is clipped (`simulate`).
     """
     one_each = np.eye(len(ENERGIES_J_MOL))
     moved = (deviating(cell, effects, range(len(one_each)), STEP * one, model) for one in one_each)

@@ -67,14 +67,14 @@ def trained_sentence(name: str, figures: Mapping[str, Any], *, one_step: bool = 
     """What the figures say of a record of that name, predicted in free run or one step ahead."""
     share, kept = figures["outside_pct"], figures["kept_pct"]
     head = f"{name}: {_share(share)} of the rows lie outside the range the correction was trained on"
-    if kept is None:
-        return f"{head}; its inputs are held at the edge there." if share else f"{head}."
-    if kept >= ALL_PCT:
-        return f"{head}."
     where, beyond = "", figures["beyond_k"] or 0.0
     if abs(beyond) >= TELLING_K:
         side = "below" if beyond < 0 else "above"
         where = f"at {figures['mean_degc']:.1f} degC, {_kelvin(abs(beyond))} {side} what it was trained at, "
+    if kept is None:
+        return f"{head}; {where}inputs beyond it are held at its edge." if share else f"{head}."
+    if kept >= ALL_PCT:
+        return f"{head}."
     if kept >= NONE_PCT:
         return f"{head}; {where}it has faded to {_share(kept)} of itself in the mean, the rest is left to the physics."
     alone = "the physics model and its last measured error" if one_step else "the physics model"

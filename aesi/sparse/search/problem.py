@@ -28,7 +28,7 @@ from aesi.sparse.search.rows import (
     nearness_of_left_out,
     training_rows,
 )
-from aesi.sparse.search.unseen import unseen_errors
+from aesi.sparse.search.unseen import judged_unseen, unseen_errors
 from aesi.sparse.terms.library import Library
 from aesi.sparse.terms.scaling import Outside
 
@@ -123,8 +123,7 @@ class Problem(TrainingRows, Factors):
         n = len(rows.target)
         block = _checked_block(options.block, rows.spans)
         folds = _checked_pieces(left_out_pieces(rows.spans, options.fold, options.cuts), options.fold)
-        drives_left_out = options.fold is None and len(left_out) == len(folds)
-        if not drives_left_out or options.feedback:  # pieces of a single record, or terms that hold the error
+        if not judged_unseen(options.fold, options.feedback, len(left_out), len(folds)):
             left_out = ()
         unseen = unseen_errors(left_out, rows.scaling, rows.error, rows.target, folds)
         row_weights = balanced_weights(rows.spans, rows.target - rows.zero) if options.balance else np.ones(n)

@@ -29,6 +29,15 @@ class UnseenErrors:
     target: Array
 
 
+def judged_unseen(fold: object, feedback: bool, parts: int, folds: int) -> bool:
+    """Are folds judged by the error of physics that has not seen them?
+
+    Not where they are pieces of a `fold` length, or terms hold the error itself, and only where there is a left-out
+    part for each.
+    """
+    return fold is None and not feedback and parts == folds
+
+
 def unseen_errors(
     left_out: Sequence[HeldOutDrive], scaling: Scaling, error: Array, target: Array, folds: Sequence[Span]
 ) -> UnseenErrors:

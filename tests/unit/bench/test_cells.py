@@ -43,12 +43,16 @@ def test_windows_start_from_rest_at_the_charge_that_has_passed():
 
 
 def test_a_record_that_a_tester_holds_at_the_cut_off_says_from_which_row_on():
-    data = drawn(1.0)
+    data = drawn(1.0)  # of 720 rows
+    at_cut_off = CELL.lower_voltage_v + 0.003
     assert held_from(CELL, data) is None
     voltage = data.voltage_v.copy()
-    voltage[-60:] = CELL.lower_voltage_v + 0.003
+    voltage[-60::2] = at_cut_off
     assert held_from(CELL, replace(data, voltage_v=voltage)) == len(data) - 60
-    voltage[:-1] = data.voltage_v[:-1]  # a single row there is an end
+    voltage[13] = at_cut_off  # touched in bursts from early on
+    assert held_from(CELL, replace(data, voltage_v=voltage)) is None
+    voltage[:-1] = data.voltage_v[:-1]
+    voltage[-1] = at_cut_off  # where a discharge ends
     assert held_from(CELL, replace(data, voltage_v=voltage)) is None
 
 

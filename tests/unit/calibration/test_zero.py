@@ -72,3 +72,8 @@ def test_the_zero_is_taken_out_of_slow_records_alone(start, cycle):
     assert np.abs(taken).max() == pytest.approx(start.capacity_ah / 20.0, abs=2.0 * zero.sd_a)
     fast = replace(cycle, current_a=20.0 * cycle.current_a)
     assert zero.taken_out(fast, start.nominal_capacity_ah) is fast
+
+
+def test_a_record_of_rest_alone_ended_with_an_index_that_is_out_of_bounds(start, cycle):
+    rest = replace(cycle, current_a=np.zeros(len(cycle)))
+    assert zero_of(start, [rest]).sentences == ()

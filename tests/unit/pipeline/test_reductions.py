@@ -17,6 +17,7 @@ from aesi.pipeline.experiment.judging.evaluate import evaluate_models
 from aesi.pipeline.experiment.judging.reductions import AGAINST, valid_reductions, valid_shares
 from aesi.pipeline.experiment.load import load
 from aesi.sparse import Candidate, Genome, evaluate
+from aesi.sparse.search.fold_models import fold_samples
 
 
 @pytest.fixture(scope="module")
@@ -66,3 +67,32 @@ def test_without_validation_records_the_pieces_count_that_candidates_are_judged_
     declared = sum(np.sum(series.left_by("ESPM")[1:] ** 2) for series in loaded.split.train)
     assert shares["mser_pct"] == pytest.approx(corrected / declared)
     assert valid_reductions(candidate, shares)["mser_pct"] > 99.0
+
+
+@pytest.mark.parametrize("feedback", [False, True])
+def test_the_error_that_a_candidate_is_judged_by_was_that_of_physics_that_the_search_did_not_use(
+    record, feedback
+):
+    library = {
+        "inputs": ["I"],
+        "p_c": [0, 1],
+        "d": [1, 1],
+        "special": False,
+        "fade": False,
+        "feedback": feedback,
+    }
+    data = {"kind": "files", "record": str(record)}
+    data |= {"repeats": {"period_s": PERIOD_S, "train": [1, 3, 5], "test": [2, 4]}}
+    config = experiment(
+        record, data=data, library=library, cell={"bpx": str(BPX), "soc0": SOC0, "start": "recalibrated"}
+    )
+    loaded = load(config)
+    problem = build_problem(loaded, config)
+    by_search = (problem.scaling.error_volts_per_unit * (problem.unseen_target - problem.zero)) ** 2
+    declared = sum(
+        float(np.sum(part.take(rows).left_by("ESPM") ** 2))
+        for (part, rows) in (fold_samples(problem, a, b) for a, b in problem.folds)
+    )
+    assert valid_shares(problem, loaded.left_out)["mser_pct"] == pytest.approx(
+        float(by_search.sum()) / declared, rel=1e-3
+    )

@@ -17,6 +17,7 @@ from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
 from aesi.records import ErrorSeries, LeftOutDrives
 from aesi.sparse import Candidate, Problem
 from aesi.sparse.search.fold_models import fold_samples
+from aesi.sparse.search.unseen import judged_unseen
 
 AGAINST = {"mser_pct": DECLARED, "mser_recalibrated_pct": RECALIBRATED}
 """How a reduction is called -> the physics whose error it is of, in the rows of models and of candidates alike."""
@@ -40,11 +41,12 @@ def valid_reductions(candidate: Candidate, shares: Mapping[str, float]) -> dict[
 
 def _judged_pieces(problem: Problem, left_out: LeftOutDrives) -> Iterator[ErrorSeries]:
     """The samples on which candidates are judged, without the measured ones that free runs start from; left-out pieces
-    under physics that has not seen them, as in the search (`aesi.sparse.search.unseen`)."""
+    under physics that has not seen them, where the search judges so."""
     if problem.split.valid:
         yield from (record.take(slice(1, None)) for record in problem.split.valid)
         return
-    unseen = problem.options.fold is None and len(left_out.parts) == len(problem.folds)
+    options = problem.options
+    unseen = judged_unseen(options.fold, options.feedback, len(left_out.parts), len(problem.folds))
     for number, (a, b) in enumerate(problem.folds):
         record, rows = fold_samples(problem, a, b)
         yield (left_out.parts[number].series if unseen else record).take(rows)

@@ -174,9 +174,9 @@ def outside_finding(model: Row) -> str:
     if not share:
         return ""
     return (
-        f"{share:.1f} % of the test samples lie outside the range the correction was trained on; its inputs are "
-        "held at the edge there. Its bands in free run are wider there by what it would add if it went on beyond the "
-        "edge; no data has calibrated that."
+        f"{share:.1f} % of the test samples lie outside the range the correction was trained on; inputs beyond it "
+        "are held at its edge. Its bands in free run are wider by what it would add if it went on beyond the edge; no "
+        "data has calibrated that."
     )
 
 
