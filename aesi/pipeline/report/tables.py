@@ -97,8 +97,8 @@ def free_run_band_table(models: Sequence[Row]) -> Table:
         "Prediction bands on the test set. Regime: the measured voltage is given once, the stated time before "
         f"the sample that is predicted, and not again; whole drive: a free run from the first sample. {WORST_BIN} "
         "Inside: of the samples within the trained range, of temperature too; outside of it the band is wider by how "
-        "far the model would go on, which is not calibrated. Pieces: how many calibrated the band, and the lowest coverage "
-        "among them when each is left out; one drive may scatter as far."
+        "far the model would go on, which is not calibrated. Pieces: how many calibrated the band, and the lowest "
+        "coverage among them when each is left out; one drive may scatter as far."
     )
     columns = [
         *_interval_columns("bands"),
