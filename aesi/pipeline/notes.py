@@ -119,7 +119,7 @@ def of_fitted(
     share = dict(cell.capacity_shares).get(record.name)
     if share is None:
         return ()
-    of_then = soh is None and f"{share:.3f}" != "1.000"
+    of_then = soh is None and round(share, 3) != 1.0
     said = [
         f"{record.name}: the cell's file was fitted to a record of this name"
         + (

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lead_effect import OWN
 
 import aesi
 from aesi.errors import ConfigError, InputError, NoNumberError, OwnEffectError, ParameterError
@@ -22,27 +23,6 @@ from aesi.records import Measurement
 from aesi.tracer import discover
 
 CELL = Path(__file__).resolve().parents[2] / "experiments" / "cells" / "nmc_30ah.bpx.json"
-OWN = '''"""Ohmic drop of a lead.
-
-    V = V_cell - I R      I > 0 on discharge
-
-Leaves out its inductance. Holds at any current.
-
-Source: Ohm's law.
-"""
-
-from aesi.parameters import Parameter
-from aesi.physics import Contribution, Effect
-
-PARAMETERS = {"lead_ohm": Parameter(1e-3, "ohm", (0.0, 0.01), "a lead", neutral=0.0, description="R")}
-
-
-def drop(trace, *, lead_ohm):
-    return Contribution(-lead_ohm * trace.current_a, {"lead_v": lead_ohm * trace.current_a})
-
-
-EFFECT = Effect("lead", "physics", __doc__, PARAMETERS, on_voltage=drop)
-'''
 LEAD_OHM = 1e-3
 SOC0 = 0.8
 TIME = np.arange(1800.0)

@@ -121,12 +121,14 @@ def without_records(source: Path) -> tuple[str, ...]:
 
 
 def _of_folder(folder: Path, cell: Path | None) -> tuple[Job, ...]:
-    return tuple(_of_subfolder(each, cell) for each in _subfolders(folder) if _records_in(each))
+    return tuple(
+        _of_subfolder(each, cell, data) for each in _subfolders(folder) if (data := _records_in(each))
+    )
 
 
-def _of_subfolder(folder: Path, cell: Path | None) -> Job:
+def _of_subfolder(folder: Path, cell: Path | None, data: tuple[Path, ...]) -> Job:
     try:
-        return Job(folder.name, _cell_in(folder, cell), _records_in(folder))
+        return Job(folder.name, _cell_in(folder, cell), data)
     except InputError as error:
         return Job(folder.name, Path(), (), unusable=str(error))
 

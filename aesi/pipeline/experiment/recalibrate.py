@@ -146,7 +146,8 @@ class _Fit:
         """What the model leaves, V RMS, at deviations z (n_free,) that it can be simulated at."""
         left = self._left(z)
         assert left is not None
-        return self.error_v * float(np.sqrt(np.mean(left**2) * MEMORY_S / self._every_s()))
+        _, every_s = _spacing(self.records[0].measurement)  # all are evenly sampled alike
+        return self.error_v * float(np.sqrt(np.mean(left**2) * MEMORY_S / every_s))
 
     def bounds(self) -> tuple[Array, Array]:
         low, high = np.full(len(KNOBS), -np.inf), np.full(len(KNOBS), np.inf)  # the prior is bound enough
@@ -190,11 +191,10 @@ class _Fit:
 
     def _of(self, physics: PhysicsStart, record: FitRecord) -> Array:
         data = record.measurement
-        dt_s = float(data.time_s[1] - data.time_s[0])
-        every = max(1, round(EVERY_S / dt_s))
+        every, every_s = _spacing(data)
         rows = np.flatnonzero(record.rows)[::every]
         run = physics.simulate(data, record.soc0, self.hold)
-        weight = np.sqrt(every * dt_s / MEMORY_S) / self.error_v
+        weight = np.sqrt(every_s / MEMORY_S) / self.error_v
         left: Array = weight * (data.voltage_v - run.voltage_v)[rows]
         return _without_own(left, weight * self._own_v[data.name][rows]) if self.own_charges else left
 
@@ -214,14 +214,16 @@ class _Fit:
             for r in self.records
         }
 
-    def _every_s(self) -> float:
-        t = self.records[0].measurement.time_s
-        dt_s = float(t[1] - t[0])
-        return max(1, round(EVERY_S / dt_s)) * dt_s
-
     def _ohm(self) -> float:
         """One deviation of the contact resistance."""
         return KNOBS[RESISTOR[0]].deviation / self.declared.nominal_capacity_ah
+
+
+def _spacing(data: Measurement) -> tuple[int, float]:
+    """How many rows, and how many s, lie between two that are fitted."""
+    dt_s = float(data.time_s[1] - data.time_s[0])
+    every = max(1, round(EVERY_S / dt_s))
+    return every, every * dt_s
 
 
 def _without_own(left: Array, own: Array) -> Array:
