@@ -22,10 +22,10 @@ BENCHMARKS = {
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""
 
-Case = TypeVar("Case")
+Chosen = TypeVar("Chosen")
 
 
-def some_chosen(name: str, cases: Sequence[Case], names: Iterable[str]) -> Sequence[Case]:
+def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Sequence[Chosen]:
     """The cases of a benchmark that its options chose.  Raises InputError where there is none: a summary of no case
     would look like a result.
 

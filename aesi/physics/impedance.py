@@ -72,7 +72,7 @@ def impedance(
         raise InputError(
             "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
         )
-    check_soc(soc)
+    check_soc(soc, "soc")
     frequency = np.atleast_1d(numbers(frequency_hz, "frequency_hz"))
     if frequency.ndim != 1 or not (
         np.isfinite(frequency).all() and (frequency > 0.0).all() and len(frequency)
