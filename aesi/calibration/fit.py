@@ -134,9 +134,9 @@ def problem(
     kept = [one_branch(start, data) for data in records]
     placed, told = with_temperatures(start, [data for data, _ in kept], conditions.temperatures_degc)
     start, typical = with_activation(start)
-    physics = conditions.physics or "espm"
+    model_name = conditions.model or "espm"
     cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
-    ready = prepared(start, placed, conditions.soc0, physics, conditions.same_cell, cut)
+    ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
     if conditions.soc0 is not None:
         told = (*told, *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut))
     for one in ready:
@@ -160,7 +160,7 @@ def problem(
         Shapes.over(start, span),
         zero,
         ageing,
-        physics,
+        model_name,
         spectra,
     )
     starts = (r.start.sentence for r in ready if not r.start.against_voltage)  # those are warnings

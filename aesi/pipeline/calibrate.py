@@ -81,10 +81,10 @@ def calibrate_files(
     check_posterior(asked.posterior)
     check_distinct_spectra(conditions.spectra, asked.impedance)
     given = declared_model(cell)
-    declared, model = given.cell, conditions.physics or given.model
+    declared, model = given.cell, conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
-    found = calibrate(declared, measurements, replace(conditions, physics=model))
+    found = calibrate(declared, measurements, replace(conditions, model=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
