@@ -1,4 +1,4 @@
-"""A hypothesis and one effect more: the effect's parameters by Gauss-Newton, all others to first order.
+"""Grow a hypothesis by one effect: the effect's parameters are fitted by Gauss-Newton, all others to first order.
 
     min over u of  min over z  |W (e(u) - J z)|^2 + |x + z|^2 + |u|^2        u of the effect, x + z of the parent   (1)
 
@@ -42,7 +42,7 @@ ROUNDS = 6
 
 @dataclass(frozen=True, eq=False)
 class Parent:
-    """A fitted hypothesis as what grows from it needs it: whitened once at each size of the model error."""
+    """A fitted hypothesis to grow effects on, with its sensitivities whitened once at each size of the model error."""
 
     problem: InverseProblem
     blocks: Blocks
