@@ -1,4 +1,4 @@
-"""What a cell at the beginning of a record relaxes to: how long it has rested, and after what, nobody knows.
+"""The voltage that a cell relaxes to, read from a record that begins with a rest of unknown length and history.
 
     V(t) = U + a g(t) + e,     a ~ N(0, C**2),     e ~ N(0, RELAXED_SHAPE_V**2)                            (1)
 
@@ -42,10 +42,10 @@ WITHIN = np.concatenate([[0.0], np.geomspace(0.02, 1.0, 8)])
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """How a record begins.
+    """The rest that a record begins with.
 
-    rows : before a load starts, or a smaller current has moved the state of charge; at least the first row.
-    flows : such a current goes on after them, and has likely flowed before.
+    rows : those before a load starts, or before a small current has moved the state of charge; at least the first row.
+    flows : a small current goes on after these rows, and has likely flowed before them.
     """
 
     rows: Measurement
@@ -87,9 +87,9 @@ def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, model: ModelNa
 
 
 def _explained(seen: Array, away: Array, rate_sd: float) -> tuple[float, float, float]:
-    """What is said of the means over parts of a rest by one history (nats), and mean (V) and variance of U by it.
+    """How well one history explains the means over parts of a rest (nats), and the mean (V) and variance of U by it.
 
-    seen, away : (p,) V about the last one, and V over C-rate.
+    seen : (p,) V, the means about the last voltage.  away : (p,) V over C-rate, those of g of (1) for this history.
     """
     slopes = np.column_stack([np.ones(len(seen)), away]) / RELAXED_SHAPE_V
     prior = np.diag([UNKNOWN_V**-2, rate_sd**-2])

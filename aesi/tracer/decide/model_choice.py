@@ -202,8 +202,8 @@ def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
 def most_names(single: Answer, max_effects: int) -> int:
     """How many effects a search with the porous electrode may name and still be believed over the single particle's.
 
-    All of `max_effects`, unless the single particle's answer leaves no model error beyond what two solvers differ by:
-    then nothing is left for further names to explain, and the porous electrode may name no more than that answer.
+    All of `max_effects`, unless the single particle explains the data without a model error beyond what two solvers
+    differ by: then nothing is left for further names to explain, and the porous electrode may name no more than it did.
     """
     chosen = single.path.chosen
     if single.verdict.word == "unknown" or chosen.score.delta_v > LEAST_V:

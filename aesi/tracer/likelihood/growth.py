@@ -250,9 +250,11 @@ class EffectGrowth:
 
 
 def promise(parent: Parent, slopes_v: Array) -> float:
-    """What an effect would say of unseen data on top of a parent, nats, to first order and with the slopes that it had
-    on another one, at the size of the model error that the parent needs or that a right hypothesis leaves, whichever
-    says more: costs no simulation."""
+    """What a parent with one effect more promises to say of unseen data, nats: to first order, without a simulation.
+
+    slopes_v : (n, k) V, those of the effect as they were on another parent.
+    The model error has the size that the parent needs or the one that a right hypothesis leaves, whichever says more.
+    """
     fit, prior = parent.fit, PRIORS[parent.problem.trust]
     own = SplitTable(parent.problem, parent.blocks, np.column_stack([fit.point.residual_v, slopes_v]))
     x = np.concatenate([fit.point.padded_x, np.zeros(slopes_v.shape[1])])
