@@ -25,7 +25,7 @@ from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
-from aesi.physics.effect import ActiveEffect, Record, Trace, check_states
+from aesi.physics.effect import ActiveEffect, Record, Trace, as_cell_saw, check_states
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.physics.rest.open_circuit import initial_soc
@@ -97,7 +97,7 @@ def simulate(
     across: dict[str, Array] | None = {} if profiles else None
     solve = solver(model, across)
     changed = model_with(cell, active)
-    record = _as_cell_saw(Record(time, current, _kelvin(temperature_degc, time)), active)
+    record = as_cell_saw(Record(time, current, _kelvin(temperature_degc, time)), active)
     if soc0 is None:
         soc0 = _soc_from_rest(changed, active, record.temperature_k, rest_voltage_v)
     else:
@@ -145,14 +145,6 @@ def _changed(model: EspmModel, active: ActiveEffect) -> EspmModel:
 def _instruments_first(effects: Iterable[ActiveEffect]) -> tuple[ActiveEffect, ...]:
     """What was recorded has to be set right before the cell can answer to it."""
     return tuple(sorted(effects, key=lambda e: e.effect.kind != "instrument"))
-
-
-def _as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:
-    """What the cell really saw where `record` was written, by the effects in their order."""
-    for active in effects:
-        if active.effect.on_record is not None:
-            record = active.act(active.effect.on_record, record)
-    return record
 
 
 Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution]

@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from aesi.data.thinning import Averaged
-from aesi.physics.effect import ActiveEffect, Effect, Record
+from aesi.physics.effect import ActiveEffect, Effect, Record, as_cell_saw
 from aesi.records import Measurement
 
 
@@ -33,10 +33,7 @@ def instruments_undone(
 @lru_cache(maxsize=64)
 def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measurement:
     """The record behind the instruments; remembered, since few of the parameters that a fit moves are theirs."""
-    record = Record(data.finer.time_s, data.finer.current_a)
-    for active in acting:
-        assert active.effect.on_record is not None
-        record = active.act(active.effect.on_record, record)
+    record = as_cell_saw(Record(data.finer.time_s, data.finer.current_a), acting)
     return data.with_record(record.time_s, record.current_a)
 
 
