@@ -94,7 +94,7 @@ def calibrate(
     return Calibration(
         cell=replace(
             found,
-            fitted_with=model.physics,
+            fitted_with=model.model_name,
             capacity_shares=tuple(shares.items()),
             tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
             fitted_at_k=tuple((r.name, round(_mean_kelvin(cell, r), 2)) for r in model.records),

@@ -104,7 +104,7 @@ def _write_page(
 ) -> None:
     from aesi.pipeline.report.calibration import CalibrationView, write_calibration_report
 
-    words = MODEL_WORDS[found.model.physics]
+    words = MODEL_WORDS[found.model.model_name]
     view = CalibrationView(
         content, words, fit_traces(found), HEALTH_WORDS, open_line(content), tuple(spectra)
     )
@@ -187,7 +187,7 @@ def scaled_to(
 
 def _made_from(found: Calibration) -> str:
     records = ", ".join(e.name for e in found.errors)
-    with_model = MODEL_WORDS[found.model.physics]
+    with_model = MODEL_WORDS[found.model.model_name]
     return f"Fitted by aesi calibrate with {with_model} to {records}, from {found.declared.name}."
 
 
@@ -207,7 +207,7 @@ def calibration_content(
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
-        "model": found.model.physics,
+        "model": found.model.model_name,
         "files": [
             {
                 "name": e.name,
