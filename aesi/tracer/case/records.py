@@ -193,11 +193,11 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
 
 
 def led_by(data: Measurement, seen: Sequence[Measurement]) -> tuple[int, Measurement] | None:
-    """Which of the records that fits have seen leads to `data`, and that one with all that comes after it; None where
-    none does.
+    """The record among those that fits have seen that `data` goes on from: its index, and both as one record; None
+    where there is none.
 
-    It is the longest that `data` begins with, or else the first that it continues. Such a one is not joined to it where
-    one of the two has a temperature and the other none, which no simulation could run at.
+    It is the longest that `data` begins with, or else the first that `data` continues. The latter are not joined where
+    only one of the two has a temperature, since no simulation could run at half a column.
     """
     begun = [index for index, known in enumerate(seen) if _begins_with(data, known)]
     if begun:
@@ -225,7 +225,7 @@ def prepare_test(
     soc0: float | None,
     given: Sequence[ActiveEffect] = (),
 ) -> PreparedRecord:
-    """A record that chooses nothing.
+    """A test record, which chooses nothing, made ready.
 
     Where a record that fits have seen leads to it (`led_by`), the model runs through that and only what comes after is
     judged.
@@ -239,7 +239,7 @@ def prepare_test(
 
 
 def joined(first: Measurement, second: Measurement) -> Measurement:
-    """The rows of one record and then those of another one, as which it is told of."""
+    """The rows of `first` and then those of `second`, under the name of `second` and with all else of it."""
     temperatures = [t for t in (first.temperature_degc, second.temperature_degc) if t is not None]
     return replace(
         second,
