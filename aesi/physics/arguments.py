@@ -1,4 +1,4 @@
-"""What `simulate` is given, checked before anything is computed: one sentence for what cannot be meant."""
+"""Checks of what `simulate` is given, made before anything is computed; an error is one sentence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FARTHEST_SOC = 1.0
 
 
 def check_cell(cell: object) -> None:
-    """Raises InputError for what is no Cell, such as the path of its file."""
+    """Raises InputError where `cell` is not a Cell but, say, the path of its file."""
     if not isinstance(cell, Cell):
         raise InputError(
             f"cell is {_a(cell)}, not a Cell; read one from its file with aesi.Cell.from_bpx(path)."

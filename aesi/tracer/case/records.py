@@ -25,6 +25,8 @@ THINNED_SHARE = 0.5
 0.48 of it are left on eight drives of blind cases at 10 Hz (seeds 13 and 18)."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
+HOLD_OPTION = "--hold {0} (in an experiment discover.hold: {0})"
+"""What takes the current otherwise, by `hold_sentence`."""
 HALF_FULL = 0.5
 """State of charge from which a smaller one is the safer to simulate: the middle, whatever the cell."""
 SMALLEST_NOISE_V = 5e-5
@@ -166,7 +168,7 @@ def _prepared(
         noise_full_v=noise_full,
         notes=(
             *said,
-            hold_sentence(data.name, record.hold, data.hold is not None),
+            hold_sentence(data.name, record.hold, data.hold is not None, HOLD_OPTION),
             *_temperature_noted(data),
         ),
     )
@@ -191,11 +193,11 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
 
 
 def led_by(data: Measurement, seen: Sequence[Measurement]) -> tuple[int, Measurement] | None:
-    """Which of the records that fits have seen leads to `data`, and that one with all that comes after it; None where
-    none does.
+    """The record among those that fits have seen that `data` goes on from: its index, and both as one record; None
+    where there is none.
 
-    It is the longest that `data` begins with, or else the first that it continues. Such a one is not joined to it where
-    one of the two has a temperature and the other none, which no simulation could run at.
+    It is the longest that `data` begins with, or else the first that `data` continues. The latter are not joined where
+    only one of the two has a temperature, since no simulation could run at half a column.
     """
     begun = [index for index, known in enumerate(seen) if _begins_with(data, known)]
     if begun:
@@ -223,7 +225,7 @@ def prepare_test(
     soc0: float | None,
     given: Sequence[ActiveEffect] = (),
 ) -> PreparedRecord:
-    """A record that chooses nothing.
+    """A test record, which chooses nothing, made ready.
 
     Where a record that fits have seen leads to it (`led_by`), the model runs through that and only what comes after is
     judged; its notes say so in place of a state that its own first row would give.
@@ -240,7 +242,7 @@ def prepare_test(
 
 
 def joined(first: Measurement, second: Measurement) -> Measurement:
-    """The rows of one record and then those of another one, as which it is told of."""
+    """The rows of `first` and then those of `second`, under the name of `second` and with all else of it."""
     temperatures = [t for t in (first.temperature_degc, second.temperature_degc) if t is not None]
     return replace(
         second,
