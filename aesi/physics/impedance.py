@@ -72,7 +72,7 @@ def impedance(
         raise InputError(
             "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
         )
-    check_soc(soc)
+    check_soc(soc, "soc")
     frequency = _checked_frequency(frequency_hz)
     active = checked_effects(effects)
     kelvin = _shifted(active, _checked_kelvin(temperature_degc))

@@ -228,14 +228,17 @@ def prepare_test(
     """A test record, which chooses nothing, made ready.
 
     Where a record that fits have seen leads to it (`led_by`), the model runs through that and only what comes after is
-    judged.
+    judged; its notes say so in place of a state that its own first row would give.
     """
     led = led_by(data, seen)
     if led is None:
         return prepare(cell, data, soc0, 0.0, given=given, shared=True)
     index, whole = led
     prepared = prepare(cell, whole, soc0, 0.0, given=given, shared=True)
-    return replace(prepared, lead_rows=len(seen[index]), continues=index)
+    leads = "begins with" if whole is data else "continues"
+    said = f"{data.name} {leads} {seen[index].name}: the model runs through that first, and what comes after is judged."
+    notes = (said, *(note for note in prepared.notes if note != prepared.start.sentence))
+    return replace(prepared, lead_rows=len(seen[index]), continues=index, notes=notes)
 
 
 def joined(first: Measurement, second: Measurement) -> Measurement:
