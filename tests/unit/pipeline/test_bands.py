@@ -96,3 +96,14 @@ def test_a_left_out_piece_is_as_open_as_the_other_rows_leave_it(drive) -> None:
     np.testing.assert_allclose(left[: N // 2], 5e-3 / np.sqrt(1.5))
     np.testing.assert_allclose(nothing, 5e-3 / np.sqrt(1.5))
     assert errors.root.shape == (2, 2)
+
+
+def test_rows_are_as_open_as_the_error_that_their_fit_allowed_for_leaves_them(drive) -> None:
+    slopes = 5e-3 * np.ones((N, 1))
+    train = replace(drive, slopes_v=slopes, missed_v=0.02)
+    # A fit without the second half missed 40 mV, that to all rows 20.
+    left_out = replace(drive, missed_v=0.04)
+    errors = OutOfSampleErrors.of([(Held(), left_out, slice(N // 2, N))], (train,), (10.0,))
+    # 200 and 400 rows of 1 s, 100 s of which count as one of 8 and 4 deviations.
+    np.testing.assert_allclose(errors.spread[0], 5e-3 / np.sqrt(1 + 2 / 8**2))
+    np.testing.assert_allclose(errors.root, [[1 / np.sqrt(1 + 4 / 4**2)]])

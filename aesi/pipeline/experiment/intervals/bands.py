@@ -73,7 +73,7 @@ class OutOfSampleErrors:
             excess=[run.excess for run in runs],
             spread=[_spread(train, series, rows) for _, series, rows in pairs],
             seen=_seen(train),
-            root=_root(train),
+            root=_root(train, train[0].missed_v),
             reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
         )
 
@@ -147,21 +147,28 @@ def _seen(train: Sequence[ErrorSeries]) -> Visited:
 
 
 def _root(
-    train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE
+    train: Sequence[ErrorSeries],
+    missed_v: float | None,
+    left_out: ErrorSeries | None = None,
+    rows: slice = WHOLE,
 ) -> Array | None:
     """Of the knobs, by the training records without the given rows of one of them, where that is one; None without
-    slopes."""
+    slopes.
+
+    missed_v : what a fit to these rows allowed for; None where none was made, which would begin with the least."""
     slopes = []
     for record in train:
         if record.slopes_v is not None:
             held = left_out is not None and record.name == left_out.name
             slopes.append(record.slopes_v[_others(len(record), rows) if held else slice(None), : len(KNOBS)])
-    return covariance_root(slopes, train[0].dt_s / (MEMORY_S * MODEL_ERROR_V**2)) if slopes else None
+    error_v = MODEL_ERROR_V if missed_v is None else missed_v
+    return covariance_root(slopes, train[0].dt_s / (MEMORY_S * error_v**2)) if slopes else None
 
 
 def _spread(train: Sequence[ErrorSeries], series: ErrorSeries, rows: slice) -> Array:
-    """(n,) V along a record, by the slopes of the physics that is served, of a fit to the other rows; 0 without."""
-    root = _root(train, series, rows)
+    """(n,) V along a record, by the slopes of the physics that is served, of the fit to the other rows that the series
+    is under; 0 without."""
+    root = _root(train, series.missed_v, series, rows)
     slopes = next((each.slopes_v for each in train if each.name == series.name), series.slopes_v)
     return np.zeros(len(series)) if root is None or slopes is None else spread(slopes[:, : len(root)], root)
 
