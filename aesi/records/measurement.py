@@ -32,15 +32,18 @@ def assumed_hold(time_s: Array) -> Hold:
 
 
 def hold_sentence(
-    name: str, hold: Hold, declared: bool, option: str = "--hold ", *, saved: bool = False
+    name: str, hold: Hold, declared: bool, option: str = "--hold {}", *, saved: bool = False
 ) -> str:
-    """What was taken, for a reader.  option : what takes it otherwise.  saved : it is that of a saved model."""
+    """What was taken, for a reader.
+
+    option : what takes it otherwise, {} for how.  saved : it is that of a saved model.
+    """
     words = {"linear": "in straight lines between rows", "backward": "constant since the row before"}
     if declared:
         return f"{name}: the current is taken {words[hold]}, as declared."
     writer, other = {"linear": ("", "backward"), "backward": (", as loggers write", "linear")}[hold]
     writer = ", as the saved model was made" if saved else writer
-    return f"{name}: the current is taken {words[hold]}{writer}; {option}{other} takes it otherwise."
+    return f"{name}: the current is taken {words[hold]}{writer}; {option.format(other)} takes it otherwise."
 
 
 def measured_on_case(temperature_degc: Array) -> bool:

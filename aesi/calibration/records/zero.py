@@ -10,6 +10,12 @@ their rest voltages: a charge that stopped at the upper cut-off voltage is less 
 potentials of another cell tell their difference roughly, so each end is uncertain by half its distance from full, too.
 The C/20 cycles of an LG 18650HG2 at 25, 40 and 0 degC say -5.0, -4.5 and -3.6 mA, that of a Panasonic NCR18650PF
 9.2 mA: they took 18.3, 17.7, 17.1 and 20.7 h to empty, 20.0, 19.3, 18.3 and 18.0 h to fill.
+
+The drives of both cells have it, too: of the currents within 30 mA of none, the one that is read most often is -5.1 mA
+in 24 of 29 records of the HG2 and 9.8 or 10.6 mA in all 21 of the Panasonic that regenerate. In a drive of three hours
+that is 1 % of the charge, and it is left in: taken out of all records of both cells before a fit, with -4.9 and 9.8 mA,
+it moved the median error of 38 records that chose nothing by 1 mV at most in chambers of 0 to 40 degC, to either side,
+and in colder ones by -18 to 5, as descents end elsewhere.
 """
 
 from __future__ import annotations

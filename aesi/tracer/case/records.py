@@ -25,6 +25,8 @@ THINNED_SHARE = 0.5
 0.48 of it are left on eight drives of blind cases at 10 Hz (seeds 13 and 18)."""
 CONTINUATION_STEPS = 3.0
 """A file that starts within this many samples of another's end, on the same clock, continues it."""
+HOLD_OPTION = "--hold {0} (in an experiment discover.hold: {0})"
+"""What takes the current otherwise, by `hold_sentence`."""
 HALF_FULL = 0.5
 """State of charge from which a smaller one is the safer to simulate: the middle, whatever the cell."""
 SMALLEST_NOISE_V = 5e-5
@@ -166,7 +168,7 @@ def _prepared(
         noise_full_v=noise_full,
         notes=(
             *said,
-            hold_sentence(data.name, record.hold, data.hold is not None),
+            hold_sentence(data.name, record.hold, data.hold is not None, HOLD_OPTION),
             *_temperature_noted(data),
         ),
     )

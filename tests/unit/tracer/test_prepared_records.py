@@ -32,3 +32,13 @@ def test_a_voltage_of_no_state_of_this_cell_is_refused(cell, make):
     data = make()
     with pytest.raises(DataError, match="rest voltage"):
         prepare(cell, replace(data, voltage_v=data.voltage_v - 1.5), None, 0.0)
+
+
+def test_how_the_current_is_taken_is_told_with_what_takes_it_otherwise_from_the_command_line_and_a_file(
+    cell, make
+):
+    notes = prepare(cell, make(), 0.9, 0.0).notes
+    assert any(
+        note.endswith("; --hold backward (in an experiment discover.hold: backward) takes it otherwise.")
+        for note in notes
+    )
