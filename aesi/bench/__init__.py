@@ -1,6 +1,9 @@
 """Benchmarks against the peers, by name: each yields one JSON-ready dict a line, peer and ours in one run."""
 
-from typing import Any
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeVar
+
+from aesi.errors import InputError
 
 CaseRow = dict[str, Any]
 """What is told of one case: JSON-ready values by name."""
@@ -18,3 +21,20 @@ BENCHMARKS = {
     "cells": "aesi.bench.physics.cells",
 }
 """Name -> module with a function `run(**options) -> Iterator[dict]`."""
+
+Chosen = TypeVar("Chosen")
+
+
+def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Sequence[Chosen]:
+    """The cases of a benchmark that its options chose.  Raises InputError where there is none: a summary of no case
+    would look like a result.
+
+    names : what its option `only` can be.
+    """
+    if not cases:
+        there = ", ".join(dict.fromkeys(names))
+        raise InputError(
+            f"no case of `aesi bench {name}` is left by these options, which without them runs all; for only=... there "
+            f"are: {there}."
+        )
+    return cases

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench import some_chosen
 from aesi.bench.detectable import SEEN_NATS, seen_nats
 from aesi.bench.limit import NO_ANSWER, NoAnswer, Stopwatch, answer_of
 from aesi.bench.scoring import TO_THE_NOISE, calibration, judge, rate
@@ -36,16 +37,17 @@ def chosen(
     seed: int = 0,
     every: int = 1,
     after: int = 0,
-) -> list[CaseSpec]:
+) -> Sequence[CaseSpec]:
     """Cases of the plan, or of the small one that a test can afford.
 
     cases : the first so many (None: all).  only : substring of a recipe's name, or a kind of case.
     every : take each n-th case.  after : without the first so many, which somebody may have looked at.
+    Raises InputError where none is left.
     """
     specs = small_plan(seed) if small else plan(seed, FULL)
-    return [s for s in specs if only is None or only in (s.kind, *s.recipes) or only in "+".join(s.recipes)][
-        ::every
-    ][after:][:cases]
+    found = [s for s in specs if only is None or only in (s.kind, *s.recipes) or only in "+".join(s.recipes)]
+    kinds, recipes = (s.kind for s in specs), sorted(name for s in specs for name in s.recipes)
+    return some_chosen("blind", found[::every][after:][:cases], (*kinds, *recipes))
 
 
 def judged(spec: CaseSpec, cells: str, limit_s: float | None = LIMIT_S) -> dict[str, Any]:

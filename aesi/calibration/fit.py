@@ -1,5 +1,8 @@
-"""Calibrate: a descent from the start file, and one with the heat that it tells; then what the data determine and what
-they leave open."""
+"""Calibrate: fit the parameters of a cell's file to records, and say what these determine and what they leave open.
+
+A first descent starts from the file as it is. What it finds tells how much heat the cell makes; a second descent goes
+on from there with that heat.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ from aesi.calibration.records.conditions import Conditions
 from aesi.calibration.records.named import named_apart
 from aesi.calibration.records.prepared import Prepared, check_charge, hold_told, prepared, with_temperatures
 from aesi.calibration.records.spectra import degc_of, fitted_ones
-from aesi.calibration.records.zero import zero_of
+from aesi.calibration.records.zero import Zero, zero_of
 from aesi.calibration.result import (
     Calibration,
     RecordError,
@@ -91,7 +94,7 @@ def calibrate(
     return Calibration(
         cell=replace(
             found,
-            fitted_with=model.physics,
+            fitted_with=model.model_name,
             capacity_shares=tuple(shares.items()),
             tested_on=tuple((name, day_of(days[name])) for name in shares if name in days),
             fitted_at_k=tuple((r.name, round(_mean_kelvin(cell, r), 2)) for r in model.records),
@@ -106,7 +109,7 @@ def calibrate(
         ),
         capacities=shares,
         size_assumed="" if conditions.same_cell else size_assumed(cell, records),
-        notes=(*notes, *_told(model, x), *_ran_out(model, states), *warmth),
+        notes=(*notes, *_of_priors(model, x), *_of_own(model, x), *_ran_out(model, states), *warmth),
         seconds=time.perf_counter() - began,
         model=model,
         x=x,
@@ -117,39 +120,24 @@ def calibrate(
 def problem(
     cell: Cell, records: Sequence[Measurement], conditions: Conditions
 ) -> tuple[Model, tuple[str, ...]]:
-    """What is fitted, and sentences on how it was set up."""
-    if not records:
-        raise DataError("give at least one record to calibrate with.")
-    records = named_apart(records, {"temperature": conditions.temperatures_degc, "date": conditions.dates})
-    for record in records:
-        check_voltage(cell, record)
-        if not record.current_a.any():
-            raise DataError(
-                f"{record.name}: no current flows in it, so that it tells no parameter; leave it out."
-            )
-    start, notes = (cell, ()) if conditions.same_cell else sized(cell, records)
-    zero = zero_of(start, records)
-    if not conditions.same_cell:
-        start, notes = sized(cell, [zero.taken_out(r, start.nominal_capacity_ah) for r in records])
+    """What is fitted, and sentences on how it was set up.
+
+    Raises DataError for records that do not fit the cell.
+    """
+    records = _checked_records(cell, records, conditions)
+    start, zero, of_size = _sized(cell, records, conditions.same_cell)
     kept = [one_branch(start, data) for data in records]
-    placed, told = with_temperatures(start, [data for data, _ in kept], conditions.temperatures_degc)
-    start, typical = with_activation(start)
-    physics = conditions.physics or "espm"
+    placed, of_temperature = with_temperatures(
+        start, [data for data, _ in kept], conditions.temperatures_degc
+    )
+    start, of_activation = with_activation(start)
     cut = [r.name for r, whole in zip(placed, records, strict=True) if r.time_s[0] > whole.time_s[0]]
-    ready = prepared(start, placed, conditions.soc0, physics, conditions.same_cell, cut)
-    if conditions.soc0 is not None:
-        told = (*told, *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut))
+    model_name = conditions.model or "espm"
+    ready = prepared(start, placed, conditions.soc0, model_name, conditions.same_cell, cut)
     for one in ready:
         check_charge(start, one)
     spectra, of_spectra = fitted_ones(start, conditions.spectra)
     span = _span_k(start, ready, spectra)
-    if span <= SPAN_K:
-        apart = (
-            f"the mean temperatures of the records are {span:.1f} K apart, less than {SPAN_K:g} K"
-            if len(ready) > 1
-            else "a single record does not tell how the cell answers to temperature"
-        )
-        told = (*told, f"{apart}: activation energies and entropy stay as they are.")
     on_case = any(r.kelvin is not None and measured_on_case(r.kelvin) for r in ready)
     start = with_interfaces(start, on_case)
     ageing = Ageing.of(ready, conditions.dates, conditions.as_of)
@@ -160,12 +148,66 @@ def problem(
         Shapes.over(start, span),
         zero,
         ageing,
-        physics,
+        model_name,
         spectra,
     )
-    starts = (r.start.sentence for r in ready if not r.start.against_voltage)  # those are warnings
-    taken = (*starts, *of_spectra, *map(hold_told, ready), *ageing.sentences)
-    return model, (*notes, *zero.sentences, *(n for _, more in kept for n in more), *told, *typical, *taken)
+    return model, (
+        *of_size,
+        *zero.sentences,
+        *(sentence for _, of_branch in kept for sentence in of_branch),
+        *of_temperature,
+        *(f"{name}: {OF_ROWS_LEFT_OUT}" for name in cut if conditions.soc0 is not None),
+        *_of_small_span(span, len(ready)),
+        *of_activation,
+        *(r.start.sentence for r in ready if not r.start.against_voltage),  # those are warnings
+        *of_spectra,
+        *map(hold_told, ready),
+        *ageing.sentences,
+    )
+
+
+def _checked_records(
+    cell: Cell, records: Sequence[Measurement], conditions: Conditions
+) -> tuple[Measurement, ...]:
+    """The records with names of their own.
+
+    Raises DataError where there is none, and for one that is no record of the cell or has no current.
+    """
+    if not records:
+        raise DataError("give at least one record to calibrate with.")
+    named = named_apart(records, {"temperature": conditions.temperatures_degc, "date": conditions.dates})
+    for record in named:
+        check_voltage(cell, record)
+        if not record.current_a.any():
+            raise DataError(
+                f"{record.name}: no current flows in it, so that it tells no parameter; leave it out."
+            )
+    return named
+
+
+def _sized(cell: Cell, records: Sequence[Measurement], same_cell: bool) -> tuple[Cell, Zero, tuple[str, ...]]:
+    """The cell of the size that the records tell, the zero of their cycler, and sentences on the size.
+
+    Each needs the other: a first size gives the zero, and currents without that the size that is taken.
+    """
+    if same_cell:
+        return cell, zero_of(cell, records), ()
+    roughly, _ = sized(cell, records)
+    zero = zero_of(roughly, records)
+    start, sentences = sized(cell, [zero.taken_out(r, roughly.nominal_capacity_ah) for r in records])
+    return start, zero, sentences
+
+
+def _of_small_span(span_k: float, n_records: int) -> tuple[str, ...]:
+    """A sentence where the records lie too close together in temperature (K) to tell how the cell answers to it."""
+    if span_k > SPAN_K:
+        return ()
+    apart = (
+        f"the mean temperatures of the records are {span_k:.1f} K apart, less than {SPAN_K:g} K"
+        if n_records > 1
+        else "a single record does not tell how the cell answers to temperature"
+    )
+    return (f"{apart}: activation energies and entropy stay as they are.",)
 
 
 def descended(model: Model, evaluations: int, x0: Array | None = None) -> Array:
@@ -201,8 +243,8 @@ def _ran_out(model: Model, states: Mapping[FitState, tuple[Cell, Array]]) -> tup
     return tuple(out)
 
 
-def _told(model: Model, x: Array) -> tuple[str, ...]:
-    """Sentences on priors that the records contradict, and on what a record's cycler and its age were found to be."""
+def _of_priors(model: Model, x: Array) -> tuple[str, ...]:
+    """A sentence for each prior that was given and that the records contradict."""
     out = []
     for free, z in zip(model.free, x, strict=False):
         if free.given and abs(z) > NOTED_DEVIATIONS:
@@ -210,6 +252,12 @@ def _told(model: Model, x: Array) -> tuple[str, ...]:
                 f"{free.name} ends at {free.value(float(z)):.4g} {free.unit}, {abs(z):.1f} standard deviations "
                 f"{'above' if z > 0.0 else 'below'} what was given ({free.start:g}): the records say otherwise."
             )
+    return tuple(out)
+
+
+def _of_own(model: Model, x: Array) -> tuple[str, ...]:
+    """Sentences on what a record has of its own: its cycler's zero, its active material and its silicon."""
+    out = []
     zero_a = model.zero.at(float(x[model.layout.zero]))
     for i, record in enumerate(model.records):
         typical = float(np.median(np.abs(record.rows.current_a[record.flows > 0.0])))

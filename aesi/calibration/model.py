@@ -114,11 +114,11 @@ class Model:
         shapes: Shapes,
         zero: Zero,
         ageing: Ageing,
-        physics: ModelName = "espm",
+        model_name: ModelName = "espm",
         spectra: Sequence[Spectrum] = (),
     ) -> None:
-        self.physics = physics
-        self.spectra = FittedSpectra(tuple(spectra), physics)
+        self.model_name = model_name
+        self.spectra = FittedSpectra(tuple(spectra), model_name)
         self.cell, self.records, self.free, self.shapes, self.zero = cell, records, free, shapes, zero
         self.ageing = ageing
         silicon = sum(r.slow for r in records) >= TELL_SILICON
@@ -185,7 +185,7 @@ class Model:
         current = record.rows.current_a
         if record.slow:
             current = current - self.zero.at(float(x[self.layout.zero])) * record.flows
-        solve = solver(self.physics)
+        solve = solver(self.model_name)
         rows, _, at, _ = solve(model, record.rows.time_s, current, record.kelvin, soc, record.hold)
         return rows, at
 

@@ -1,4 +1,4 @@
-"""Samples of what a calibration leaves open, by emcee: how far the intervals of the linearised fit were off.
+"""Posterior samples of a calibration, drawn by emcee, to check the intervals of the linearised fit.
 
 The potentials' knots, the states of charge, the ages and the cycler's zero enter the voltage all but linearly; they are
 integrated out in closed form about each sample, so that the walkers move in the global parameters alone:

@@ -1,8 +1,8 @@
-"""The cell that is written: full and empty where the records show them, in the state that its records differ from.
+"""The cell that a calibration writes: one state of health, with full and empty where the records show them.
 
-A file is mostly simulated without a state of health. So what is fitted is a cell in one state, and records of the same
-cell, each with what it has less or more of its own: within the prior of that, the file is what serves them all. What
-share of its capacity each record has is in `capacities`.
+Whoever simulates a file mostly gives no state of health. So the fit is of a cell in one state, from which each record
+may differ in active material and silicon, within a prior: the file is the state that serves all records. How much of
+the file's capacity the cell had in each record is in `capacities`.
 """
 
 from __future__ import annotations
@@ -32,8 +32,10 @@ def capacities(model: Model, x: Array) -> dict[str, float]:
 
 
 def start_soc(model: Model, x: Array, index: int) -> float:
-    """State of charge at which a record starts, in the windows of the written cell as that was then: it rests where the
-    cell of the fit does, whose empty need not be at the lower voltage."""
+    """State of charge at which a record starts, in the windows of the written cell, aged as it was in that record.
+
+    Both cells rest at the same voltage there; in the windows of the fit, empty need not be at the lower voltage.
+    """
     record = model.records[index]
     material, silicon = model.material(index, x), model.silicon(index, x)
     fitted = model.aged(model.cell_at(x), material, silicon)

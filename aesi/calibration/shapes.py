@@ -1,4 +1,4 @@
-"""Corrections of potentials that keep them falling, and of an entropy.
+"""Corrections of open-circuit potentials, which keep falling with stoichiometry, and of entropic coefficients.
 
 A potential falls with stoichiometry: one that rose would give a particle two states at one voltage, and a porous
 electrode none. What is fitted is therefore the logarithm of its slope against that of the start file:

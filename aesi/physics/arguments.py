@@ -1,4 +1,4 @@
-"""What `simulate` is given, checked before anything is computed: one sentence for what cannot be meant."""
+"""Checks of what `simulate` is given, made before anything is computed; an error is one sentence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ FARTHEST_SOC = 1.0
 
 
 def check_cell(cell: object) -> None:
-    """Raises InputError for what is no Cell, such as the path of its file."""
+    """Raises InputError where `cell` is not a Cell but, say, the path of its file."""
     if not isinstance(cell, Cell):
         raise InputError(
             f"cell is {_a(cell)}, not a Cell; read one from its file with aesi.Cell.from_bpx(path)."
@@ -49,15 +49,18 @@ def check_choice(name: str, value: object, choices: Any) -> None:
         raise InputError(f"{name} = {value!r} is not known; give {allowed}.")
 
 
-def check_soc(soc0: Any) -> None:
-    """Raises InputError for a state of charge that is no share of the capacity."""
-    if soc0 is None:
+def check_soc(soc: Any, name: str = "soc0") -> None:
+    """Raises InputError for a state of charge that is no share of the capacity.
+
+    name : how the sentence calls it.
+    """
+    if soc is None:
         return
-    given = np.asarray(soc0)
+    given = np.asarray(soc)
     number = given.ndim == 0 and given.dtype.kind in "iuf"
     if not (number and -FARTHEST_SOC <= given <= 1.0 + FARTHEST_SOC):  # this way round, NaN fails too
         raise InputError(
-            f"soc0 = {soc0!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
+            f"{name} = {soc!r} is not a state of charge; give a share of the capacity between 0 (empty) and 1 (full), "
             "as one number, so 90 % is 0.9."
         )
 

@@ -22,14 +22,17 @@ DRY_SHARE = 0.02
 """Of the rest concentration at a collector: no reaction can be found because there is no salt for one."""
 
 RUN_ON = ', or let it run on: aesi simulate --run-on, in Python on_depletion="clip".'
-"""How a sentence ends."""
+"""How each of these sentences ends."""
 
 
 def sentence(
     model: EspmModel, time_s: Array, current_a: Array, kelvin: float, rows: Array, at: int, what: int
 ) -> str:
-    """rows : of `run_plain`.  at : the first faulty row.  what : 1 or 2, an electrode's surface; 3, the salt;
-    4, no reaction carries the current."""
+    """Why a simulation stopped, and what to check.
+
+    time_s, current_a : (n,) of the record.  kelvin : temperature at the fault.  rows : (7, n) as of `run_plain`.
+    at : the first faulty row.  what : 1 or 2, the surface of that electrode (`LAYERS`); `SALT`; or `NO_SOLUTION`.
+    """
     cell = model.cell
     way_there = current_a[max(at - 1, 0) : at + 1]
     asked_a = float(way_there[np.argmax(np.abs(way_there))])
@@ -50,7 +53,7 @@ def sentence(
 
 
 def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str:
-    """Of an electrolyte that ran dry: by the cold, where it would carry notably more when warm."""
+    """That the electrolyte ran dry; the cold is to blame where it would carry notably more when warm."""
     reference_k = model.cell.reference_temperature_k
     here, there = (carried_a(model, t) for t in (kelvin, reference_k))
     cause = (
@@ -68,7 +71,7 @@ def _no_salt(model: EspmModel, kelvin: float, amperes: float, where: str) -> str
 def _surface_left(
     model: EspmModel, kelvin: float, amperes: float, rows: Array, at: int, what: int, where: str
 ) -> str:
-    """Of a surface that is empty or full: by the charge, or by a current that solid diffusion cannot follow.
+    """That a surface is empty or full: by the charge that was asked for, or by a current too large for solid diffusion.
 
     rows : of `run_plain`.  at : the faulty one.  what : 1 or 2, the electrode.
     """
@@ -104,9 +107,9 @@ def _surface_left(
 
 
 def ran_out(name: str, at_s: Mapping[str, float]) -> str:
-    """A sentence on a record that simulations which go on regardless ran out on: errors mean nothing from there on.
+    """A sentence on a record on which clipped simulations ran out; their errors mean nothing from there on.
 
-    at_s : what was simulated, in words, to when it ran out, s.
+    at_s : what was simulated, in words, to the time at which it ran out, s.
     """
     from aesi.physics.espm.kernels import BEYOND_RANGE_V  # compiled code, which is read when it is first used
 

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import inspect
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeVar
 
@@ -218,6 +218,14 @@ class ActiveEffect:
         if self.effect.file is not None:
             out["file"] = self.effect.file
         return out
+
+
+def as_cell_saw(record: Record, effects: Iterable[ActiveEffect]) -> Record:
+    """What the cell really saw where `record` was written, by the effects in their order."""
+    for active in effects:
+        if active.effect.on_record is not None:
+            record = active.act(active.effect.on_record, record)
+    return record
 
 
 def check_states(effect: Effect, added: Contribution, trace: Trace) -> None:

@@ -31,7 +31,7 @@ from aesi.physics.arguments import check_cell, check_choice, check_soc, check_te
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.cell.relations import Relation
-from aesi.physics.effect import ActiveEffect, Contribution, Record, Trace
+from aesi.physics.effect import ActiveEffect, Contribution, Record, Trace, as_cell_saw
 from aesi.physics.espm.extended import interface_capacity, ohmic_drops, particle_units
 from aesi.physics.espm.layout import Units
 from aesi.physics.espm.plain import rate_factor, shifted_ocp, stack_of
@@ -72,20 +72,10 @@ def impedance(
         raise InputError(
             "soc = None is no state of charge; give a share of the capacity, so that 90 % is 0.9."
         )
-    check_soc(soc)
-    frequency = np.atleast_1d(numbers(frequency_hz, "frequency_hz"))
-    if frequency.ndim != 1 or not (
-        np.isfinite(frequency).all() and (frequency > 0.0).all() and len(frequency)
-    ):
-        raise DataError("frequency_hz has to be one row of positive numbers, at least one.")
+    check_soc(soc, "soc")
+    frequency = _checked_frequency(frequency_hz)
     active = checked_effects(effects)
-    degc = numbers(temperature_degc, "temperature_degc")
-    if degc.ndim:
-        raise InputError(
-            f"temperature_degc has the shape {degc.shape}; a cell at rest is at one temperature."
-        )
-    check_temperature(degc)
-    kelvin = _shifted(active, float(degc) + ZERO_CELSIUS_K)
+    kelvin = _shifted(active, _checked_kelvin(temperature_degc))
     check_choice("model", model, ModelName)
     changed = model_with(cell, active)
     rest = _at_rest(cell, changed, soc)
@@ -111,6 +101,27 @@ def impedance(
     really = kelvin - ZERO_CELSIUS_K
     rest_run = simulate(cell, INSTANT_S, np.zeros(2), soc, on_model, really, "backward", model=model)
     return z + sum(_series_ohm(changed, one, function, rest_run) for one, function in acting)
+
+
+def _checked_frequency(frequency_hz: Numbers) -> Array:
+    """(n,) Hz.  Raises DataError for what is no row of positive numbers."""
+    frequency = np.atleast_1d(numbers(frequency_hz, "frequency_hz"))
+    if frequency.ndim != 1 or not (
+        np.isfinite(frequency).all() and (frequency > 0.0).all() and len(frequency)
+    ):
+        raise DataError("frequency_hz has to be one row of positive numbers, at least one.")
+    return frequency
+
+
+def _checked_kelvin(temperature_degc: float) -> float:
+    """K.  Raises InputError for several temperatures, and for one that no cell has."""
+    degc = numbers(temperature_degc, "temperature_degc")
+    if degc.ndim:
+        raise InputError(
+            f"temperature_degc has the shape {degc.shape}; a cell at rest is at one temperature."
+        )
+    check_temperature(degc)
+    return float(degc) + ZERO_CELSIUS_K
 
 
 def slowest_diffusion_hz(
@@ -262,10 +273,7 @@ def _slope(relation: Relation, at: float) -> float:
 
 def _shifted(effects: tuple[ActiveEffect, ...], kelvin: float) -> float:
     """The temperature that the cell really has."""
-    record = Record(np.zeros(1), np.zeros(1), np.array([kelvin]))
-    for active in effects:
-        if active.effect.on_record is not None:
-            record = active.act(active.effect.on_record, record)
+    record = as_cell_saw(Record(np.zeros(1), np.zeros(1), np.array([kelvin])), effects)
     return float(cast(Array, record.temperature_k)[0])
 
 

@@ -125,15 +125,15 @@ class _Start:
         record: Measurement,
         hold: Hold,
         effects: tuple[ActiveEffect, ...],
-        physics: ModelName,
+        model_name: ModelName,
     ) -> None:
         self.declared, self.record, self.effects = cell, record, effects
         self.model = model_with(cell, effects)
         self.cell = self.model.cell
         self.current_a = float(record.current_a[0])
         self.open_circuit = OpenCircuit.at_start(self.cell, record)
-        self.physics, self.hold = physics, hold
-        self.load = LoadedStart(self.open_circuit, record, hold, physics)
+        self.model_name, self.hold = model_name, hold
+        self.load = LoadedStart(self.open_circuit, record, hold, model_name)
 
     def read(self) -> InitialState:
         """From the voltage."""
@@ -149,7 +149,7 @@ class _Start:
         read = freed_of_instruments(self.model, self.effects, begins)
         if self.open_circuit.charged(read):
             return self._full(read, f"rests at {begins:.3f} V", begins)
-        voltage, sd_v = settled_voltage(self.open_circuit, rest.rows, self.physics)
+        voltage, sd_v = settled_voltage(self.open_circuit, rest.rows, self.model_name)
         true = freed_of_instruments(self.model, self.effects, voltage)
         moved = rest.rows.charge_ah / capacity_ah  # before it, the cell was as much fuller and higher
         higher_v = self._rise_v(true, moved)

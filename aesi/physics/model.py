@@ -70,7 +70,9 @@ PLAIN = Interface()
 
 @dataclass(frozen=True)
 class EspmModel:
-    """The extended single-particle model of a cell, and its extensions.
+    """A cell and what is assumed of it; the single particle ("espm") and the porous electrode ("dfn") both solve this.
+
+    Effects return changed copies of it. Its name is that of the extended single-particle model, which it was made for.
 
     regions : layers into which each electrode is cut, with a particle (or one of each size) in each.
     heat : None for a temperature that is given or constant; see `of_record`.

@@ -25,7 +25,7 @@ from aesi.physics import depletion
 from aesi.physics.arguments import check_cell, check_choice, check_soc, check_temperature, checked_effects
 from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
-from aesi.physics.effect import ActiveEffect, Record, Trace, check_states
+from aesi.physics.effect import ActiveEffect, Record, Trace, as_cell_saw, check_states
 from aesi.physics.espm.plain import run_plain
 from aesi.physics.model import EspmModel
 from aesi.physics.rest.open_circuit import initial_soc
@@ -34,13 +34,19 @@ from aesi.records import Hold, Run
 from aesi.records.checked import check_row, check_times, numbers
 
 ModelName = Literal["espm", "dfn"]
+"""Which of the two models of a cell is solved: `model` to a user, and `model_name` where an `EspmModel`, which is what
+either of them solves, is called `model`."""
 MODEL_WORDS: Mapping[str, str] = {"espm": "the single particle (espm)", "dfn": "the porous electrode (dfn)"}
 """How reports call the models."""
 OnDepletion = Literal["raise", "clip"]
 MOST_ROWS = 20_000
 """Of a record whose solutions are remembered; those of longer ones would fill the memory."""
 Solution = tuple[Array, dict[str, Array], int, int]
-"""Rows as `plain.run_plain`, further states by name, the first fault and what it was."""
+"""What a solver gives back: (rows, further, fault_at, fault).
+
+rows : (7, n), as those of `plain.run_plain`.  further : other states by name, (n,) each.  fault_at : the first row at
+which the cell has run out, -1 for none.  fault : what ran out there, as `depletion.sentence` takes it.
+"""
 
 
 def simulate(
@@ -91,35 +97,27 @@ def simulate(
     across: dict[str, Array] | None = {} if profiles else None
     solve = solver(model, across)
     changed = model_with(cell, active)
-    record = Record(time, current, _kelvin(temperature_degc, time))
-    for effect in active:
-        if effect.effect.on_record is not None:
-            record = effect.act(effect.effect.on_record, record)
+    record = as_cell_saw(Record(time, current, _kelvin(temperature_degc, time)), active)
     if soc0 is None:
         soc0 = _soc_from_rest(changed, active, record.temperature_k, rest_voltage_v)
     else:
         soc0 = same_rest(cell, changed.cell, soc0)
     if profiles or len(time) > MOST_ROWS:
-        rows, extra, fault_at, fault = _solved(solve, changed, record, soc0, hold)
+        rows, further, fault_at, fault = _solved(solve, changed, record, soc0, hold)
     else:
-        rows, extra, fault_at, fault = _copied(_remembered(model, changed, _Told.apart(record), soc0, hold))
-    series = _series(changed.cell, rows) | extra
-    if fault_at >= 0:
-        if on_depletion == "raise":
-            kelvin = float(extra["temperature_k"][fault_at])
-            raise SimulationError(
-                depletion.sentence(changed, time, record.current_a, kelvin, rows, fault_at, fault)
-            )
-        series["depleted"] = (np.arange(len(time)) >= fault_at).astype(float)
-    elif on_depletion == "clip":
-        series["depleted"] = np.zeros(len(time))
-    voltage = _voltage_effects(changed, active, record, rows[0], series, hold)
-    if fault_at >= 0 and not np.isfinite(voltage).all():
-        lost = int(np.argmin(np.isfinite(voltage)))
+        known = _remembered(model, changed, _KeyedRecord.of(record), soc0, hold)
+        rows, further, fault_at, fault = _copied(known)
+    if fault_at >= 0 and on_depletion == "raise":
+        kelvin = float(further["temperature_k"][fault_at])
         raise SimulationError(
-            f"there is no solution at {stamp(time[lost])} s: the cell ran out at {stamp(time[fault_at])} s, and the "
-            "current went on; end the record there, or check soc0, capacity and the sign of the current."
+            depletion.sentence(changed, time, record.current_a, kelvin, rows, fault_at, fault)
         )
+    series = _series(changed.cell, rows) | further
+    if on_depletion == "clip":
+        series["depleted"] = _depleted(fault_at, len(time))
+    voltage = _voltage_effects(changed, active, record, rows[0], series, hold)
+    if fault_at >= 0:
+        _check_solved(time, voltage, fault_at)
     return Run(time, current, voltage, series, across or {})
 
 
@@ -153,21 +151,21 @@ Solver = Callable[[EspmModel, Array, Array, Array | None, float, Hold], Solution
 """(model, time, current, temperature or None, soc0, hold) -> the solution."""
 
 
-def solver(name: str, profiles: dict[str, Array] | None = None) -> Solver:
-    """The model of that name; it is imported, and its compiled code read, when it is first used.
+def solver(model_name: str, profiles: dict[str, Array] | None = None) -> Solver:
+    """What solves the model of that name; it is imported, and its compiled code read, when it is first used.
 
-    profiles : is given what `Run.profiles` names.  Raises InputError for another name.
+    profiles : a dict that the solver fills with what `Run.profiles` names.  Raises InputError for another name.
     """
-    if name == "espm":
+    if model_name == "espm":
         if profiles is not None:
             raise InputError("profiles across the electrodes are of the porous electrode; use model='dfn'.")
         return _run_espm
-    if name == "dfn":
+    if model_name == "dfn":
         from aesi.physics.dfn.run import run_porous_electrode
 
         return partial(run_porous_electrode, profiles=profiles)
     raise InputError(
-        f"there is no model {name!r}; give 'espm' (single particle) or 'dfn' (porous electrode)."
+        f"there is no model {model_name!r}; give 'espm' (single particle) or 'dfn' (porous electrode)."
     )
 
 
@@ -183,19 +181,19 @@ def _solved(solve: Solver, model: EspmModel, record: Record, soc0: float, hold: 
 
 
 def _own(row: Array) -> Array:
-    """As kernels are compiled for: contiguous, and may be written to, which what effects are given may not."""
+    """The row as kernels are compiled for: contiguous and writable, which the arrays that effects are given are not."""
     return np.require(row, float, ["C", "W"])
 
 
 @dataclass(frozen=True)
-class _Told:
-    """A record that is told from others by what it holds."""
+class _KeyedRecord:
+    """A record as a key of a cache: equal to another where their arrays hold the same numbers."""
 
     digest: bytes
     record: Record = field(compare=False)
 
     @classmethod
-    def apart(cls, record: Record) -> _Told:
+    def of(cls, record: Record) -> _KeyedRecord:
         digest = hashlib.blake2b(digest_size=16)
         for channel in (record.time_s, record.current_a, record.temperature_k):
             digest.update(b"none" if channel is None else np.ascontiguousarray(channel).data)
@@ -203,21 +201,23 @@ class _Told:
 
 
 @lru_cache(maxsize=128)
-def _remembered(model: ModelName, changed: EspmModel, told: _Told, soc0: float, hold: Hold) -> Solution:
+def _remembered(
+    model_name: ModelName, model: EspmModel, keyed: _KeyedRecord, soc0: float, hold: Hold
+) -> Solution:
     """One solution, as it was found before: effects on the voltage and on readings leave what happens in the cell as it
     is, so that 14 to 32 % of the solutions that four blind cases ask for were asked for already."""
-    return _solved(solver(model), changed, told.record, soc0, hold)
+    return _solved(solver(model_name), model, keyed.record, soc0, hold)
 
 
 def forget_solutions() -> None:
-    """Solve anew what was solved before: for who times it."""
+    """Empty the memory of solutions, for benchmarks: what is asked for again is solved again."""
     _remembered.cache_clear()
 
 
 def _copied(solution: Solution) -> Solution:
-    """The caller's own arrays."""
-    rows, extra, fault_at, fault = solution
-    return rows.copy(), {name: values.copy() for name, values in extra.items()}, fault_at, fault
+    """The caller's own arrays, which may be written to without changing what is remembered."""
+    rows, further, fault_at, fault = solution
+    return rows.copy(), {name: values.copy() for name, values in further.items()}, fault_at, fault
 
 
 def _run_espm(
@@ -232,6 +232,24 @@ def _run_espm(
     return run_extended(model, time, current, temperature_k, soc0, hold)
 
 
+def _depleted(fault_at: int, n: int) -> Array:
+    """(n,) 1 from the row at which the cell ran out on, 0 before; `fault_at` is -1 where it did not."""
+    if fault_at < 0:
+        return np.zeros(n)
+    return (np.arange(n) >= fault_at).astype(float)
+
+
+def _check_solved(time: Array, voltage: Array, fault_at: int) -> None:
+    """Raises SimulationError where a clipped simulation has no solution at some row after the cell ran out."""
+    if np.isfinite(voltage).all():
+        return
+    lost = int(np.argmin(np.isfinite(voltage)))
+    raise SimulationError(
+        f"there is no solution at {stamp(time[lost])} s: the cell ran out at {stamp(time[fault_at])} s, and the "
+        "current went on; end the record there, or check soc0, capacity and the sign of the current."
+    )
+
+
 def _voltage_effects(
     model: EspmModel,
     effects: Sequence[ActiveEffect],
@@ -240,6 +258,10 @@ def _voltage_effects(
     series: dict[str, Array],
     hold: Hold,
 ) -> Array:
+    """(n,) V, what the instrument reads: the model's voltage, then all effects on it, then those on the reading.
+
+    series : is given the states that the effects bring.
+    """
     for active in effects:
         if active.effect.on_voltage is not None:
             trace = Trace(model, record.time_s, record.current_a, voltage, series, hold == "backward")

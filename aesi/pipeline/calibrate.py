@@ -81,10 +81,10 @@ def calibrate_files(
     check_posterior(asked.posterior)
     check_distinct_spectra(conditions.spectra, asked.impedance)
     given = declared_model(cell)
-    declared, model = given.cell, conditions.physics or given.model
+    declared, model = given.cell, conditions.model or given.model
     start = scaled_to(declared, measurements, conditions.temperatures_degc)
     check_spectra(start, (*conditions.spectra, *asked.impedance))
-    found = calibrate(declared, measurements, replace(conditions, physics=model))
+    found = calibrate(declared, measurements, replace(conditions, model=model))
     name = declared.name if asked.title is None else asked.title
     found = replace(found, cell=replace(found.cell, name=name, description=_made_from(found)))
     posterior = sampled(found, asked.posterior, asked.seed) if asked.posterior else None
@@ -104,7 +104,7 @@ def _write_page(
 ) -> None:
     from aesi.pipeline.report.calibration import CalibrationView, write_calibration_report
 
-    words = MODEL_WORDS[found.model.physics]
+    words = MODEL_WORDS[found.model.model_name]
     view = CalibrationView(
         content, words, fit_traces(found), HEALTH_WORDS, open_line(content), tuple(spectra)
     )
@@ -187,7 +187,7 @@ def scaled_to(
 
 def _made_from(found: Calibration) -> str:
     records = ", ".join(e.name for e in found.errors)
-    with_model = MODEL_WORDS[found.model.physics]
+    with_model = MODEL_WORDS[found.model.model_name]
     return f"Fitted by aesi calibrate with {with_model} to {records}, from {found.declared.name}."
 
 
@@ -207,7 +207,7 @@ def calibration_content(
     return {
         "schema": SCHEMA,
         "cell": found.cell.name,
-        "model": found.model.physics,
+        "model": found.model.model_name,
         "files": [
             {
                 "name": e.name,

@@ -77,15 +77,19 @@ def _out_of_reach(hz: Array, slowest_hz: float) -> list[str]:
     below, above, said = int(np.sum(hz < slowest_hz)), int(np.sum(hz > BAND_HZ[1])), []
     if below:
         said.append(
-            f"{below:,} of the frequencies lie below {slowest_hz:.2g} Hz, where the slowest diffusion in the model "
+            f"{_of_them(below)} below {slowest_hz:.2g} Hz, where the slowest diffusion in the model "
             "keeps up: Z tends to the slope of the open-circuit voltage alone, and |Z| to 1/f without end."
         )
     if above:
         said.append(
-            f"{above:,} of the frequencies lie above {BAND_HZ[1]:g} Hz, where a measured spectrum is of leads and "
+            f"{_of_them(above)} above {BAND_HZ[1]:g} Hz, where a measured spectrum is of leads and "
             "windings, too: the model has no inductance."
         )
     return said
+
+
+def _of_them(count: int) -> str:
+    return f"{count:,} of the frequencies {'lies' if count == 1 else 'lie'}"
 
 
 def _left_out(effects: Sequence[ActiveEffect]) -> list[str]:

@@ -74,9 +74,8 @@ def simulate_file(
 ) -> Run:
     """Simulate the profile in `current` and write time, current, voltage and states to the CSV `out`.
 
-    Beside `temperature_k` stands `temperature_degc`, which files are read by: the case's as the profile has it, else
-    the model's, unless that is the cell file's all along. `depleted`, where it is asked to run on, is 1 from where the
-    model ran out.
+    The file has `temperature_k` and, where the temperature was measured or moves, `temperature_degc`. `depleted`, where
+    it is asked to run on, is 1 from where the model ran out.
 
     cell : a BPX file, or a folder of a saved model, whose cell and effects are taken (not its correction).
     effects : added to those.
@@ -112,16 +111,25 @@ def simulate_file(
         on_depletion="clip" if asked.run_on else "raise",
         model=used.model,
     )
-    degc = profile.temperature_degc
-    if degc is None and np.any(run.series["temperature_k"] != declared.cell.initial_temperature_k):
-        degc = run.series["temperature_k"] - ZERO_CELSIUS_K
-    columns_out = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
-    write_table(out, columns_out if degc is None else columns_out | {"temperature_degc": degc})
+    _write_run(out, run, profile.temperature_degc, declared.cell)
     say(reached(used.cell, placed.record, run.voltage_v, run.series["soc"]))
     if asked.run_on and np.any(run.series["depleted"]):
         at = int(np.argmax(run.series["depleted"]))
         say([ran_out(placed.record.name, {"this model": float(run.time_s[at])})])
     return run
+
+
+def _write_run(out: Path, run: Run, measured_degc: Array | None, cell: Cell) -> None:
+    """Write the columns of a run.
+
+    Beside `temperature_k` stands `temperature_degc`, which files are read by: the case's where it was measured, else
+    the model's, unless that is the cell file's all along.
+    """
+    degc = measured_degc
+    if degc is None and np.any(run.series["temperature_k"] != cell.initial_temperature_k):
+        degc = run.series["temperature_k"] - ZERO_CELSIUS_K
+    columns = {"time_s": run.time_s, "current_a": run.current_a, "voltage_v": run.voltage_v, **run.series}
+    write_table(out, columns if degc is None else columns | {"temperature_degc": degc})
 
 
 def predict_file(

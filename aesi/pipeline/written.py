@@ -1,20 +1,38 @@
-"""The files that a job leaves, so that a command can refuse a place before its work; light to import."""
+"""Names of the files that commands write, to a folder or to the tracking store, and which of them a command writes.
+
+A command asks here before its work whether it may write at all, so this module has to be light to import.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Literal
 
 MODEL = "model"
 """The folder of the model within a folder of results."""
 OF_MODEL = (".json", ".npz")
 """Endings of the files in it."""
-FINDING, REPORT, ARCHIVE = "discovery.json", "report.html", "hypotheses.jsonl"
-"""Of a discovery: the finding, the page, and the fits that it is taken up again from."""
+HEAD, ARRAYS, EFFECTS = "model.json", "arrays.npz", "effects"
+"""Of a saved model: its head, its arrays, and the part (a JSON file of that name) that tells its effects."""
+REPORT = "report.html"
+"""The page of a run or of a discovery."""
+SUMMARY = "summary.json"
+"""What a run or a batch came to."""
+TABLES: Mapping[Literal["md", "tex"], str] = {"md": "tables.md", "tex": "tables.tex"}
+"""Of a run, by their format."""
+FIGURES, PAPER_FIGURES = "figures", "paper.html"
+"""Of a run: the folder of its figures, and the page of them in it."""
+FINDING, ARCHIVE = "discovery.json", "hypotheses.jsonl"
+"""Of a discovery: the finding, and the fits that it is taken up again from."""
 ROW, CALIBRATED = "row.json", "calibrated.bpx.json"
 """Of a cell of a batch beside that: its row of the summary, and the cell of a check-up."""
-SUMMARY_TABLE, SUMMARY, SUMMARY_PAGE = "summary.csv", "summary.json", "index.html"
+SUMMARY_TABLE, SUMMARY_PAGE = "summary.csv", "index.html"
 """Of a batch."""
+CANDIDATE = "candidate.json"
+"""Of a candidate that was rebuilt, beside its model: its genome and its figures, then and now."""
+EXPERIMENT, COMPARISON, COEFFICIENTS = "experiment.json", "comparison.json", "coefficients.json"
+"""In the tracking store alone: the settings of a run, what `aesi compare` draws of it, the terms of a candidate."""
 
 
 def calibration_files(out: Path) -> tuple[Path, Path, Path, Path]:

@@ -16,6 +16,7 @@ from aesi.numerics.files.contents import contents
 from aesi.numerics.files.source_digest import source_digest
 from aesi.numerics.files.whole import write_whole
 from aesi.pipeline.experiment.sections import TrackingConfig
+from aesi.pipeline.written import SUMMARY
 from flows.base import fingerprint
 from flows.base.console import Console
 from flows.evaluation.spread import in_processes, on_dask
@@ -73,7 +74,7 @@ def tracked(cases: Cases, workers: int = 1, address: str | None = None) -> Itera
             tracker.metrics(_other_numbers(last, NO_FIGURES))
             if "confusion" in last:
                 tracker.json("confusion.json", last["confusion"])
-            tracker.json("summary.json", last)
+            tracker.json(SUMMARY, last)
     yield last
 
 

@@ -23,6 +23,7 @@ from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
 from aesi.bench.hybrid.ensemble import synthetic_record
 from aesi.pipeline.experiment.sections import TrackingConfig
+from aesi.pipeline.written import COEFFICIENTS
 from aesi.records import INPUT_NAMES, Split
 from aesi.sparse import Genome, Library, Options, Problem, evaluate
 from aesi.sparse.terms.inputs import with_inputs
@@ -93,7 +94,7 @@ def _round(
                 kind="candidate",
                 params={f"parameter_{k}": k / 7 for k in range(PARAMETERS)},
                 metrics={f"metric_{k}": k / 7 for k in range(METRICS)},
-                files={"coefficients.json": artifact},
+                files={COEFFICIENTS: artifact},
             )
             waited += time.perf_counter() - asked
     if tracker is not None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from aesi.errors import AesiError, InputError
-from flows.commands import complete, outputs
+from flows.commands import complete, options, outputs
 
 
 def bench(
@@ -17,9 +17,7 @@ def bench(
         str | None, typer.Argument(help="One benchmark; all without it.", autocompletion=complete.benchmarks)
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="One JSON line each.")] = False,
-    options: Annotated[
-        list[str] | None, typer.Option("--set", help="key=value, an option of the benchmark.")
-    ] = None,
+    given: Annotated[list[str] | None, options.key_value("key=value, an option of the benchmark.")] = None,
     compare: Annotated[
         Path | None,
         typer.Option(help="A history of results (docs/benchmarks.json): say what got worse, exit code 1."),
@@ -39,7 +37,9 @@ def bench(
             f"`aesi bench {name or ''}`".replace(" `", "`")
             + f" compares with {', '.join(lacking)}, not installed here: pip install {command}."
         )
-    keywords = dict(_pair(option) for option in options or [])
+    keywords = dict(_pair(option) for option in given or [])
+    if compare and not compare.exists():
+        raise InputError(f"--compare {compare}: there is no such file.")
     history = read_history(compare) if compare else []
     if compare and not history:
         raise InputError(f"{compare} holds no recorded benchmarks to compare with.")

@@ -246,7 +246,7 @@ def discover(
         ),
     ] = None,
     overrides: Annotated[
-        list[str] | None, typer.Option("--set", help="key=value laid over the experiment file.")
+        list[str] | None, options.key_value("key=value laid over the experiment file.")
     ] = None,
     prefect: options.PrefectOption = True,
 ) -> None:

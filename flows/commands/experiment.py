@@ -12,7 +12,7 @@ from flows.commands import options, outputs
 
 Experiment = Annotated[Path, typer.Argument(help="An experiment file, for instance experiments/smoke.yaml.")]
 Overrides = Annotated[
-    list[str] | None, typer.Option("--set", help="key=value laid over the file: search.candidates=50.")
+    list[str] | None, options.key_value("key=value laid over the file: search.candidates=50.")
 ]
 
 

@@ -88,6 +88,24 @@ HoldOption = Annotated[
     ),
 ]
 
+
+def _no_key_twice(pairs: list[str] | None) -> list[str] | None:
+    """Lets KEY=VALUE pairs through.  Raises InputError for a key that is there twice: of two values the last would
+    count, and nobody be told."""
+    seen = set()
+    for pair in pairs or []:
+        key = pair.partition("=")[0].strip()
+        if key in seen:
+            raise InputError(f"--set is there twice for {key}; give it once.")
+        seen.add(key)
+    return pairs
+
+
+def key_value(told: str) -> Any:
+    """The option `--set`, with its help."""
+    return typer.Option("--set", callback=_no_key_twice, help=told)
+
+
 SelfHeating = Annotated[
     bool,
     typer.Option(

@@ -10,11 +10,8 @@ from pathlib import Path
 
 from aesi.errors import InputError
 from aesi.numerics.files.whole import check_writable
-from aesi.pipeline.written import MODEL, SUMMARY
+from aesi.pipeline.written import ARRAYS, EFFECTS, HEAD, MODEL, SUMMARY
 
-HEAD, ARRAYS, EFFECTS = "model.json", "arrays.npz", "effects"
-"""Of a saved model, as `aesi.pipeline.product.model_folder` has it, which takes its time to import: its head, its
-arrays, and the part that names the files of the user's own effects."""
 PAGES = (".html", ".htm")
 OTHER_FORMATS = (
     *(".xlsx", ".xls", ".ods", ".parquet", ".feather", ".json", ".mat", ".h5"),

@@ -14,6 +14,7 @@ from aesi.pipeline.batch.job import Settings, lost_job, of_other_code, run_job
 from aesi.pipeline.batch.plan import Job, read_plan, without_records
 from aesi.pipeline.batch.summary import write_summary
 from aesi.pipeline.experiment.sections import TrackingConfig
+from aesi.pipeline.written import SUMMARY_PAGE, SUMMARY_TABLE
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.folder_lock import alone_in
@@ -109,7 +110,7 @@ def _track_summary(tracker: Tracker | None, rows: dict[str, dict[str, Any]], out
         return
     done = [row for row in rows.values() if row["status"] == "done"]
     tracker.metrics({"done": float(len(done)), "failed": float(len(rows) - len(done))})
-    for name in ("summary.csv", "index.html"):
+    for name in (SUMMARY_TABLE, SUMMARY_PAGE):
         tracker.files(out / name)
 
 

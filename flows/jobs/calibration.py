@@ -9,6 +9,7 @@ from typing import Any
 from aesi.pipeline.calibrate import Request, calibrate_files
 from aesi.pipeline.notes import together
 from aesi.pipeline.report.words.calibrations import open_line
+from aesi.pipeline.written import calibration_files
 from aesi.records import Measurement
 from flows.base import environment
 from flows.base.console import Console
@@ -44,5 +45,6 @@ def calibrate(
         console.say(f"  on a bound, so not to be believed: {', '.join(content['at_bounds'])}")
     for warning in content["warnings"]:
         console.say(f"  WARNING: {warning}")
-    console.say(f"Written: {out}. Report: {out.with_suffix('.report.html')}")
+    *_, page = calibration_files(out)
+    console.say(f"Written: {out}. Report: {page}")
     return content

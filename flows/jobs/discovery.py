@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from aesi.constants import MV_PER_V
 from aesi.pipeline.experiment.config import ExperimentConfig, read_experiment
 from aesi.pipeline.experiment.sections import TrackingConfig
-from aesi.pipeline.written import ARCHIVE
+from aesi.pipeline.written import ARCHIVE, FINDING, REPORT
 from flows.base import environment
 from flows.base.console import Console, duration
 from flows.base.folder_lock import alone_in
@@ -111,7 +111,7 @@ def _page(content: dict[str, Any], out: Path, tracker: Tracker | None) -> str:
         figures = [content[state].get(part, {}).get("rmse_mv") for part in ("fit", "test")]
         shown = " | ".join("" if value is None else f"{value:.2f}" for value in figures)
         lines.append(f"| {words} | {shown} |")
-    lines += ["", f"Report: `{out / 'report.html'}`", ""]
+    lines += ["", f"Report: `{out / REPORT}`", ""]
     if tracker is not None:
         lines.append(f"Tracked: [{tracker.run_id}]({tracker.address})")
     return "\n".join(lines)
@@ -220,7 +220,7 @@ def _track_result(tracker: Tracker | None, found: Discovery, content: dict[str, 
     names = ("confidence", "noise_floor_mv", "explainable_mv", "structured_mv")
     figures = {name: content[name] for name in names if content[name] is not None}
     tracker.metrics(errors | figures | {"seconds": content["seconds"]})
-    for name in ("discovery.json", "report.html"):
+    for name in (FINDING, REPORT):
         tracker.files(out / name)
 
 
@@ -243,7 +243,7 @@ def _say(console: Console, content: dict[str, Any], notes: Sequence[str], out: P
             console.say(f"  {part}: {_errors_of(content, part)}")
     for note in together(notes):
         console.say(f"  {note}")
-    console.say(f"Finished in {duration(time.monotonic() - started)}. Report: {out / 'report.html'}")
+    console.say(f"Finished in {duration(time.monotonic() - started)}. Report: {out / REPORT}")
 
 
 def _errors_of(content: dict[str, Any], part: str) -> str:

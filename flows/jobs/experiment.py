@@ -14,6 +14,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aesi.pipeline.written import REPORT
 from flows.base.console import Console, duration
 from flows.jobs.run_request import RunRequest
 from flows.jobs.run_session import working_on
@@ -36,7 +37,7 @@ def run_experiment(request: RunRequest, run: Stages, console: Console) -> Path:
 
         folder = ExperimentJob(request, tracker, run, console, started).results()
     console.say(f"Finished in {duration(time.monotonic() - started)}.")
-    console.say(f"Report: {_shown(folder / 'report.html')}")
+    console.say(f"Report: {_shown(folder / REPORT)}")
     where = _uri_option(config.tracking.uri)
     console.say(f"Runs:   aesi ui{where}        Tables: aesi tables {config.name}{where}")
     return folder

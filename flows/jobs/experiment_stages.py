@@ -21,6 +21,7 @@ from aesi.pipeline.experiment.judging.validation import validation_mser
 from aesi.pipeline.experiment.load import Loaded, load
 from aesi.pipeline.experiment.outputs import Result, write_outputs
 from aesi.pipeline.notes import together
+from aesi.pipeline.written import COMPARISON, REPORT, TABLES
 from aesi.sparse import Problem
 from flows.base import environment
 from flows.base.console import Console
@@ -149,13 +150,13 @@ class ExperimentJob:
     def _report(self, folder: Path, result: Result, found: Found) -> Mapping[str, Any]:
         summary = self.run("report", lambda: write_outputs(folder, result))
         self.console.say(summary["finding"])
-        self.tracker.json("comparison.json", self.run("comparison", lambda: comparison(result)))
+        self.tracker.json(COMPARISON, self.run("comparison", lambda: comparison(result)))
         track_result(self.tracker, folder, summary, found.number, result.fitted, result.config.note)
         return summary
 
     def _publish(self, folder: Path, summary: Mapping[str, Any], config: ExperimentConfig) -> None:
         slug = re.sub("[^a-z0-9]+", "-", config.name.lower()).strip("-")
-        tables = (folder / "tables.md").read_text(encoding="utf-8")
+        tables = (folder / TABLES["md"]).read_text(encoding="utf-8")
         self.run.publish(f"{slug}-report", self._page(folder, summary), f"What came of {config.name}")
         self.run.publish(f"{slug}-tables", tables, f"Tables of {config.name}")
 
@@ -166,4 +167,4 @@ class ExperimentJob:
         if summary["fallback"]:
             lines += [f"**{summary['fallback']}**", ""]
         tracked = f"[{self.tracker.run_id}]({self.tracker.address})"
-        return "\n".join([*lines, f"- report: `{folder / 'report.html'}`", f"- tracked: {tracked}"])
+        return "\n".join([*lines, f"- report: `{folder / REPORT}`", f"- tracked: {tracked}"])

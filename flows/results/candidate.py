@@ -28,6 +28,7 @@ from aesi.pipeline.experiment.intervals.conformalise import conformalise
 from aesi.pipeline.experiment.judging.reductions import AGAINST, valid_shares
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.written import CANDIDATE, EXPERIMENT, MODEL
 from aesi.records import Failed, LeftOutDrives
 from aesi.sparse import Candidate, Genome, Problem, evaluate
 from flows.base import codec
@@ -42,7 +43,6 @@ from flows.tracking.experiment_log import (
 )
 from flows.tracking.store import KIND, PARENT, Store, without_login
 
-EXPERIMENT = "experiment.json"
 COMMIT, COMMIT_SHOWN = "mlflow.source.git.commit", 10
 GENES = ("lambda1", "lambda2", "tau", "p_c", "d", "feedback")
 
@@ -126,7 +126,7 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         soc0=rebuilt.declared.soc0,
         model=rebuilt.declared.model,
     )
-    model.save(out / "model")
+    model.save(out / MODEL)
     content = {
         "run_id": rebuilt.run_id,
         "number": rebuilt.number,
@@ -136,8 +136,8 @@ def save(rebuilt: Rebuilt, out: Path) -> Path:
         "tracked": dict(rebuilt.tracked),
         "coefficients": coefficients(rebuilt.candidate),
     }
-    write_whole(out / "candidate.json", json.dumps(content, indent=1))
-    return out / "model"
+    write_whole(out / CANDIDATE, json.dumps(content, indent=1))
+    return out / MODEL
 
 
 def said(rebuilt: Rebuilt, out: Path) -> str:
@@ -147,7 +147,7 @@ def said(rebuilt: Rebuilt, out: Path) -> str:
     return (
         f"candidate {rebuilt.number}: {len(candidate.bagging.terms)} and {len(candidate.stability.terms)} terms, "
         f"{reduced(declared)} squared error on validation in free run, {reduced(recalibrated)} than recalibrated; "
-        f"{candidate.better.name} is in {out / 'model'}"
+        f"{candidate.better.name} is in {out / MODEL}"
     )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from aesi.errors import InputError
 from aesi.pipeline.report.compare import ComparedRun, write_comparison
+from aesi.pipeline.written import COMPARISON, FINDING
 from flows.tracking.store import Store, beginning
 
 OF_THE_RESULT = ("chosen_candidate", "chosen_model")
@@ -67,8 +68,8 @@ def _compared(store: Store, experiment: str, run: Any) -> ComparedRun:
         chosen=run.data.params.get("chosen_model", ""),
         judged_on=_judged_on(run.data.params),
         tags=run.data.tags,
-        comparison=_content(store, run, "comparison.json"),
-        discovery=_content(store, run, "discovery.json") if "verdict" in run.data.tags else {},
+        comparison=_content(store, run, COMPARISON),
+        discovery=_content(store, run, FINDING) if "verdict" in run.data.tags else {},
     )
 
 

@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 from aesi.errors import InputError
 from aesi.pipeline.report import tables
+from aesi.pipeline.written import FIGURES, REPORT, SUMMARY
 from flows.tracking.experiment_log import CODE, SETTING, UNFITTED
 from flows.tracking.store import KIND, Store, without_login
 
@@ -167,13 +168,13 @@ def _by_id(finished: Sequence[Any], run_id: str, name: str) -> Any:
 
 
 def _summary(store: Store, run: Any) -> dict[str, Any]:
-    return dict(json.loads(store.read(run, "summary.json").read_text(encoding="utf-8")))
+    return dict(json.loads(store.read(run, SUMMARY).read_text(encoding="utf-8")))
 
 
 def _copy_figures(store: Store, run_id: str, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for item in store.client.list_artifacts(run_id):
-        if item.path in ("report.html", "figures"):
+        if item.path in (REPORT, FIGURES):
             store.client.download_artifacts(run_id, item.path, str(folder))
 
 

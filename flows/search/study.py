@@ -27,6 +27,8 @@ from flows.search.result import SearchResult
 
 OnScored = Callable[[int, Genome, ScoredCandidate | Failed], None]
 """Told of each candidate: its number, its genome, what became of it."""
+OnGeneration = Callable[[int, int], None]
+"""Told how many candidates of how many are done, a generation at a time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,14 +81,15 @@ def run_study(
     on_scored: OnScored | None = None,
     tally: Tally | None = None,
     publish_as: str | None = None,
-    on_generation: Callable[[int, int], None] | None = None,
+    on_generation: OnGeneration | None = None,
     lost_again: bool = False,
 ) -> Found:
     """Search until all candidates of the experiment are known, and pick one.
 
-    on_generation : told how many candidates of how many are done, a generation at a time.
+    reuse, lost_again : see `Evaluation`; a resumed run leaves out the latter, since its candidates are tracked as they
+    were.
+    on_scored, on_generation : told of what is done.  tally : counts where the outcomes came from.
     publish_as : name of the study in Optuna's storage; None publishes nothing.
-    lost_again : see `Evaluation`; not of a run that is gone on with, whose candidates are tracked as they were.
 
     Raises FitError, with the reasons counted, where no candidate is feasible.
     """
@@ -95,41 +98,23 @@ def run_study(
     pool = open_pool(problem, config, study)
     tally = tally or Tally()
     evaluation = Evaluation(pool, outcomes, study, console.say, tally, reuse, lost_again)
-    scored: dict[int, ScoredCandidate | Failed] = {}
-    waiting: dict[Genome, list[ScoredCandidate | Failed]] = {}
-    started = time.monotonic()
     settings = settings_of(problem, config)
-    constraints = settings.constraints
-    published = None
+    listeners = [] if on_scored is None else [on_scored]
     if publish_as:
         space = genome_space(problem, config)
-        published = PublishedStudy(publish_as, config.runner.storage, constraints, space, console.say)
-
-    def evaluate_many(genomes: Sequence[Genome]) -> Iterator[tuple[int, Candidate | Failed]]:
-        for position, outcome in evaluation(genomes):
-            waiting.setdefault(genomes[position], []).append(outcome)
-            yield position, outcome if isinstance(outcome, Failed) else outcome.candidate
-
-    def on_candidate(number: int, genome: Genome, outcome: Candidate | Failed) -> None:
-        scored[number] = waiting[genome].pop()
-        if on_scored is not None:
-            on_scored(number, genome, scored[number])
-        if published is not None:
-            published.add(number, genome, scored[number])
-        done, total = len(scored), config.search.candidates
-        if on_generation is not None and (done % config.search.population == 0 or done == total):
-            on_generation(done, total)
-        told = _best(scored, constraints)
-        console.progress("candidates", len(scored), config.search.candidates, started, told)
-
+        published = PublishedStudy(
+            publish_as, config.runner.storage, settings.constraints, space, console.say
+        )
+        listeners.append(published.add)
+    scores = _Scores(evaluation, config, settings.constraints, console, listeners, on_generation)
     try:
         result = search(
             problem,
             config.search.candidates,
             config.seed,
             settings,
-            on_candidate=on_candidate,
-            evaluate_many=evaluate_many,
+            on_candidate=scores.on_candidate,
+            evaluate_many=scores.evaluate_many,
         )
     finally:
         pool.close()
@@ -137,9 +122,50 @@ def run_study(
     if tally.found:
         console.say(f"  {tally.evaluated} candidates evaluated, {tally.found} known from before")
     numbers = result.fittest(top_share(config))
-    chosen = averaged([_alive(number, scored[number]) for number in numbers])
+    chosen = averaged([_alive(number, scores.scored[number]) for number in numbers])
     key = fingerprint.key(*(evaluation.key(genome) for genome in chosen.genomes))
-    return Found(result, numbers, chosen, key, scored)
+    return Found(result, numbers, chosen, key, scores.scored)
+
+
+class _Scores:
+    """What has become of the candidates of a study so far; whoever listens is told of each.
+
+    The search sees a `Candidate`; what is kept and told also has its intervals on the validation records.
+    scored : number -> outcome, of all candidates so far.
+    """
+
+    def __init__(
+        self,
+        evaluation: Evaluation,
+        config: ExperimentConfig,
+        constraints: Constraints,
+        console: Console,
+        listeners: Sequence[OnScored],
+        on_generation: OnGeneration | None,
+    ) -> None:
+        self.scored: dict[int, ScoredCandidate | Failed] = {}
+        self._evaluation, self._constraints, self._console = evaluation, constraints, console
+        self._total, self._population = config.search.candidates, config.search.population
+        self._listeners, self._on_generation = listeners, on_generation
+        self._unnumbered: dict[Genome, list[ScoredCandidate | Failed]] = {}
+        self._started = time.monotonic()
+
+    def evaluate_many(self, genomes: Sequence[Genome]) -> Iterator[tuple[int, Candidate | Failed]]:
+        """A generation as `search` asks for it: (position, outcome) as they come."""
+        for position, outcome in self._evaluation(genomes):
+            self._unnumbered.setdefault(genomes[position], []).append(outcome)
+            yield position, outcome if isinstance(outcome, Failed) else outcome.candidate
+
+    def on_candidate(self, number: int, genome: Genome, outcome: Candidate | Failed) -> None:
+        """Keep the outcome of a candidate, now that the search has given it a number, and tell of it."""
+        self.scored[number] = self._unnumbered[genome].pop()
+        for listener in self._listeners:
+            listener(number, genome, self.scored[number])
+        done, total = len(self.scored), self._total
+        if self._on_generation is not None and (done % self._population == 0 or done == total):
+            self._on_generation(done, total)
+        told = _best(self.scored, self._constraints)
+        self._console.progress("candidates", done, total, self._started, told)
 
 
 def settings_of(problem: Problem, config: ExperimentConfig) -> SearchSettings:

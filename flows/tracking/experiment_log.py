@@ -17,6 +17,7 @@ from aesi.pipeline.experiment.fit import Fitted
 from aesi.pipeline.experiment.judging.reductions import valid_reductions, valid_shares
 from aesi.pipeline.experiment.load import Loaded
 from aesi.pipeline.product.hybrid import HybridModel
+from aesi.pipeline.written import COEFFICIENTS, EXPERIMENT, FIGURES, MODEL, REPORT, SUMMARY, TABLES
 from aesi.records import ROLES, Failed
 from aesi.sparse import Candidate, Genome, Problem, SparseModel
 from flows.base import codec
@@ -61,7 +62,7 @@ def track_start(tracker: Tracker, config: ExperimentConfig, loaded: Loaded, fold
     if loaded.fallback:
         tags["aesi.fallback"] = loaded.fallback
     tracker.parameters(flat(content) | {"versions": versions(), "cell": loaded.cell_name, **held}, tags)
-    tracker.json("experiment.json", whole)
+    tracker.json(EXPERIMENT, whole)
     write_whole(folder / INPUTS / RECORDS, codec.dumps(loaded.split))
     write_whole(folder / INPUTS / LEFT_OUT, codec.dumps(loaded.left_out))
     soc0 = next(iter(loaded.soc0.values()), None)
@@ -127,9 +128,7 @@ class CandidateTracker:
             kind="candidate",
             params=params,
             metrics={} if isinstance(outcome, Failed) else _metrics(outcome, self._valid_shares),
-            files={}
-            if isinstance(outcome, Failed)
-            else {"coefficients.json": coefficients(outcome.candidate)},
+            files={} if isinstance(outcome, Failed) else {COEFFICIENTS: coefficients(outcome.candidate)},
             failed=outcome.reason if isinstance(outcome, Failed) else None,
             tags={} if isinstance(outcome, Failed) or not outcome.note else {"aesi.intervals": outcome.note},
             seconds=0.0 if isinstance(outcome, Failed) else outcome.seconds,
@@ -161,14 +160,14 @@ def track_result(
     }
     tracker.parameters({"chosen_candidate": number, "chosen_model": chosen}, tags)
     tracker.mark(f"candidate:{number}", {CHOSEN: "true"})
-    for name in ("summary.json", "report.html", "tables.md", "tables.tex"):
+    for name in (SUMMARY, REPORT, *TABLES.values()):
         tracker.files(folder / name)
     for one in fitted:
         if one.trials:
             tracker.json(f"search of {one.model.name}.json", [dict(row) for row in one.trials])
-    if (folder / "figures").is_dir():
-        tracker.files(folder / "figures", "figures")
-    tracker.model(folder / "model")
+    if (folder / FIGURES).is_dir():
+        tracker.files(folder / FIGURES, FIGURES)
+    tracker.model(folder / MODEL)
 
 
 def result_line(row: Mapping[str, Any]) -> str:

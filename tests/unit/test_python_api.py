@@ -310,7 +310,7 @@ def test_a_prediction_takes_one_temperature_for_all_rows(cell, current):
 
 def test_an_impedance_says_what_cannot_be_meant(cell):
     for changes, sentence in (
-        ({"soc": 50}, "soc0 = 50 is not a state of charge"),
+        ({"soc": 50}, "^soc = 50 is not a state of charge"),
         ({"soc": [0.5, 0.6]}, "is not a state of charge"),
         ({"soc": None}, "soc = None is no state of charge"),
         ({"temperature_degc": "room"}, "temperature_degc holds 'room', which is not a number"),

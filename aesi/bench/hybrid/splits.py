@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench import some_chosen
 from aesi.constants import MV_PER_V
 from aesi.errors import InputError
 from aesi.numerics.metrics import rms
@@ -106,9 +107,7 @@ def chosen_splits(
         if a_cell is not None and a_cell < len(mine):
             mine = [mine[i] for i in np.linspace(0, len(mine) - 1, a_cell).round().astype(int)]
         kept += mine
-    if not kept:
-        raise InputError("no split is chosen; `aesi bench splits` without options runs all of them.")
-    return tuple(kept)
+    return tuple(some_chosen("splits", kept, (s.name for s in all_splits() if s.cell in cells)))
 
 
 def judged(fitted: Sequence[Fitted], tests: Sequence[ErrorSeries]) -> dict[str, Any]:

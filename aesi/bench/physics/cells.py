@@ -27,6 +27,7 @@ from typing import Any
 
 import numpy as np
 
+from aesi.bench import some_chosen
 from aesi.bench.physics.archive import ARCHIVE, HG2, NCR, chamber, degc_of
 from aesi.bench.physics.tested import soh_on_its_day
 from aesi.constants import MV_PER_V
@@ -116,13 +117,11 @@ def run(
 
     cells : folder of the cell files.  only : names of sets or records; all without it.  archive : of the records of the
     published archives, in place of those of the sets.  porous : add `porous_mv`, the file at the measured temperature
-    with the porous electrode in place of the single particle, some seconds a record.
+    with the porous electrode in place of the single particle, some seconds a record.  Raises InputError where a name of
+    `only` is none.
     """
-    wanted = {only} if isinstance(only, str) else set(only)
     rows = []
-    for record in ARCHIVED if archive else RECORDS:
-        if wanted and not wanted & {record.data, record.name}:
-            continue
+    for record in _chosen([only] if isinstance(only, str) else only, ARCHIVED if archive else RECORDS):
         row = judged(Path(cells), record, porous)
         rows.append(row)
         yield row
@@ -138,6 +137,14 @@ def run(
         "others_printed": len(beaten),
         "below_others": sum(best(r) < r["others_mv"] for r in beaten),
     }
+
+
+def _chosen(only: Sequence[str], there: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
+    """The records of the named sets or names, each of which has to be one; all where none is given."""
+    names = [name for record in there for name in (record.data, record.name)]
+    by_name = {one: [record for record in there if one in (record.data, record.name)] for one in only}
+    wanted = [record for found in by_name.values() for record in some_chosen("cells", found, names)]
+    return [record for record in there if record in wanted or not only]
 
 
 def best(row: dict[str, Any]) -> float:

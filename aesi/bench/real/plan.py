@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from aesi.bench import some_chosen
 from aesi.bench.physics.archive import ARCHIVE
 from aesi.bench.real.case import Fault, RealCase, Take
 from aesi.bench.real.faults import FaultKind
@@ -115,15 +116,15 @@ def chosen(
     development: bool | None = None,
     every: int = 1,
     archive: bool = False,
-) -> list[RealCase]:
+) -> Sequence[RealCase]:
     """Cases of the plan; of that of the archives with `archive`.
 
     cases : the first so many.  only : a group, or a substring of names.  development : only those that choose, or only
-    those that do not.  every : take each n-th.
+    those that do not.  every : take each n-th.  Raises InputError where none is left.
     """
     found = [c for c in plan(archive) if only is None or only == c.group or only in c.name]
     found = [c for c in found if development is None or c.development == development]
-    return found[::every][:cases]
+    return some_chosen("real", found[::every][:cases], (case.group for case in plan(archive)))
 
 
 def _stop(file: str) -> float | None:

@@ -29,7 +29,7 @@ class Conditions:
     temperatures_degc : of records without a column.
     dates : days of the records: what is of another day may be of another age.  as_of : of the file's state, the last
     with a load without it.
-    physics : the model that is fitted; None takes "espm".
+    model : that is fitted, "espm" or "dfn"; None takes "espm".
     same_cell : the file is of this very cell, so that a charge that is missing was lost and the stoichiometries of full
     charge may be far from the file's; else it may be of a cell of another size, and its area is scaled to the charge
     of a full discharge.
@@ -41,7 +41,7 @@ class Conditions:
     temperatures_degc: Mapping[str, float] = field(default_factory=dict)
     dates: Mapping[str, date] = field(default_factory=dict)
     as_of: date | None = None
-    physics: ModelName | None = None
+    model: ModelName | None = None
     same_cell: bool = False
     spectra: tuple[Spectrum, ...] = ()
     priors: Mapping[str, tuple[float, float]] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""Records by name: what is said and found of each is kept under its name, so that no two may share one."""
+"""Names that tell the records of a calibration apart: what is given and found of a record is kept under its name."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def named_apart(
 ) -> tuple[Measurement, ...]:
     """The records; those that share a name are numbered: `us06 (1)`, `us06 (2)`.
 
-    said : what is said, in a word -> that, by record name.
-    Raises DataError where it is said of a name that several records share.
+    said : what is given of single records, by what it is in a word ("temperature") and by record name.
+    Raises DataError where something is given under a name that several records share.
     """
     counts = Counter(record.name for record in records)
     for what, by_name in said.items():

@@ -65,7 +65,7 @@ def prepared(
     cell: Cell,
     records: Sequence[Measurement],
     soc0: float | None,
-    physics: ModelName = "espm",
+    model: ModelName = "espm",
     same_cell: bool = False,
     cut: Collection[str] = (),
 ) -> tuple[Prepared, ...]:
@@ -76,17 +76,17 @@ def prepared(
     """
     least = SOC_SD if same_cell else OTHER_CELL_SD
     return tuple(
-        _prepared(cell, data, None if data.name in cut else soc0, len(records) > 1, physics, least)
+        _prepared(cell, data, None if data.name in cut else soc0, len(records) > 1, model, least)
         for data in records
     )
 
 
 def _prepared(
-    cell: Cell, data: Measurement, soc0: float | None, shared: bool, physics: ModelName, least: float
+    cell: Cell, data: Measurement, soc0: float | None, shared: bool, model: ModelName, least: float
 ) -> Prepared:
     window_s = max(1.0, float(data.time_s[-1] - data.time_s[0]) / MOST_ROWS)
     thin = thinned(data, cell.capacity_ah, window_s)
-    start = initial_state(cell, data, soc0, data.hold_taken, shared=shared, model=physics)
+    start = initial_state(cell, data, soc0, data.hold_taken, shared=shared, model=model)
     slow = is_slow(thin.data, cell.nominal_capacity_ah)
     if start.basis == "given":
         sd = start.sd

@@ -125,7 +125,7 @@ class FittedSpectra:
     """
 
     spectra: tuple[Spectrum, ...]
-    physics: ModelName
+    model: ModelName
 
     def misfits(self, cell: Cell) -> Array:
         """(2 frequencies in the band, all spectra after one another) of this cell."""
@@ -143,7 +143,7 @@ class FittedSpectra:
         seen = in_band(spectrum)
         measured = spectrum.z_ohm[seen]
         soc = min(max(state_of(cell, spectrum), 0.0), 1.0)  # near empty, a step of the capacity may leave it
-        z = impedance(cell, spectrum.frequency_hz[seen], soc, degc_of(spectrum), model=self.physics)
+        z = impedance(cell, spectrum.frequency_hz[seen], soc, degc_of(spectrum), model=self.model)
         off = (z - measured) / np.abs(measured)
         return np.concatenate([off.real, off.imag]) / (SPECTRUM_SHARE * _by_decade(spectrum) ** 0.5)
 

@@ -1,4 +1,4 @@
-"""What the values of a cell's file cannot be: one sentence for the first that no cell has.
+"""Checks of the values in a cell's file; an error is one sentence on the first value that no cell has.
 
 The limits are wide: they tell a wrong unit or sign, not a poor parametrisation.
 """

@@ -1,4 +1,4 @@
-"""Activation energies: what is known of them where no record of a cell tells, and when records do."""
+"""Priors of activation energies, for cells whose records do not determine them, and when records do."""
 
 from __future__ import annotations
 

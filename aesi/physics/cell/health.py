@@ -1,4 +1,4 @@
-"""A state of health: the share of its file's capacity that a cell had, as such or by the day of a test.
+"""State of health: the share of its file's capacity that a cell had, given as that share or as the day of a test.
 
 A cell that is tested for weeks ages on the way, so that a record is of the capacity of its day and not of the file's.
 The records of a calibration each have a share of the file's capacity, and those with a date tell how it went: between
@@ -66,7 +66,7 @@ def checked_soh(soh: Soh) -> Soh:
 
 
 def day_of(given: date) -> date:
-    """The day of a moment: a moment is a date to Python, and two of one day are less than a day apart."""
+    """The day of a date, which in Python may also be a moment (`datetime`): two moments of one day are one day here."""
     return given.date() if isinstance(given, datetime) else given
 
 

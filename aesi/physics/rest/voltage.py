@@ -1,4 +1,4 @@
-"""The voltage of a rest as it stands, and as the cell has it, whatever its instruments add."""
+"""The voltage of a cell at rest: as it was read, and freed of what instrument faults added to it."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""The first row of a record against a cell: a rest that still relaxes, a loaded start, and what is known of either."""
+"""State of charge at the first row of a record: from a rest that still relaxes, or from a start under load."""

@@ -34,12 +34,10 @@ ROUNDS = 4
 
 
 class LoadedStart:
-    """The first minutes of a record under load, simulated.  physics : the model that does."""
+    """The first minutes of a record under load, simulated by `model`."""
 
-    def __init__(
-        self, open_circuit: OpenCircuit, record: Measurement, hold: Hold, physics: ModelName
-    ) -> None:
-        self.open_circuit, self.record, self.hold, self.physics = open_circuit, record, hold, physics
+    def __init__(self, open_circuit: OpenCircuit, record: Measurement, hold: Hold, model: ModelName) -> None:
+        self.open_circuit, self.record, self.hold, self.model = open_circuit, record, hold, model
         self.cell = open_circuit.cell
         self.current_a = float(self.record.current_a[0])
 
@@ -93,6 +91,6 @@ class LoadedStart:
     def _run(self, time_s: Array, current_a: Array, soc: float) -> Array:
         degc = self.open_circuit.kelvin - ZERO_CELSIUS_K
         run = simulate(
-            self.cell, time_s, current_a, soc, (), degc, self.hold, on_depletion="clip", model=self.physics
+            self.cell, time_s, current_a, soc, (), degc, self.hold, on_depletion="clip", model=self.model
         )
         return run.voltage_v

@@ -1,4 +1,4 @@
-"""What a cell at the beginning of a record relaxes to: how long it has rested, and after what, nobody knows.
+"""The voltage that a cell relaxes to, read from a record that begins with a rest of unknown length and history.
 
     V(t) = U + a g(t) + e,     a ~ N(0, C**2),     e ~ N(0, RELAXED_SHAPE_V**2)                            (1)
 
@@ -42,10 +42,10 @@ WITHIN = np.concatenate([[0.0], np.geomspace(0.02, 1.0, 8)])
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """How a record begins.
+    """The rest that a record begins with.
 
-    rows : before a load starts, or a smaller current has moved the state of charge; at least the first row.
-    flows : such a current goes on after them, and has likely flowed before.
+    rows : those before a load starts, or before a small current has moved the state of charge; at least the first row.
+    flows : a small current goes on after these rows, and has likely flowed before them.
     """
 
     rows: Measurement
@@ -67,19 +67,17 @@ def resting_rows(record: Measurement, limit_a: float, most_ah: float, hold: Hold
     return Rest(rows.take(slice(0, n)), flows=n < len(rows) and bool(small[n]))
 
 
-def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, physics: ModelName) -> tuple[float, float]:
+def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, model: ModelName) -> tuple[float, float]:
     """U of (1) and its standard deviation, V.
 
-    rest : rows without a current; of too few, their mean and nought.  physics : the model that has g.
+    rest : rows without a current; of too few, their mean and nought.  model : that g is simulated with.
     """
     if len(rest) < PARTS:
         return float(rest.voltage_v.mean()), 0.0
     starts = np.linspace(0, len(rest), PARTS + 1).astype(int)[:-1]
     last = float(rest.voltage_v[starts[-1] :].mean())
     seen = _means(rest.voltage_v - last, starts)
-    histories = list(
-        _histories(open_circuit, rest.time_s - rest.time_s[0], open_circuit.soc_at(last), physics)
-    )
+    histories = list(_histories(open_circuit, rest.time_s - rest.time_s[0], open_circuit.soc_at(last), model))
     found = [_explained(seen, _means(away, starts), rate_sd) for away in histories for rate_sd in C_RATE_SDS]
     nats, to_come, variance = (np.array(column) for column in zip(*found, strict=True))
     weight = np.exp(nats - nats.max())
@@ -89,9 +87,9 @@ def settled_voltage(open_circuit: OpenCircuit, rest: Measurement, physics: Model
 
 
 def _explained(seen: Array, away: Array, rate_sd: float) -> tuple[float, float, float]:
-    """What is said of the means over parts of a rest by one history (nats), and mean (V) and variance of U by it.
+    """How well one history explains the means over parts of a rest (nats), and the mean (V) and variance of U by it.
 
-    seen, away : (p,) V about the last one, and V over C-rate.
+    seen : (p,) V, the means about the last voltage.  away : (p,) V over C-rate, those of g of (1) for this history.
     """
     slopes = np.column_stack([np.ones(len(seen)), away]) / RELAXED_SHAPE_V
     prior = np.diag([UNKNOWN_V**-2, rate_sd**-2])
@@ -106,7 +104,7 @@ def _means(values: Array, starts: IntArray) -> Array:
     return np.asarray(np.add.reduceat(values, starts) / np.diff(np.append(starts, len(values))))
 
 
-def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, physics: ModelName) -> Iterator[Array]:
+def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, model: ModelName) -> Iterator[Array]:
     """(n,) V over C-rate, g of (1) at the rows of a rest, for each history."""
     # With the charge of its double layers a cell rests beside the open-circuit voltage of its state of charge, and far
     # beside it where that is steep: layers of 7 and 11 F/m2 made 60 mV of 20 s of C/4 at a full LFP cell, and of a rest
@@ -122,7 +120,7 @@ def _histories(open_circuit: OpenCircuit, time_s: Array, soc: float, physics: Mo
         current = np.where(time <= flowed_s, current_a, 0.0)
         before = soc + current_a * flowed_s / SECONDS_PER_HOUR / cell.capacity_ah
         degc = open_circuit.kelvin - ZERO_CELSIUS_K
-        run = simulate(cell, time, current, before, (), degc, "backward", on_depletion="clip", model=physics)
+        run = simulate(cell, time, current, before, (), degc, "backward", on_depletion="clip", model=model)
         away = (run.voltage_v - open_circuit.voltage_at(float(run.series["soc"][-1]))) / rate
         for stopped_s in STOPPED_S:
             yield np.interp(flowed_s + stopped_s + time_s, time, away)

@@ -23,6 +23,7 @@ from aesi.pipeline.report import tables, write_figures, write_run_report
 from aesi.pipeline.report.figures import paper_figures
 from aesi.pipeline.report.views import BootstrapView, RecordTrace, RunView
 from aesi.pipeline.report.words.runs import run_finding
+from aesi.pipeline.written import FIGURES, MODEL, PAPER_FIGURES, REPORT, SUMMARY, TABLES
 from aesi.sparse import ENSEMBLES, Candidate, Problem, SparseModel
 from aesi.sparse.ranking import svd_ranking
 
@@ -104,12 +105,12 @@ def write_outputs(folder: Path, result: Result) -> dict[str, Any]:
         "notes": list(notes(result)),
         "models": rows,
     }
-    replace(hybrid(result), finding=finding).save(folder / "model")
-    for format in ("md", "tex"):
-        write_whole(folder / f"tables.{format}", tables.render(rows, format))
-    write_run_report(folder / "report.html", view)
-    write_figures(folder / "figures" / "paper.html", f"{view.experiment}: figures", paper_figures(view))
-    write_whole(folder / "summary.json", json.dumps(summary, indent=1, allow_nan=False))
+    replace(hybrid(result), finding=finding).save(folder / MODEL)
+    for format, name in TABLES.items():
+        write_whole(folder / name, tables.render(rows, format))
+    write_run_report(folder / REPORT, view)
+    write_figures(folder / FIGURES / PAPER_FIGURES, f"{view.experiment}: figures", paper_figures(view))
+    write_whole(folder / SUMMARY, json.dumps(summary, indent=1, allow_nan=False))
     return summary
 
 

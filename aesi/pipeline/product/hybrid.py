@@ -28,9 +28,10 @@ from aesi.physics.depletion import RUN_ON
 from aesi.physics.effects import active_effect
 from aesi.pipeline.product.deviations import slopes_v
 from aesi.pipeline.product.error_series import error_series
-from aesi.pipeline.product.model_folder import HEAD, part_file, read_model, write_model
+from aesi.pipeline.product.model_folder import part_file, read_model, write_model
 from aesi.pipeline.product.prediction import Prediction
 from aesi.pipeline.product.trained import outside_trained, trained_on
+from aesi.pipeline.written import EFFECTS, HEAD
 from aesi.records import ErrorSeries, FreeRun, Hold, Measurement
 from aesi.records.checked import numbers, row_words
 from aesi.sparse import SparseModel
@@ -148,7 +149,7 @@ class HybridModel:
         folder = Path(folder)
         parts: dict[str, Any] = {
             "cell.bpx": self.cell.to_bpx(),
-            "effects": [effect.to_dict() for effect in self.effects],
+            EFFECTS: [effect.to_dict() for effect in self.effects],
         }
         for name in ("correction", "intervals", "bands"):
             part = getattr(self, name)
@@ -171,8 +172,8 @@ class HybridModel:
         ):
             with _as_saved(part_file(folder, name)):
                 read[name] = of_content(parts[name]) if parts.get(name) else None
-        with _as_saved(part_file(folder, "effects")):
-            read["effects"] = tuple(active_effect(content) for content in parts.get("effects", ()))
+        with _as_saved(part_file(folder, EFFECTS)):
+            read["effects"] = tuple(active_effect(content) for content in parts.get(EFFECTS, ()))
         with _as_saved(folder / HEAD):
             return HybridModel(
                 cell=Cell.from_bpx(part_file(folder, "cell.bpx"), fitted=True),

@@ -17,10 +17,9 @@ from aesi.errors import InputError
 from aesi.numerics.files.arrays import read_arrays
 from aesi.numerics.files.whole import write_whole
 from aesi.numerics.typing import Array
+from aesi.pipeline.written import ARRAYS, HEAD, MODEL
 
 SCHEMA = "aesi.model/1"
-HEAD = "model.json"
-ARRAYS = "arrays.npz"
 ARRAY_KEY = "array:"
 """Prefix of a string that stands for an array of arrays.npz."""
 
@@ -76,7 +75,7 @@ def read_model(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 
 def _below(folder: Path) -> str:
     """The newest model in a folder of runs, as a question, where somebody named that instead."""
-    heads = [head for pattern in ("model", "*/model") for head in folder.glob(f"{pattern}/{HEAD}")]
+    heads = [head for pattern in (MODEL, f"*/{MODEL}") for head in folder.glob(f"{pattern}/{HEAD}")]
     newest = max(heads, key=lambda head: head.stat().st_mtime, default=None)
     return "." if newest is None else f"; did you mean {newest.parent}?"
 

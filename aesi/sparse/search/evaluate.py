@@ -134,28 +134,16 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         )
     solver = STRidge(genome.lambda1, genome.lambda2)
     columns = np.append(active, len(problem.library))
-    fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.factors])
-    alive = fits.any(axis=1)
-    if not alive.any():
-        return Failed(f"every coefficient is below lambda2 = {genome.lambda2:g} in every resample")
-    losses = np.full(len(fits), np.inf)
-    losses[alive] = out_of_bag(problem, active, fits[alive], np.flatnonzero(alive))
-    best = best_members(losses, problem.options.best)
-    if not len(best):
-        return Failed("every resample diverges in free run")
-    ensemble = combine(fits[best], problem.full_factor[:, columns], genome.tau, solver)
-    if not ensemble.stability.any():
-        return Failed(
-            f"no term reaches an inclusion probability of tau = {genome.tau:g}, or survives the refit"
-        )
+    combined = _combined(problem, genome, active, columns, solver)
+    if isinstance(combined, Failed):
+        return combined
+    ensemble, loss_oob = combined
     fold_fits, refits = _fold_fits(problem, columns, ensemble.stability != 0, solver)
     runs, memory = fold_runs(problem, active, fold_fits, refits, ensemble.bagging)
     bagging, stability = (
-        faded(
-            sparse_model(problem, active, coefficients, memory, name, ensemble), problem, runs.amplitudes[k]
-        )
-        for k, (name, coefficients) in enumerate(
-            zip(ENSEMBLES, (ensemble.bagging, ensemble.stability), strict=True)
+        faded(sparse_model(problem, active, coefficients, memory, name, ensemble), problem, amplitude)
+        for name, coefficients, amplitude in zip(
+            ENSEMBLES, (ensemble.bagging, ensemble.stability), runs.amplitudes[:2], strict=True
         )
     )
     judged = on_validation(problem, runs, (bagging, stability))
@@ -165,7 +153,6 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
     if not np.isfinite(loss_valid):
         return Failed("the model diverges in free run on the validation data")
     weights = weights or FitnessWeights()
-    loss_oob = float(losses[best].mean())
     count = int(np.count_nonzero(ensemble.bagging))
     return Candidate(
         genome=genome,
@@ -183,6 +170,30 @@ def evaluate(problem: Problem, genome: Genome, weights: FitnessWeights | None = 
         fold_sums=runs.sums[:2],
         valid_losses=valid_losses,
     )
+
+
+def _combined(
+    problem: Problem, genome: Genome, active: IntArray, columns: IntArray, solver: STRidge
+) -> tuple[Ensemble, float] | Failed:
+    """The best of the fits to all resamples as one ensemble, and the mean of their out-of-bag losses.
+
+    active : (m,) numbers of the terms.  columns : (m + 1,) of a factor, those of the terms and of the target.
+    """
+    fits = np.stack([solver.fit_factor(factor[:, columns]) for factor in problem.factors])
+    alive = fits.any(axis=1)
+    if not alive.any():
+        return Failed(f"every coefficient is below lambda2 = {genome.lambda2:g} in every resample")
+    losses = np.full(len(fits), np.inf)
+    losses[alive] = out_of_bag(problem, active, fits[alive], np.flatnonzero(alive))
+    best = best_members(losses, problem.options.best)
+    if not len(best):
+        return Failed("every resample diverges in free run")
+    ensemble = combine(fits[best], problem.full_factor[:, columns], genome.tau, solver)
+    if not ensemble.stability.any():
+        return Failed(
+            f"no term reaches an inclusion probability of tau = {genome.tau:g}, or survives the refit"
+        )
+    return ensemble, float(losses[best].mean())
 
 
 def fitness(losses: tuple[float, float, float], library_size: int, weights: FitnessWeights) -> float:

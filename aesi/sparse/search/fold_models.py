@@ -42,13 +42,15 @@ def fold_models(
     left_out: Sequence[HeldOutDrive] = (),
     cut: Sequence[Span] | None = None,
 ) -> Iterator[tuple[SparseModel, ErrorSeries, slice]]:
-    """A model with the candidate's genome, or the mean of models with its members' genomes, a training record, and the
-    samples of it that the model has not seen.
+    """For every piece of the training records: a model fitted without it, its record, and the samples that it holds.
 
-    One for every piece of `cut`: by default the folds of the search, where these are drives.  Pieces without which no
-    term survives are left out.  judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
+    The model has the candidate's genome, or is the mean of models with its members' genomes. Pieces without which no
+    term survives are passed over.
+
+    judged : AESI I (the default), or AESI II, whose terms alone are refitted then.
     left_out : for every piece, its record under physics that has not seen the piece either; by default the records as
     they are.
+    cut : the pieces; by default the folds of the search where these are drives, else about `N_PIECES` of like length.
     """
     judged = judged or candidate.bagging
     active, members = _members(problem, candidate, judged)

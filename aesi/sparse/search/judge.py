@@ -97,7 +97,8 @@ class FoldRuns:
 def fold_runs(
     problem: Problem, active: IntArray, fits: Array, refits: Array, bagging: Array
 ) -> tuple[FoldRuns, float]:
-    """Runs over each piece by models fitted on the others; the memory of the residual where none has feedback."""
+    """Free and one-step runs over each piece by models fitted on the others; and the memory of the residual, for models
+    without feedback."""
     drives = [
         drive_of(problem, active, np.stack([fit, refit, bagging]), slice(a, b))
         for (a, b), fit, refit in zip(problem.folds, fits, refits, strict=True)

@@ -1,4 +1,4 @@
-"""Records as a search takes them: with the inputs that say something, checked."""
+"""Training and validation records made ready for a search: checked, and without inputs that say nothing new."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ def prepared_series(
 ) -> tuple[tuple[ErrorSeries, ...], tuple[ErrorSeries, ...], tuple[str, ...]]:
     """Training and validation records with their inputs, and a sentence for each input that was left out.
 
-    inputs : names, by default those of the records; a library's own go first. Raises DataError for nothing to learn.
+    inputs : names, by default those of the records; a library's own go first.
+    Raises DataError where there is nothing to learn.
     """
     if not split.train:
         raise DataError("there are no training records.")

@@ -1,4 +1,4 @@
-"""What a case has to be before it is worth a hypothesis: one sentence each where it is not."""
+"""Checks that a case can be decided at all, made before any hypothesis is fitted; an error is one sentence."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Activation energies that no record has told the file of a measured cell.
+"""Activation energies of a measured cell whose file was fitted at one temperature only, so that they are unknown.
 
 A calibration on records of one temperature leaves them as its start file has them, so that at another one the logarithm
 of each rate is off by
@@ -33,7 +33,7 @@ ACTIVATION_ENERGIES = "activation_energies"
 
 
 def fitted_kelvin(cell: Cell) -> float | None:
-    """The temperature of a file that was fitted at one, K; None where its records span more, or it tells of none."""
+    """The one temperature that a file was fitted at, K; None where its records span more, or the file tells of none."""
     kelvin = [mean_k for _, mean_k in cell.fitted_at_k]
     return float(np.mean(kelvin)) if kelvin and max(kelvin) - min(kelvin) <= SPAN_K else None
 

@@ -1,4 +1,7 @@
-"""What instruments did to a record they did to its rows as measured, before those were averaged for fits."""
+"""Undo instrument faults on the rows as they were measured, and average these for fits only then.
+
+The other order would not do: a lag of half a second is gone from rows that are averages over a second.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +10,17 @@ from dataclasses import replace
 from functools import lru_cache
 
 from aesi.data.thinning import Averaged
-from aesi.physics.effect import ActiveEffect, Effect, Record
+from aesi.physics.effect import ActiveEffect, Effect, Record, as_cell_saw
 from aesi.records import Measurement
 
 
 def instruments_undone(
     data: Measurement, effects: Sequence[ActiveEffect]
 ) -> tuple[Measurement, tuple[ActiveEffect, ...]]:
-    """The record that the cell saw behind its instruments, and what the effects do beside that.
+    """The record as the cell saw it, and the effects without the part that was undone.
 
-    A lag of half a second cannot be told from rows of a second: a jump of the current is spread over them. Nor can one
-    of a tenth from the sparse rows of a pulse, which begin where the current jumps. Records that were not averaged are
+    A lag of half a second does not show in rows of a second, over which a jump of the current is spread; nor does one
+    of a tenth in the sparse rows of a pulse, which begin where the current jumps. Records that were not averaged are
     returned as they are, with all effects.
     """
     acting = tuple(a for a in effects if a.effect.kind == "instrument" and a.effect.on_record is not None)
@@ -29,11 +32,8 @@ def instruments_undone(
 
 @lru_cache(maxsize=64)
 def _seen_by_cell(data: Averaged, acting: tuple[ActiveEffect, ...]) -> Measurement:
-    """The record behind the instruments: of the parameters that a fit moves few are theirs."""
-    record = Record(data.finer.time_s, data.finer.current_a)
-    for active in acting:
-        assert active.effect.on_record is not None
-        record = active.act(active.effect.on_record, record)
+    """The record behind the instruments; remembered, since few of the parameters that a fit moves are theirs."""
+    record = as_cell_saw(Record(data.finer.time_s, data.finer.current_a), acting)
     return data.with_record(record.time_s, record.current_a)
 
 

@@ -193,11 +193,11 @@ def _temperature_noted(data: Measurement) -> tuple[str, ...]:
 
 
 def led_by(data: Measurement, seen: Sequence[Measurement]) -> tuple[int, Measurement] | None:
-    """Which of the records that fits have seen leads to `data`, and that one with all that comes after it; None where
-    none does.
+    """The record among those that fits have seen that `data` goes on from: its index, and both as one record; None
+    where there is none.
 
-    It is the longest that `data` begins with, or else the first that it continues. Such a one is not joined to it where
-    one of the two has a temperature and the other none, which no simulation could run at.
+    It is the longest that `data` begins with, or else the first that `data` continues. The latter are not joined where
+    only one of the two has a temperature, since no simulation could run at half a column.
     """
     begun = [index for index, known in enumerate(seen) if _begins_with(data, known)]
     if begun:
@@ -225,21 +225,24 @@ def prepare_test(
     soc0: float | None,
     given: Sequence[ActiveEffect] = (),
 ) -> PreparedRecord:
-    """A record that chooses nothing.
+    """A test record, which chooses nothing, made ready.
 
     Where a record that fits have seen leads to it (`led_by`), the model runs through that and only what comes after is
-    judged.
+    judged; its notes say so in place of a state that its own first row would give.
     """
     led = led_by(data, seen)
     if led is None:
         return prepare(cell, data, soc0, 0.0, given=given, shared=True)
     index, whole = led
     prepared = prepare(cell, whole, soc0, 0.0, given=given, shared=True)
-    return replace(prepared, lead_rows=len(seen[index]), continues=index)
+    leads = "begins with" if whole is data else "continues"
+    said = f"{data.name} {leads} {seen[index].name}: the model runs through that first, and what comes after is judged."
+    notes = (said, *(note for note in prepared.notes if note != prepared.start.sentence))
+    return replace(prepared, lead_rows=len(seen[index]), continues=index, notes=notes)
 
 
 def joined(first: Measurement, second: Measurement) -> Measurement:
-    """The rows of one record and then those of another one, as which it is told of."""
+    """The rows of `first` and then those of `second`, under the name of `second` and with all else of it."""
     temperatures = [t for t in (first.temperature_degc, second.temperature_degc) if t is not None]
     return replace(
         second,

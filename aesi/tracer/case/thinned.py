@@ -73,9 +73,12 @@ def thinned_together(cell: Cell, measurements: Sequence[Measurement]) -> list[Th
 
 
 def lost_v(cell: Cell, record: ThinnedRecord, soc0: float, given: Sequence[ActiveEffect]) -> Array:
-    """(n_thin,) V: the thinned voltage of the declared model less that of the thinned record; nought where it cannot be
-    simulated. Kinetics are no linear function of the current, and averages over a step of it are those of neither
-    side."""
+    """(n_thin,) V that thinning takes from the voltage of the declared model: its voltage on the whole record, averaged
+    over the thinned rows, less its voltage on the thinned record; nought where it cannot be simulated.
+
+    The two differ since kinetics are not linear in the current: the average of a voltage over a step of the current is
+    not the voltage at the average current.
+    """
     nothing = np.zeros(len(record.thin))
     if len(record.thin) == len(record.whole):
         return nothing

@@ -190,8 +190,11 @@ def of_several_ages(problem: InverseProblem, archive: Archive) -> bool:
 
 
 def believed(one: tuple[Path, Verdict], other: tuple[Path, Verdict]) -> bool:
-    """Is the second of two searches believed rather than the first? One that explains the data before one that does
-    not, then by what they chose; both kinds of evidence have to speak for more names, as where one is admitted.
+    """Is the second of two searches believed rather than the first?
+
+    One that explains the data is, before one that does not; then it goes by what they chose. The one with more names is
+    believed only where both kinds of evidence, unseen data and marginal likelihood, speak for it, as where a name is
+    admitted.
 
     A blind case that lacks nothing said 3.5 nats more of unseen data with another radius and a plating that made the
     data less likely by 17.

@@ -1,4 +1,4 @@
-"""What a fit says of ordinary use: full discharges and charges, at whatever states of charge and currents records are.
+"""How well a fit predicts ordinary use: full discharges and charges, wherever the records themselves have been.
 
     sd(t)^2 = s(t) C s(t)'          s the slopes of the voltage over the parameters, C their covariance in the fit   (1)
 

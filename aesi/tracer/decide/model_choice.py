@@ -26,8 +26,10 @@ from aesi.tracer.search.path import Path
 
 
 class Search(Protocol):
-    """All that is searched and judged with one model of the cell, with at most so many names; `shallower` is what the
-    same with fewer names answered."""
+    """Searches and judges a case with the model of its problem.
+
+    most : effects that may be named.  shallower : the answer of the same search with fewer names, where there is one.
+    """
 
     def __call__(
         self, problem: InverseProblem, archive: Archive, most: int, shallower: Answer | None = None
@@ -58,10 +60,12 @@ class ModelChoice:
 def with_model(
     problem: InverseProblem, wanted: ModelName | None, search: Search, archive_of: ArchiveOf, max_effects: int
 ) -> tuple[Evidence, ModelChoice]:
-    """The search with the model that the user named, or else with the one that the parameters of the cell were fitted
-    with, or else with the single particle beside good records, or else with the one that the records ask for.
+    """Choose the model of the cell and search with it.
 
-    max_effects : names that may be given.
+    The first of these that applies: the model that the user asks for; the one that the cell's file was fitted with; the
+    single particle, where good records stand beside; the one that the records ask for.
+
+    wanted : by the user.  max_effects : effects that may be named.
     """
     declared = reduction_of(problem)
     settled = wanted or problem.cell.fitted_with
@@ -196,9 +200,11 @@ def _larger(declared: Reduction | None, path: Path) -> Reduction | None:
 
 
 def most_names(single: Answer, max_effects: int) -> int:
-    """Names with which the porous electrode could still be believed rather than a search with the single particle: no
-    more than that has, where what it leaves is likelier without a model error beyond what two solvers differ by, so
-    that there is nothing for further ones to explain."""
+    """How many effects a search with the porous electrode may name and still be believed over the single particle's.
+
+    All of `max_effects`, unless the single particle explains the data without a model error beyond what two solvers
+    differ by: then nothing is left for further names to explain, and the porous electrode may name no more than it did.
+    """
     chosen = single.path.chosen
     if single.verdict.word == "unknown" or chosen.score.delta_v > LEAST_V:
         return max_effects

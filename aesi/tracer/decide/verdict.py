@@ -101,11 +101,13 @@ def structured_v(path: Path, one: Explanation) -> float:
 
 
 def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, allowed_v: float) -> float:
-    """`structured_v` of what a right hypothesis could tell of the blocks that it has not seen, V.
+    """`structured_v`, with only those rows of unseen blocks that a right hypothesis could have predicted, V.
 
-    Rows count as far as their prediction, by the parameters that the other blocks give, is less uncertain than the
-    noise and what a right one may leave beyond it (V): a potential with nine coefficients cannot tell what it is where
-    no other block has been.
+    A row counts in full where its prediction, by the parameters that the other blocks give, is far less uncertain than
+    the noise and `allowed_v`, and little where it is far more so: a potential with nine coefficients cannot be known
+    where no other block has been.
+
+    allowed_v : V beyond the noise that a right hypothesis may leave.
     """
     usual = PRIORS[problem.trust].median
     counts = told_share(problem.white_v, prediction_sd_v(problem, blocks, one, usual), allowed_v)
@@ -114,7 +116,10 @@ def unexplained_v(problem: InverseProblem, blocks: Blocks, one: Explanation, all
 
 
 def told_share(white_v: Array | float, sd_v: Array, allowed_v: float) -> Array:
-    """(n,) how far each row counts that is predicted with such a standard deviation (V), beside noise of `white_v`."""
+    """(n,) how far a row counts by how well it is predicted: 1 for a sure prediction, towards 0 for an unsure one.
+
+    sd_v : (n,) V, standard deviation of the prediction.  white_v : V, noise.  allowed_v : as for `unexplained_v`.
+    """
     told_v2 = white_v**2 + allowed_v**2
     return np.asarray(told_v2 / (told_v2 + sd_v**2))
 
@@ -122,11 +127,11 @@ def told_share(white_v: Array | float, sd_v: Array, allowed_v: float) -> Array:
 def foretold_share(
     problem: InverseProblem, blocks: Blocks, one: LinearForm, allowed_v: float, partition: str
 ) -> float:
-    """Share of the rows that a hypothesis is tested on where the conditions of a partition are left out in turn: of the
-    others it says so little that whatever they are could not have spoken against it.
+    """Share of the rows that put a hypothesis to the test, where the conditions of a partition are left out in turn.
 
-    Its parameters are known as far as a model that errs by `allowed_v` tells them. A smooth discharge foretells all of
-    its ranges of charge by a model without error, and hardly any by one that may be off by 0.4 mV.
+    Of the other rows it predicts so little that nothing they could be would speak against it. Its parameters are taken
+    to be as uncertain as a model that errs by `allowed_v` leaves them: a smooth discharge foretells all of its ranges
+    of charge by a model without error, and hardly any by one that may be off by 0.4 mV.
     """
     most = PRIORS[problem.trust].median._replace(delta_v=allowed_v)
     sd_v = prediction_sd_v(problem, blocks, one, most, partition)
@@ -139,8 +144,10 @@ def tolerance_v(problem: InverseProblem, thresholds: Thresholds) -> float:
 
 
 def judged(path: Path, thresholds: Thresholds) -> Verdict:
-    """The verdict on a search with the declared parameters believed as of a careful parametrisation; its confidence is
-    still to be read off the margin."""
+    """The verdict on a search that trusts the declared parameters as those of a careful parametrisation.
+
+    Its confidence is 0 until it is read off the margin (`evidence.with_confidence`).
+    """
     allowed = tolerance_v(path.problem, thresholds)
     left = unexplained_v(path.problem, path.blocks, path.chosen, allowed)
     if left > allowed:
@@ -179,7 +186,7 @@ def _with_what(path: Path) -> str:
 
 
 def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
-    """An `unknown` with the names that hold beyond what models of measured cells are off by.
+    """An `unknown` that names the effects whose gain is beyond what models of measured cells are usually off by.
 
     path : the search at the trust `measured`.
     """
@@ -201,16 +208,16 @@ def partly(path: Path, verdict: Verdict, thresholds: Thresholds) -> Verdict:
 
 
 def best_gain(path: Path) -> float:
-    """Nats that the best effect of any step says more, admitted or not; nought where none could be grown."""
+    """The largest gain of an effect at any step, admitted or not, nats; nought where none could be grown."""
     return max((step.best_gain for step in path.steps if step.grown), default=0.0)
 
 
 def look_alikes(
     path: Path, thresholds: Thresholds, allowed_v: float
 ) -> tuple[tuple[tuple[str, ...], ...], float]:
-    """Sets of effects that these data do not tell apart (a model confidence set, Hansen, Lunde & Nason, Econometrica
-    79 (2011) 453, over paired block differences), and how many standard deviations the closest other one lags.
+    """Sets of effects that these data do not tell apart, and by how many standard deviations the next one lags.
 
+    They are a model confidence set, Hansen, Lunde & Nason, Econometrica 79 (2011) 453, over paired block differences.
     allowed_v : what a right hypothesis may leave on unseen data beyond the noise.
     """
     groups, margin = [], np.inf

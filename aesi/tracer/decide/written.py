@@ -69,26 +69,30 @@ def _tested(problem: InverseProblem, blocks: Blocks, fit: FittedHypothesis) -> b
 
 
 def worst_ratio(one: Option, options: Sequence[Option]) -> float:
-    """How many times what the best of the others leaves a model leaves, on the record left out where that is most."""
+    """The largest ratio, over records left out, of what this model leaves of one to what the best model leaves."""
     least = np.min([other.left_out.by_record for other in options], axis=0)
     return float(np.max(np.array(one.left_out.by_record) / least))
 
 
 def carries_best(options: Sequence[Option]) -> Option:
-    """Of at least one model that which is never far worse than another one on a record left out: of the least worst
-    ratio, the first where several are as good. A mean over the records would let one gain much and another lose it."""
+    """The model, of at least one, whose worst ratio is least; the first of several that are as good.
+
+    Such a model is never far worse than another on any record left out. A mean over the records would let a gain on one
+    pay for a loss on another.
+    """
     return min(options, key=lambda one: worst_ratio(one, options))
 
 
 def written(
     declared: Option, recalibrated: Sequence[Option], named: Sequence[Option] = ()
 ) -> tuple[ModelState, str | None]:
-    """Which model carries best, or what was named, or the declared one, where that does as well; and why what was named
-    is not what is written.
+    """The model that is written, and why it is not what was named (None where it is, or where nothing was).
 
-    It may do harm in no range of charge, and has to run over the declared range.  recalibrated : with own parameters
-    open, some of them with effects that stand in for what the cell lacks.  named : what was named, with the own
-    parameters as declared, then with these open.
+    It is the model that carries over best; what was named, or else the declared model, is preferred where that does as
+    well. Whatever is written may do harm in no range of charge, and has to run over the declared range.
+
+    recalibrated : models with own parameters open, some of them with effects that stand in for what the cell lacks.
+    named : what was named, with the own parameters as declared, then with these open.
     """
     own = [one for one in recalibrated if _fault(one, declared, (*ORDINARY_C, *FAST_C)) is None]
     faults = [_fault(one, declared, ORDINARY_C) for one in named]
@@ -113,7 +117,7 @@ def refused(recalibrated: Option, declared: Option) -> str | None:
 
 
 def stand_ins(state: ModelState, named: Sequence[str]) -> tuple[str, ...]:
-    """What is said of effects that are written and not named."""
+    """A sentence on effects that are written though they are not named."""
     beside = [name for name in state.hypothesis if name not in named]
     if not beside:
         return ()

@@ -1,7 +1,7 @@
-"""How far from where it stands a parameter may be, with the bounds that it has.
+"""Credible intervals of parameters that have bounds.
 
-One that is inside its bounds has a normal density, to both sides. One that all data push onto a bound has, along the
-distance d >= 0 from it, with the free ones marginalised and the others held where they are,
+A parameter inside its bounds has a normal density, to both sides. One that the data push onto a bound has, along the
+distance d >= 0 from it, with the free parameters marginalised and the others held where they are,
 
     p(d) ~ exp(g d - a d^2 / 2)    g < 0 where the data push onto the bound, a > 0 their curvature    (1)
 
@@ -19,9 +19,9 @@ from aesi.tracer.likelihood.gaussian import Posterior, held_at_bounds
 
 
 def reaches(posterior: Posterior, bounds: Array, share: float) -> Array:
-    """(m, 2) how far below and above each parameter lies what holds this share of its density.
+    """(m, 2) distances from each parameter to the ends, lower and upper, of the interval with `share` of its density.
 
-    bounds : (m, 2) of the coordinates, as the distances are.
+    bounds : (m, 2) of the coordinates, in which the distances are, too.
     """
     to_bounds, held = held_at_bounds(posterior, bounds)
     free, place = np.flatnonzero(~held), posterior.x + to_bounds

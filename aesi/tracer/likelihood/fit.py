@@ -156,8 +156,11 @@ class HypothesisFitter:
 
 
 def beyond_expected(white: Array) -> float:
-    """Mean square of whitened errors (n,), none below 1: by how much a difference of two squared errors overstates what
-    it is worth where they are larger than the noise and the model error that they were whitened by."""
+    """Mean square of whitened errors (n,), at least 1.
+
+    Where errors are larger than the noise and the model error that they were whitened by, a difference of two squared
+    errors overstates what it is worth, by this factor.
+    """
     return max(float(np.mean(white**2)), 1.0)
 
 

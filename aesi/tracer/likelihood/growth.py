@@ -1,4 +1,4 @@
-"""A hypothesis and one effect more: the effect's parameters by Gauss-Newton, all others to first order.
+"""Grow a hypothesis by one effect: the effect's parameters are fitted by Gauss-Newton, all others to first order.
 
     min over u of  min over z  |W (e(u) - J z)|^2 + |x + z|^2 + |u|^2        u of the effect, x + z of the parent   (1)
 
@@ -42,7 +42,7 @@ ROUNDS = 6
 
 @dataclass(frozen=True, eq=False)
 class Parent:
-    """A fitted hypothesis as what grows from it needs it: whitened once at each size of the model error."""
+    """A fitted hypothesis to grow effects on, with its sensitivities whitened once at each size of the model error."""
 
     problem: InverseProblem
     blocks: Blocks
@@ -250,9 +250,11 @@ class EffectGrowth:
 
 
 def promise(parent: Parent, slopes_v: Array) -> float:
-    """What an effect would say of unseen data on top of a parent, nats, to first order and with the slopes that it had
-    on another one, at the size of the model error that the parent needs or that a right hypothesis leaves, whichever
-    says more: costs no simulation."""
+    """What a parent with one effect more promises to say of unseen data, nats: to first order, without a simulation.
+
+    slopes_v : (n, k) V, those of the effect as they were on another parent.
+    The model error has the size that the parent needs or the one that a right hypothesis leaves, whichever says more.
+    """
     fit, prior = parent.fit, PRIORS[parent.problem.trust]
     own = SplitTable(parent.problem, parent.blocks, np.column_stack([fit.point.residual_v, slopes_v]))
     x = np.concatenate([fit.point.padded_x, np.zeros(slopes_v.shape[1])])

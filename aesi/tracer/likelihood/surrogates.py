@@ -1,8 +1,9 @@
-"""What the best of all effects gains where nothing is missing: on surrogates of the model error and the noise.
+"""How much an effect has to gain to be admitted: more than the best of all effects gains by chance.
 
-A hypothesis is right on data that are drawn from it. The largest gain of any effect on many such draws is what chance
-alone gives the best of so many; a quantile of it is an admission test whose family-wise error rate is the one number
-that is chosen. Gains are to first order, with the slopes that the effects have where they were fitted to the data.
+Surrogates are data drawn from a hypothesis, with its model error and noise, so that it lacks nothing on them. The
+largest gain of any effect on many such draws is what chance alone gives the best of so many; a quantile of it is an
+admission test, for which only the family-wise error rate has to be chosen. Gains are to first order, with the slopes
+that the effects have where they were fitted to the data.
 White, Econometrica 68 (2000) 1097, for the largest of many as the statistic.
 """
 
@@ -29,9 +30,9 @@ scatter as their spreads say, the share that have one which is called wrong."""
 
 
 def admission_nats(parent: Parent, slopes_v: Mapping[str, Array], seed: int = 0) -> float:
-    """What an effect has to say of unseen data more than the hypothesis without it, nats.
+    """The gain on unseen data that an effect has to reach to be admitted, nats.
 
-    slopes_v : id of an effect -> (n, k) V, what its parameters do; none of them asks for nothing.
+    slopes_v : id of an effect -> (n, k) V, what its parameters do; without any effect the gain to reach is 0.
     """
     if not slopes_v:
         return 0.0

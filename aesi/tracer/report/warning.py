@@ -1,4 +1,4 @@
-"""What the part that chose nothing says against what was found or written; it changes neither."""
+"""Warnings where the test part, which chose nothing, contradicts what was found or written; they change neither."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from aesi.numerics.typing import Array
 from aesi.tracer.case.blocks import Blocks, blocks_of
 from aesi.tracer.case.problem import InverseProblem
 from aesi.tracer.likelihood.fit import FittedHypothesis, held_out_residual
-from aesi.tracer.likelihood.growth import EffectGrowth, Grown, Parent
+from aesi.tracer.likelihood.growth import EffectGrowth, Explanation, Grown, Parent
 from aesi.tracer.likelihood.surrogates import admission_nats
 from aesi.tracer.search.archive import Archive
 from aesi.tracer.search.fitted import as_declared, base_of, fitted_hypothesis, from_within
@@ -61,8 +61,10 @@ def searched(
         )
     if shallower is not None and shallower.beyond_reach_v is not None:
         return shallower
-    taken_over = () if shallower is None else shallower.steps[:1]
-    first = growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and not taken_over else []
+    taken_over = None if shallower is None else next(iter(shallower.steps), None)
+    first = (
+        growths_on([Parent(problem, blocks, base)], {}, archive) if max_effects and taken_over is None else []
+    )
     # Fewer effects than that are fitted in the time that looking would spare.
     if len(first) > FINALISTS and np.isfinite(allowed_v):
         reach_v = REACH * allowed_v + problem.reduced_v
@@ -70,30 +72,131 @@ def searched(
         if least_v > reach_v:
             return Path(problem, blocks, base, (), base, beyond_reach_v=least_v)
     first, slopes = promising_first(first, archive)
-    steps: list[Step] = []
-    notes: list[str] = [] if shallower is None else list(shallower.notes)
-    parents, chosen = [base], base
-    for _ in range(max_effects):
-        if taken_over and not steps:
-            (step,) = taken_over
-        else:
-            step, refused = _step(problem, blocks, parents, slopes, archive, report, first)
-            notes += refused
-        first = []
-        if not steps:
-            slopes |= {g.hypothesis[-1]: g.slopes_v for g in step.grown}
-        steps.append(step)
-        if step.admitted is None:
-            break
-        chosen = step.admitted
-        if len(chosen.hypothesis) > 1 and _hopeless(problem, blocks, base, chosen):
-            break
-        parents = [chosen, *(f for f in step.fitted if f is not chosen)]
-    least_nats = max((step.admission_nats for step in steps), default=0.0)
+    notes = () if shallower is None else shallower.notes
+    search = _ForwardSearch(problem, blocks, base, archive, report, slopes, notes)
+    chosen = search.add(max_effects, first, taken_over)
+    least_nats = max((step.admission_nats for step in search.steps), default=0.0)
     chosen = without_needless(problem, blocks, chosen, least_nats, archive, base, report)
-    if not _hopeless(problem, blocks, base, chosen):
-        chosen = _exchanged(problem, blocks, chosen, steps, slopes, archive, report)
-    return Path(problem, blocks, base, tuple(steps), chosen, tuple(dict.fromkeys(notes)))
+    if not search.hopeless(chosen):
+        chosen = search.exchange(chosen)
+    return Path(problem, blocks, base, tuple(search.steps), chosen, tuple(dict.fromkeys(search.notes)))
+
+
+class _ForwardSearch:
+    """A search on its way.
+
+    base : the hypothesis without effects.  slopes : effect -> (n, k) V, as it grew on the base.
+    steps, notes : those made so far.
+    """
+
+    def __init__(
+        self,
+        problem: InverseProblem,
+        blocks: Blocks,
+        base: FittedHypothesis,
+        archive: Archive,
+        report: Report,
+        slopes: Mapping[str, Array],
+        notes: Sequence[str],
+    ) -> None:
+        self.problem, self.blocks, self.base = problem, blocks, base
+        self.archive, self.report = archive, report
+        self.slopes, self.notes = dict(slopes), list(notes)
+        self.steps: list[Step] = []
+
+    def add(
+        self, max_effects: int, first: Sequence[EffectGrowth], taken_over: Step | None
+    ) -> FittedHypothesis:
+        """The hypothesis after a step for each effect, until none is admitted or more will not do.
+
+        first : what the first step grows; all effects where it is empty.  taken_over : the first step, if it is known.
+        """
+        parents, chosen = [self.base], self.base
+        for number in range(max_effects):
+            if number == 0 and taken_over is not None:
+                step = taken_over
+            else:
+                step, refused = self._step(parents, first if number == 0 else ())
+                self.notes += refused
+            if number == 0:
+                self.slopes |= {g.hypothesis[-1]: g.slopes_v for g in step.grown}
+            self.steps.append(step)
+            if step.admitted is None:
+                break
+            chosen = step.admitted
+            if len(chosen.hypothesis) > 1 and self.hopeless(chosen):
+                break
+            parents = [chosen, *(f for f in step.fitted if f is not chosen)]
+        return chosen
+
+    def exchange(self, chosen: FittedHypothesis) -> FittedHypothesis:
+        """The hypothesis with one of its effects exchanged for another, while that says more: what was added first
+        stood in for all that was missing then. The steps that this takes are added to `steps`."""
+        grown_from = {frozenset(parent.hypothesis) for step in self.steps for parent in step.parents}
+        while True:
+            rests = [
+                tuple(other for other in chosen.hypothesis if other != name) for name in chosen.hypothesis
+            ]
+            new = [rest for rest in rests if frozenset(rest) not in grown_from]
+            others = []
+            for rest in new:
+                grown_from.add(frozenset(rest))
+                fit = self._fitted(rest, chosen)
+                if fit is None:
+                    continue
+                step, _ = self._step([fit])
+                self.steps.append(step)
+                others += [] if step.admitted is None else [step.admitted]
+            best = most_plausible([chosen, *others], len(self.problem.competing()))
+            if best is None or best is chosen:
+                return chosen
+            chosen = best
+
+    def hopeless(self, chosen: FittedHypothesis) -> bool:
+        """Does the hypothesis leave so much that another effect more will not do?"""
+        left, without = (beyond_noise(self.problem, self.blocks, fit) for fit in (chosen, self.base))
+        return left > HOPELESS_SHARE * without
+
+    def _step(
+        self, parents: Sequence[FittedHypothesis], begun: Sequence[EffectGrowth] = ()
+    ) -> tuple[Step, list[str]]:
+        """One step, and why some effects were not tried at it.
+
+        parents : the hypothesis that was chosen so far, then others to grow from.  begun : what grows on these.
+        """
+        best = parents[0]
+        places = [Parent(self.problem, self.blocks, fit) for fit in parents]
+        grown, refused = _grown(begun or growths_on(places, self.slopes, self.archive), self.archive)
+        slopes = {**self.slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
+        declared = as_declared(self.problem, self.blocks, best)
+        if declared is not None:
+            place = Parent(self.problem, self.blocks, declared)
+            again, more = _grown(growths_on([place], slopes, self.archive), self.archive)
+            grown, refused = [*grown, *again], [*refused, *more]
+        for one in grown:
+            self.report(self.problem, one, one.score.total - best.score.total)
+        ranked = _ranked(grown)
+        least_nats = admission_nats(places[0], slopes)
+        fitted = self._finalists_fitted(ranked, best)
+        may = [f for f in fitted if admissible(self.problem, self.blocks, best, f, least_nats)]
+        admitted = most_plausible(may, len(self.problem.competing()))
+        return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
+
+    def _finalists_fitted(self, ranked: Sequence[Grown], best: FittedHypothesis) -> list[FittedHypothesis]:
+        """What is worth it of what was grown, fitted with the whole model; the best first."""
+        fitted = []
+        for one in _finalists(ranked, best):
+            fit = self._fitted(one.hypothesis, one)
+            if fit is not None:
+                self.report(self.problem, fit, fit.score.total - best.score.total)
+                fitted.append(fit)
+        fitted.sort(key=lambda f: -f.score.total)
+        if fitted and fitted[0].at_bounds:
+            fitted[0] = from_within(self.problem, self.blocks, fitted[0], self.archive)
+        return fitted
+
+    def _fitted(self, hypothesis: Sequence[str], near: Explanation) -> FittedHypothesis | None:
+        return fitted_hypothesis(self.problem, self.blocks, hypothesis, near, self.archive)
 
 
 def without_needless(
@@ -131,36 +234,6 @@ def without_needless(
     return chosen
 
 
-def _exchanged(
-    problem: InverseProblem,
-    blocks: Blocks,
-    chosen: FittedHypothesis,
-    steps: list[Step],
-    slopes: Mapping[str, Array],
-    archive: Archive,
-    report: Report,
-) -> FittedHypothesis:
-    """The hypothesis with one of its effects exchanged for another, while that says more: what was added first stood
-    in for all that was missing then. The steps that this takes are added to `steps`."""
-    grown_from = {frozenset(parent.hypothesis) for step in steps for parent in step.parents}
-    while True:
-        rests = [tuple(other for other in chosen.hypothesis if other != name) for name in chosen.hypothesis]
-        new = [rest for rest in rests if frozenset(rest) not in grown_from]
-        others = []
-        for rest in new:
-            grown_from.add(frozenset(rest))
-            fit = fitted_hypothesis(problem, blocks, rest, chosen, archive)
-            if fit is None:
-                continue
-            step, _ = _step(problem, blocks, [fit], slopes, archive, report)
-            steps.append(step)
-            others += [] if step.admitted is None else [step.admitted]
-        best = most_plausible([chosen, *others], len(problem.competing()))
-        if best is None or best is chosen:
-            return chosen
-        chosen = best
-
-
 def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | None:
     """The chosen hypothesis of a path at another trust in the declared parameters, with nothing else tried."""
     blocks = blocks_of(problem)
@@ -169,41 +242,6 @@ def refitted(problem: InverseProblem, path: Path, archive: Archive) -> Path | No
         return None
     fit = fitted_hypothesis(problem, blocks, path.chosen.hypothesis, path.chosen, archive)
     return None if fit is None else Path(problem, blocks, base, path.steps, fit, path.notes)
-
-
-def _step(
-    problem: InverseProblem,
-    blocks: Blocks,
-    parents: Sequence[FittedHypothesis],
-    slopes: Mapping[str, Array],
-    archive: Archive,
-    report: Report,
-    begun: Sequence[EffectGrowth] = (),
-) -> tuple[Step, list[str]]:
-    """parents : the hypothesis that was chosen so far, then others to grow from.  begun : what grows on these."""
-    best, places = parents[0], [Parent(problem, blocks, fit) for fit in parents]
-    grown, refused = _grown(begun or growths_on(places, slopes, archive), archive)
-    slopes = {**slopes, **{g.hypothesis[-1]: g.slopes_v for g in grown}}
-    declared = as_declared(problem, blocks, best)
-    if declared is not None:
-        again, more = _grown(growths_on([Parent(problem, blocks, declared)], slopes, archive), archive)
-        grown, refused = [*grown, *again], [*refused, *more]
-    for one in grown:
-        report(problem, one, one.score.total - best.score.total)
-    ranked = _ranked(grown)
-    least_nats, competing = admission_nats(places[0], slopes), len(problem.competing())
-    fitted = []
-    for one in _finalists(ranked, best):
-        fit = fitted_hypothesis(problem, blocks, one.hypothesis, one, archive)
-        if fit is not None:
-            report(problem, fit, fit.score.total - best.score.total)
-            fitted.append(fit)
-    fitted.sort(key=lambda f: -f.score.total)
-    if fitted and fitted[0].at_bounds:
-        fitted[0] = from_within(problem, blocks, fitted[0], archive)
-    may = [f for f in fitted if admissible(problem, blocks, best, f, least_nats)]
-    admitted = most_plausible(may, competing)
-    return Step(tuple(parents), tuple(ranked), tuple(fitted), admitted, least_nats), refused
 
 
 def _grown(growths: Sequence[EffectGrowth], archive: Archive) -> tuple[list[Grown], list[str]]:
@@ -231,13 +269,6 @@ def _finalists(ranked: Sequence[Grown], best: FittedHypothesis) -> list[Grown]:
     gains = [one.score.total - best.score.total for one in ranked[:FINALISTS]]
     least = max(FINALIST_SHARE * max(gains, default=0.0), 0.0)
     return [one for one, gain in zip(ranked, gains, strict=False) if gain > least]
-
-
-def _hopeless(
-    problem: InverseProblem, blocks: Blocks, base: FittedHypothesis, chosen: FittedHypothesis
-) -> bool:
-    """Does the hypothesis leave so much that another effect more will not do?"""
-    return beyond_noise(problem, blocks, chosen) > HOPELESS_SHARE * beyond_noise(problem, blocks, base)
 
 
 def admissible(

@@ -1,5 +1,8 @@
-"""Which of several hypotheses is believed: that which says most of unseen data, and among those that say as much the
-one with the largest marginal likelihood, each of its names paid for."""
+"""Which of several hypotheses is believed.
+
+The one that says most of unseen data. Among those that say as much, the one with the largest marginal likelihood, less
+a price for each effect that it names.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +45,10 @@ def plausibility(fit: FittedHypothesis, competing: int) -> float:
 
 
 def most_plausible(fits: Sequence[FittedHypothesis], competing: int) -> FittedHypothesis | None:
-    """Of those that say as much as the best one of unseen data, which do not tell them apart, the one with the largest
-    plausibility: that with fewer names, and with fewer and more usual values. None of none."""
+    """The most plausible of those that unseen data do not tell from the best one; None where there are no fits.
+
+    Plausibility prefers fewer names, and fewer and more usual values.
+    """
     if not fits:
         return None
     most = max(fit.score.total for fit in fits)

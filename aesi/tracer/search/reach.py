@@ -1,4 +1,4 @@
-"""Could any hypothesis explain what is left? If not, none is fitted: on a measured cell that takes most of the time."""
+"""Could any hypothesis explain what is left? If not, none is fitted: on a measured cell, most of the time is saved."""
 
 from __future__ import annotations
 

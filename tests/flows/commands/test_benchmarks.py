@@ -55,8 +55,30 @@ def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, 
 
 
 def test_a_name_that_looks_like_a_number_is_a_name():
-    (summary,) = benchmarks.run("cells", only=18650)  # no set and no record is called so
-    assert summary["records"] == 0
+    with pytest.raises(InputError, match=r"for only=\.\.\. there are: "):  # no set and no record is called so
+        next(benchmarks.run("cells", only=18650))
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [
+        ({"bench": "blind"}, "stranger"),
+        ({"bench": "real"}, "ageing"),
+        ({"bench": "cells"}, "lg_m50t_w8"),
+        ({"bench": "splits"}, "hg2 without 25degC_us06"),
+        ({"bench": "left_out"}, "lg_m50t_w8/n0_udds"),
+        ({"bench": "cells", "only": ["25degC_us06", "no_such_name"]}, "lg_m50t_w8"),
+        ({"bench": "blind", "only": None, "after": 100_000}, "stranger"),
+    ],
+)
+def test_options_that_leave_no_case_gave_a_summary_of_none(options, name, workspace):
+    asked = {"only": "no_such_name", **options}
+    with pytest.raises(
+        InputError, match=rf"^no case of `aesi bench {options['bench']}` is left by .*{name}"
+    ) as said:
+        next(benchmarks.run(asked.pop("bench"), **asked))
+    assert str(said.value).count("\n") == 0
+    assert not list(workspace.iterdir())  # nothing was tracked, either
 
 
 def test_the_options_of_every_benchmark_are_checked():

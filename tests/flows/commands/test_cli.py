@@ -98,6 +98,20 @@ def test_usage_errors_are_exit_code_2(call, arguments):
         ([*CALIBRATE, "--prior", "contact.resistance=nan:0.1"], "VALUE has to be a finite number, and SD,"),
         ([*CALIBRATE, "--prior", "contact.resistance=0.1:0"], "its standard deviation, one above 0"),
         (["run", "."], ". is a folder; give an experiment file"),
+        (
+            ["run", "e.yaml", "--set", "seed=1", "--set", "seed=2"],
+            "--set is there twice for seed; give it once",
+        ),
+        (
+            ["worker", "e.yaml", "--set", "a.b=1", "--set", "a.b=2"],
+            "--set is there twice for a.b; give it once",
+        ),
+        (["discover", "e.yaml", "--set", "seed=1", "--set", "seed =2"], "--set is there twice for seed"),
+        (
+            ["bench", "cells", "--set", "only=a", "--set", "only=b"],
+            "--set is there twice for only; give it once",
+        ),
+        (["bench", "cells", "--compare", "none.json"], "--compare none.json: there is no such file."),
     ],
 )
 def test_bad_input_is_one_sentence_and_exit_code_2(call, tracked, arguments, words):

@@ -108,6 +108,8 @@ def test_frequencies_at_which_the_model_says_nothing_of_a_cell_were_written_with
     assert "no inductance" in high
     impedance_file(file, 0.5, "0.001:100:9", tmp_path / "z.csv", effects=layer, say_notes=said.extend)
     assert said == [low, high]
+    impedance_file(file, 0.5, "0.001:1000:2", tmp_path / "z.csv", effects=layer, say_notes=said.extend)
+    assert said[-1].startswith("1 of the frequencies lies above 100 Hz")
 
 
 def test_the_slowest_diffusion_is_that_of_the_larger_of_two_slow_particles(cell):

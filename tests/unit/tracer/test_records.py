@@ -156,6 +156,21 @@ def test_a_continuation_is_judged_only_after_what_was_seen(cell, degc):
     assert (stranger.lead_rows, stranger.continues) == (0, None)
 
 
+def test_a_continuation_was_said_to_start_at_the_first_row_of_what_it_continues(cell):
+    time = np.arange(900.0)
+    whole = measured(cell, time, np.full(900, 5.0))
+    seen = replace(whole.between(0, 600), name="first")
+    for test, leads in (
+        (replace(whole, name="all"), "all begins with first"),
+        (replace(whole.between(600, 900), name="rest"), "rest continues first"),
+    ):
+        told = prepare_test(cell, test, [seen], None).notes
+        assert told[0] == f"{leads}: the model runs through that first, and what comes after is judged."
+        assert not any("starts under" in note for note in told)
+    alone = prepare_test(cell, replace(whole, name="all"), [], None).notes
+    assert any("all starts under 5 A" in note for note in alone)
+
+
 def test_of_two_fitted_records_that_lead_to_a_test_the_one_it_begins_with_was_judged(cell):
     time = np.arange(900.0)
     whole = measured(cell, time, np.where(time < 30, 0.0, 5.0))
