@@ -21,8 +21,8 @@ Only rows inside the range that their model was trained on are counted: a model 
 drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
 band is wider by as much as the prediction would move if the model were extrapolated (`SparseModel.reach`).
 
-No piece tells of temperatures that no fitted row had. What is open of the activation energies there stands beside the
-calibrated width as an independent error (parameter_spread.py).
+No piece tells of temperatures that no fitted row had, so rows at such calibrate nothing, of any model. What is open of
+the activation energies there stands beside the calibrated width as an independent error (parameter_spread.py).
 
 Parts of a drive lie closer to what their models were fitted to than a drive that comes next, and whole drives may lie
 further away; both are left out, and calibrate together, since the scale tells how far each was.
@@ -171,10 +171,11 @@ class FreeRunBands:
         self, series: ErrorSeries, free: FreeRun, reach_v: Array | float = 0.0, horizon_s: float | None = None
     ) -> Intervals:
         """The band along a free run of a record, or of predictions `horizon_s` ahead, with their own `reach_v`;
-        `warm` is False outside the trained range, where the band is not calibrated."""
+        `warm` is False outside the trained range, of temperature too, where the band is not calibrated."""
         where = self.spread(series), free.excess, reach_v, self.thermal(series)
         low, high = self.along(series.dt_s, *where) if horizon_s is None else self.at(horizon_s, *where)
-        return Intervals(low, high, ~free.outside)
+        known = True if self.seen is None else self.seen.knows(series.degc_or_nan)
+        return Intervals(low, high, ~free.outside & known)
 
     def to_dict(self) -> SavedState:
         """Plain values and numpy arrays only."""

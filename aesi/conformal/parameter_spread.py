@@ -4,8 +4,9 @@
 
 j is by how much one prior deviation of each parameter moves the model's voltage, C the covariance, in such deviations,
 that is left after the fitted rows k, whose errors of size sigma are independent over times T: the Laplace approximation
-of the posterior. It grows where a parameter matters that no fitted row told of: at a current, a state of charge or a
-depletion that they did not reach. MacKay, Neural Computation 4 (1992) 448, doi:10.1162/neco.1992.4.3.448.
+of the posterior. sigma is what the fit allowed for, since a model that misses more learns less from the same rows. s
+grows where a parameter matters that no fitted row told of: at a current, a state of charge or a depletion that they did
+not reach. MacKay, Neural Computation 4 (1992) 448, doi:10.1162/neco.1992.4.3.448.
 
 Bands take (1) for the shape of their width and left-out pieces for its size (local_scale.py), so an error of s is no
 error of coverage. Rows of one temperature tell nothing of another, nor do pieces of them, so there the prior stands:

@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 
 from aesi.constants import GAS_CONSTANT_J_MOL_K, ZERO_CELSIUS_K
-from aesi.numerics.typing import Array, SavedState
+from aesi.numerics.typing import Array, BoolArray, SavedState
 
 RESOLUTION = 0.005
 """Of a state of charge: no model of an error tells places apart that are closer."""
@@ -60,6 +60,10 @@ class Visited:
         if self.temperature_degc is None:
             return np.zeros(len(temperature_degc))
         return np.asarray(np.nan_to_num(temperature_degc - np.clip(temperature_degc, *self.temperature_degc)))
+
+    def knows(self, temperature_degc: Array) -> BoolArray:
+        """(n,) True within the span of temperatures, and where none was measured (NaN)."""
+        return np.asarray(self.beyond_k(temperature_degc) == 0.0)
 
     def per_energy(self, temperature_degc: Array | None) -> Array | float:
         """(n,) mol/J, |1 / T - 1 / T_near| / R, >= 0: by how much the logarithm of a rate at T moves with its

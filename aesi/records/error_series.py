@@ -25,6 +25,7 @@ class ErrorSeries:
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
     temperature_degc : (n,) of the cell, where it was measured.
     slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
+    missed_v : V, the error of the physics model that a fit of these parameters allowed for, where one was made.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 
@@ -39,6 +40,7 @@ class ErrorSeries:
     physics: Mapping[str, Array] = field(default_factory=dict)
     temperature_degc: Array | None = None
     slopes_v: Array | None = None
+    missed_v: float | None = None
 
     def __len__(self) -> int:
         return len(self.error_v)

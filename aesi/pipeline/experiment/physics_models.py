@@ -55,6 +55,7 @@ class PhysicsModels:
             return self
         z = share * np.array(whole.deviations)
         moved = deviating(whole.declared, whole.effects, ALL, z, whole.model)
+        moved = replace(moved, missed_v=whole.missed_v)
         return replace(self, by_name={**self.by_name, RECALIBRATED: moved})
 
     def series(self, record: Measurement, soc0: float, dt_s: float, hold: Hold) -> tuple[ErrorSeries, bool]:
@@ -63,7 +64,8 @@ class PhysicsModels:
         run = runs[self.start]
         series = error_series(record, run, dt_s)
         others = {name: each.voltage_v for name, each in runs.items()}
-        return replace(series, physics=others), bool(run.series["depleted"].any())
+        missed_v = self.by_name[RECALIBRATED].missed_v
+        return replace(series, physics=others, missed_v=missed_v), bool(run.series["depleted"].any())
 
     def with_slopes(self, series: ErrorSeries, record: Measurement, soc0: float, hold: Hold) -> ErrorSeries:
         """The series of the record with what each parameter of the chosen physics is worth along it."""

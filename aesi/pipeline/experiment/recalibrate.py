@@ -157,7 +157,8 @@ class _Fit:
 
     def physics(self, z: Array) -> PhysicsStart:
         """z : (n_free,) deviations."""
-        return deviating(self.declared, self.effects, self.free, z, self.model)
+        moved = deviating(self.declared, self.effects, self.free, z, self.model)
+        return replace(moved, missed_v=self.error_v)
 
     def residual(self, z: Array) -> Array | None:
         """(m + n_free,): what is left of the voltages and of what was known, in deviations."""

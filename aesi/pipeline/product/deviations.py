@@ -81,7 +81,8 @@ RESISTOR = (1,)
 class PhysicsStart:
     """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
 
-    deviations : of the knobs that were free, where the fit ended.
+    deviations : of the knobs that were free, where the fit ended.  missed_v : V, the error of the model that the fit
+    allowed for; None where nothing was fitted.
     """
 
     declared: Cell
@@ -90,6 +91,7 @@ class PhysicsStart:
     shift: float = 0.0
     deviations: tuple[float, ...] = ()
     model: ModelName = "espm"
+    missed_v: float | None = None
 
     def soc0(self, soc0: float) -> float:
         """The state of charge, by this cell's windows, of a record that was declared to start at soc0."""

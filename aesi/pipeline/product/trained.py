@@ -34,9 +34,7 @@ def outside_trained(inputs: BoolArray, series: ErrorSeries, visited: Visited | N
 
     inputs : (n,) True where any of its inputs does.
     """
-    if visited is None or series.temperature_degc is None:
-        return inputs
-    return np.asarray(inputs | (visited.beyond_k(series.temperature_degc) != 0.0))
+    return inputs if visited is None else inputs | ~visited.knows(series.degc_or_nan)
 
 
 def trained_figures(

@@ -105,6 +105,11 @@ def test_a_record_outside_the_trained_range_is_flagged() -> None:
     np.testing.assert_array_equal(fitted().intervals(series, run).warm, ~outside)
     ahead = fitted().intervals(series, run, horizon_s=10.0)
     np.testing.assert_array_equal(ahead.upper_v, fitted().at(10.0, np.zeros(N))[1])
+    # Of physics, which has no range of inputs, that of the temperature is left.
+    bands = replace(fitted(), seen=Visited(np.array([0.5]), (25.0, 30.0)))
+    heated = replace(series, temperature_degc=np.linspace(26.0, 34.0, N))
+    inside = FreeRun(error, None, np.zeros(N, dtype=bool))
+    np.testing.assert_array_equal(bands.intervals(heated, inside).warm, heated.temperature_degc <= 30.0)
 
 
 def test_at_a_temperature_that_no_fitted_row_had_what_is_open_of_the_energies_widens_the_band():

@@ -28,4 +28,6 @@ def test_how_far_a_temperature_lies_above_or_below_the_visited_ones():
     seen = Visited.of(np.array([0.5, 0.6]), np.array([20.0, 24.0]))
     beyond = seen.beyond_k(np.array([18.0, 20.0, 22.0, 27.0, np.nan]))
     np.testing.assert_allclose(beyond, [-2.0, 0.0, 0.0, 3.0, 0.0])
+    known = seen.knows(np.array([18.0, 20.0, 22.0, 27.0, np.nan]))
+    np.testing.assert_array_equal(known, [False, True, True, False, True])
     assert not Visited.of(np.array([0.5])).beyond_k(np.array([18.0])).any()

@@ -8,6 +8,7 @@ import pytest
 from aesi.conformal import WHOLE_DRIVE
 from aesi.pipeline.experiment.intervals.bands import WHOLE, OutOfSampleErrors
 from aesi.records import ErrorSeries, FreeRun
+from aesi.sparse.yardsticks import Bare
 
 N, DT = 400, 1.0
 
@@ -96,3 +97,27 @@ def test_a_left_out_piece_is_as_open_as_the_other_rows_leave_it(drive) -> None:
     np.testing.assert_allclose(left[: N // 2], 5e-3 / np.sqrt(1.5))
     np.testing.assert_allclose(nothing, 5e-3 / np.sqrt(1.5))
     assert errors.root.shape == (2, 2)
+
+
+def test_rows_are_as_open_as_the_error_that_their_fit_allowed_for_leaves_them(drive) -> None:
+    slopes = 5e-3 * np.ones((N, 1))
+    train = replace(drive, slopes_v=slopes, missed_v=0.02)
+    # A fit without the second half missed 40 mV, that to all rows 20.
+    left_out = replace(drive, missed_v=0.04)
+    errors = OutOfSampleErrors.of([(Held(), left_out, slice(N // 2, N))], (train,), (10.0,))
+    # 200 and 400 rows of 1 s, 100 s of which count as one of 8 and 4 deviations.
+    np.testing.assert_allclose(errors.spread[0], 5e-3 / np.sqrt(1 + 2 / 8**2))
+    np.testing.assert_allclose(errors.root, [[1 / np.sqrt(1 + 4 / 4**2)]])
+
+
+@pytest.mark.parametrize("model", [Held(), Bare()])
+def test_rows_hotter_than_those_of_the_fit_calibrate_no_band(drive, model) -> None:
+    """Nor colder ones: of neither does the calibrated width tell."""
+    warm = replace(drive, name="warm", temperature_degc=np.linspace(20.0, 30.0, N))
+    hot = replace(drive, name="hot", temperature_degc=np.linspace(26.0, 36.0, N))
+    every = slice(0, N)
+    alone = OutOfSampleErrors.of([(model, hot, every), (model, warm, every)], (warm, hot), (10.0,))
+    np.testing.assert_array_equal(alone.inside[0], hot.temperature_degc <= 30.0)
+    np.testing.assert_array_equal(alone.inside[1], warm.temperature_degc >= 26.0)
+    unmeasured = replace(hot, temperature_degc=None)
+    assert OutOfSampleErrors.of([(model, unmeasured, every)], (warm, unmeasured), (10.0,)).inside[0].all()

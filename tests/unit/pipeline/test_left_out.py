@@ -9,6 +9,8 @@ from small_experiment import experiment, write_record
 from aesi.pipeline.experiment.left_out import carried_over, slope_on
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED, PhysicsModels
+from aesi.pipeline.experiment.recalibrate import MODEL_ERROR_V
+from aesi.pipeline.product.deviations import KNOBS, PhysicsStart
 
 
 def test_one_part_on_which_physics_runs_off_does_not_decide():
@@ -32,6 +34,15 @@ def test_a_recalibration_that_every_part_bears_out_is_kept_whole(loaded):
         assert slope_on(error, error - part.series.left_by(RECALIBRATED)[part.rows]) == pytest.approx(
             1.0, abs=0.05
         )
+
+
+def test_the_error_that_a_fit_allowed_for_goes_with_its_physics(loaded):
+    records = [*loaded.split.train, *loaded.split.test, *(part.series for part in loaded.left_out.parts)]
+    assert {series.missed_v for series in records} == {MODEL_ERROR_V}
+    cell = loaded.cell
+    missed = PhysicsStart(cell, cell, deviations=(1.0,) * len(KNOBS), missed_v=0.03)
+    models = PhysicsModels({DECLARED: PhysicsStart(cell, cell), RECALIBRATED: missed}, RECALIBRATED)
+    assert models.carried(0.5).chosen.missed_v == 0.03
 
 
 def test_the_slope_is_that_of_the_declared_error_on_what_the_recalibration_takes_off():

@@ -11,7 +11,7 @@ from aesi.physics import Cell, simulate
 from aesi.pipeline.experiment.config import parse_experiment
 from aesi.pipeline.experiment.load import load
 from aesi.pipeline.experiment.physics_models import DECLARED, RECALIBRATED
-from aesi.pipeline.experiment.recalibrate import FitRecord, recalibrate
+from aesi.pipeline.experiment.recalibrate import MODEL_ERROR_V, SETTLED, FitRecord, recalibrate
 from aesi.pipeline.product.deviations import INITIAL_STATE
 from aesi.records import Measurement
 
@@ -73,8 +73,12 @@ def test_a_model_that_misses_40_mv_followed_them_as_far_as_one_that_misses_10():
     record = discharged("one", 0.0)
     missed_v = 0.04 * np.sin(record.measurement.time_s / 200.0)
     other = replace(record.measurement, voltage_v=record.measurement.voltage_v + missed_v)
-    found = recalibrate(CELL, (), {"one": replace(record, measurement=other)}, "linear")
+    off = replace(record, measurement=other)
+    found = recalibrate(CELL, (), {"one": off}, "linear")
     assert max(np.abs(found.deviations)) < 1.0
+    # What it says that the model misses is what it leaves, as far as this settles; at least 10 mV.
+    assert 1.0 <= left_v(found, off) / found.missed_v <= SETTLED
+    assert recalibrate(CELL, (), {"one": record}, "linear").missed_v == MODEL_ERROR_V
 
 
 def test_an_initial_state_that_is_fitted_alone_is_the_charge_of_all_records():

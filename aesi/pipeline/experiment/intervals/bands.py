@@ -32,7 +32,7 @@ class OutOfSampleErrors:
 
     records : their names; a record is here once for each part of it that was left out.
     by_horizon : s (WHOLE_DRIVE: from the first sample) -> V, NaN where there is no prediction, or a seen one.
-    current_a, soc : A and 1.  inside : True where the model had been trained on such inputs.
+    current_a, soc : A and 1.  inside : True where the model had been trained on such inputs, at such temperatures.
     excess : `FreeRun.excess` of each model.  spread : V, what the rows that each was fitted to leave open there.
     seen, root : what a model fitted to all training records has seen, and what they leave open (parameter_spread.py).
     reach : as by_horizon, `reach` of each prediction, V.
@@ -72,8 +72,8 @@ class OutOfSampleErrors:
             inside=[_inside(model, series, rows, train) for model, series, rows in pairs],
             excess=[run.excess for run in runs],
             spread=[_spread(train, series, rows) for _, series, rows in pairs],
-            seen=_seen(train),
-            root=_root(train),
+            seen=_seen(train, [np.ones(len(record), dtype=bool) for record in train]),
+            root=_root(train, train[0].missed_v),
             reach={h: [reach(model, series, h) for model, series, _ in pairs] for h in by_horizon},
         )
 
@@ -121,47 +121,58 @@ def error_of_free_run(series: ErrorSeries, run: FreeRun) -> Array:
 
 
 def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence[ErrorSeries]) -> BoolArray:
-    """(n,) True where the model had been trained on such inputs.
+    """(n,) True where the model had been trained at such temperatures, and on such inputs.
 
     The models behind left-out pieces share the scaling of the whole training set and cannot tell by themselves:
-    for a piece of a training record, the range is that of the training rows outside it. Physics extrapolates as it
-    does in use, and so does a correction that fades into it: all of their rows count.
+    for a piece of a training record, the range is that of the training rows outside it. Of inputs beyond it physics
+    makes what it does in use, and so does a correction that fades into it: all of their rows count there. At other
+    temperatures none does, of any model: a band adds there what the fitted rows cannot tell (`FreeRunBands.thermal`),
+    so an error there is not one of the calibrated width alone.
     """
-    faded = isinstance(model, SparseModel) and model.fade is not None
-    if faded or isinstance(model, Bare):
-        return np.ones(len(series), dtype=bool)
-    seen = [
-        record.inputs[_others(len(record), rows)] if record.name == series.name else record.inputs
+    others = [
+        _others(len(record), rows) if record.name == series.name else np.ones(len(record), dtype=bool)
         for record in train
     ]
-    low = np.min([rows.min(axis=0) for rows in seen if len(rows)], axis=0)
-    high = np.max([rows.max(axis=0) for rows in seen if len(rows)], axis=0)
-    return np.asarray(((series.inputs >= low) & (series.inputs <= high)).all(axis=1))
+    near = _seen(train, others).knows(series.degc_or_nan)
+    faded = isinstance(model, SparseModel) and model.fade is not None
+    if faded or isinstance(model, Bare):
+        return near
+    inputs = np.concatenate([record.inputs[kept] for record, kept in zip(train, others, strict=True)])
+    return near & ((series.inputs >= inputs.min(axis=0)) & (series.inputs <= inputs.max(axis=0))).all(axis=1)
 
 
-def _seen(train: Sequence[ErrorSeries]) -> Visited:
+def _seen(train: Sequence[ErrorSeries], rows: Sequence[BoolArray]) -> Visited:
+    """By those rows of each record."""
+    pairs = list(zip(train, rows, strict=True))
     return Visited.of(
-        np.concatenate([record.soc for record in train]),
-        np.concatenate([record.degc_or_nan for record in train]),
+        np.concatenate([record.soc[kept] for record, kept in pairs]),
+        np.concatenate([record.degc_or_nan[kept] for record, kept in pairs]),
     )
 
 
 def _root(
-    train: Sequence[ErrorSeries], left_out: ErrorSeries | None = None, rows: slice = WHOLE
+    train: Sequence[ErrorSeries],
+    missed_v: float | None,
+    left_out: ErrorSeries | None = None,
+    rows: slice = WHOLE,
 ) -> Array | None:
     """Of the knobs, by the training records without the given rows of one of them, where that is one; None without
-    slopes."""
+    slopes.
+
+    missed_v : what a fit to these rows allowed for; None where none was made, which would begin with the least."""
     slopes = []
     for record in train:
         if record.slopes_v is not None:
             held = left_out is not None and record.name == left_out.name
             slopes.append(record.slopes_v[_others(len(record), rows) if held else slice(None), : len(KNOBS)])
-    return covariance_root(slopes, train[0].dt_s / (MEMORY_S * MODEL_ERROR_V**2)) if slopes else None
+    error_v = MODEL_ERROR_V if missed_v is None else missed_v
+    return covariance_root(slopes, train[0].dt_s / (MEMORY_S * error_v**2)) if slopes else None
 
 
 def _spread(train: Sequence[ErrorSeries], series: ErrorSeries, rows: slice) -> Array:
-    """(n,) V along a record, by the slopes of the physics that is served, of a fit to the other rows; 0 without."""
-    root = _root(train, series, rows)
+    """(n,) V along a record, by the slopes of the physics that is served, of the fit to the other rows that the series
+    is under; 0 without."""
+    root = _root(train, series.missed_v, series, rows)
     slopes = next((each.slopes_v for each in train if each.name == series.name), series.slopes_v)
     return np.zeros(len(series)) if root is None or slopes is None else spread(slopes[:, : len(root)], root)
 
