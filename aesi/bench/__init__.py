@@ -34,7 +34,7 @@ def some_chosen(name: str, cases: Sequence[Chosen], names: Iterable[str]) -> Seq
     if not cases:
         there = ", ".join(dict.fromkeys(names))
         raise InputError(
-            f"no case of `aesi bench {name}` is left by these options, which without them runs all; for only=... there "
-            f"are: {there}."
+            f"no case of `aesi bench {name}` is left by these options; without them it runs all. "
+            f"For only=... there are: {there}."
         )
     return cases

@@ -21,8 +21,9 @@ Only rows inside the range that their model was trained on are counted: a model 
 drive extrapolates there, the final model does not. Outside the trained range the inputs are held at its edge, and the
 band is wider by as much as the prediction would move if the model were extrapolated (`SparseModel.reach`).
 
-No piece tells of temperatures that no fitted row had, so rows at such calibrate nothing, of any model. What is open of
-the activation energies there stands beside the calibrated width as an independent error (parameter_spread.py).
+No piece tells of temperatures that no fitted row had, so rows at such calibrate nothing, of any model, unless too few
+pieces are left without them. What is open of the activation energies there stands beside the calibrated width as an
+independent error (parameter_spread.py).
 
 Parts of a drive lie closer to what their models were fitted to than a drive that comes next, and whole drives may lie
 further away; both are left out, and calibrate together, since the scale tells how far each was.

@@ -12,7 +12,8 @@ class Intervals:
     """Prediction intervals of the residual, each made before its residual was seen.
 
     lower_v, upper_v : (n,) V, relative to the prediction (add the prediction to get the measured voltage's).
-    warm : (n,) False where the history was too short and the marginal interval of the calibration stands in.
+    warm : (n,) False where the interval is no calibrated one: of one step ahead, where the history was too short and
+    the marginal interval of the calibration stands in; of a free run, outside the trained range.
     """
 
     lower_v: Array

@@ -25,7 +25,8 @@ class ErrorSeries:
     physics : name -> (n,) V, what other physics models say of the same record, for comparison.
     temperature_degc : (n,) of the cell, where it was measured.
     slopes_v : (n, k) V, by how much a deviation of each parameter moves the physics model's voltage, where known.
-    missed_v : V, the error of the physics model that a fit of these parameters allowed for, where one was made.
+    missed_v : V, the error of the physics model that a recalibration allowed for, where one was made; it tells how much
+    rows leave open of the parameters, of the declared cell's too.
     The sparse model maps (error_v[k], inputs[k]) to error_v[k + 1]; records are never joined across a gap.
     """
 

@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import typer
 
 from aesi.errors import InputError
-from aesi.pipeline.written import batch_files
+from aesi.pipeline.written import SUMMARY_TABLE, batch_files
 from flows.commands import options, outputs
 
 
@@ -67,4 +67,4 @@ def batch(
         health,
     )
     if all(row["status"] == "failed" for row in rows):
-        raise InputError(f"no cell of {source} could be used; {out / 'summary.csv'} says why.")
+        raise InputError(f"no cell of {source} could be used; {out / SUMMARY_TABLE} says why.")

@@ -65,9 +65,9 @@ def _pair(option: str) -> tuple[str, object]:
     if not equals:
         raise InputError(f"--set {option}: has to read key=value.")
     try:
-        return key, json.loads(text)
+        return key.strip(), json.loads(text)
     except json.JSONDecodeError:
-        return key, text
+        return key.strip(), text
 
 
 def _plain(name: str, line: dict[str, object]) -> str:

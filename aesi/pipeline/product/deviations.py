@@ -81,8 +81,8 @@ RESISTOR = (1,)
 class PhysicsStart:
     """A cell and its effects; `shift` is added to every record's state of charge at the start, by the declared cell.
 
-    deviations : of the knobs that were free, where the fit ended.  missed_v : V, the error of the model that the fit
-    allowed for; None where nothing was fitted.
+    deviations : of the knobs that were free, where the fit ended.  missed_v : V, the error of the model that a
+    recalibration allowed for; None of physics that is not from one.
     """
 
     declared: Cell

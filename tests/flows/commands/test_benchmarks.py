@@ -55,7 +55,7 @@ def test_an_option_that_a_benchmark_cannot_take_is_refused_before_it_runs(name, 
 
 
 def test_a_name_that_looks_like_a_number_is_a_name():
-    with pytest.raises(InputError, match=r"for only=\.\.\. there are: "):  # no set and no record is called so
+    with pytest.raises(InputError, match=r"For only=\.\.\. there are: "):  # no set and no record is called so
         next(benchmarks.run("cells", only=18650))
 
 

@@ -111,7 +111,7 @@ def test_killed_when_the_last_item_is_delivered(killed, aesi, arguments, tracked
 
 @pytest.mark.slow
 def test_killed_after_the_model_was_registered(killed, aesi, arguments, tracked):
-    with_model = [*arguments(), "--set", "tracking.log_model=true"]
+    with_model = [word.replace("log_model=false", "log_model=true") for word in arguments()]
     killed("flows.tracking.serving.logged_model", "_register", 1, with_model)
     resume(aesi, with_model)
     client = Store(f"sqlite:///{tracked}/mlflow.db").client

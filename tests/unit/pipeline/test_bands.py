@@ -119,5 +119,9 @@ def test_rows_hotter_than_those_of_the_fit_calibrate_no_band(drive, model) -> No
     alone = OutOfSampleErrors.of([(model, hot, every), (model, warm, every)], (warm, hot), (10.0,))
     np.testing.assert_array_equal(alone.inside[0], hot.temperature_degc <= 30.0)
     np.testing.assert_array_equal(alone.inside[1], warm.temperature_degc >= 26.0)
+    # Where a search leaves out a whole record, its samples begin with the first that is predicted.
+    colder = replace(hot, name="colder", temperature_degc=np.linspace(0.0, 10.0, N))
+    predicted = OutOfSampleErrors.of([(model, colder, slice(1, N))], (warm, colder), (10.0,))
+    assert not predicted.inside[0].any()
     unmeasured = replace(hot, temperature_degc=None)
     assert OutOfSampleErrors.of([(model, unmeasured, every)], (warm, unmeasured), (10.0,)).inside[0].all()

@@ -129,10 +129,14 @@ def _inside(model: ErrorModel, series: ErrorSeries, rows: slice, train: Sequence
     temperatures none does, of any model: a band adds there what the fitted rows cannot tell (`FreeRunBands.thermal`),
     so an error there is not one of the calibrated width alone.
     """
+    # The first sample of a record is predicted by none: it is left out with the one after it.
+    held = slice(0, rows.stop) if rows.start == 1 else rows
     others = [
-        _others(len(record), rows) if record.name == series.name else np.ones(len(record), dtype=bool)
+        _others(len(record), held) if record.name == series.name else np.ones(len(record), dtype=bool)
         for record in train
     ]
+    if not any(kept.any() for kept in others):  # of physics that was fitted to nothing
+        return np.ones(len(series), dtype=bool)
     near = _seen(train, others).knows(series.degc_or_nan)
     faded = isinstance(model, SparseModel) and model.fade is not None
     if faded or isinstance(model, Bare):
