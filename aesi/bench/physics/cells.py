@@ -142,9 +142,9 @@ def run(
 def _chosen(only: Sequence[str], there: Sequence[MeasuredRecord]) -> list[MeasuredRecord]:
     """The records of the named sets or names, each of which has to be one; all where none is given."""
     names = [name for record in there for name in (record.data, record.name)]
-    by_name = {one: [record for record in there if one in (record.data, record.name)] for one in only}
-    wanted = [record for found in by_name.values() for record in some_chosen("cells", found, names)]
-    return [record for record in there if record in wanted or not only]
+    for one in only:
+        some_chosen("cells", [name for name in names if name == one], names)
+    return [record for record in there if not only or record.data in only or record.name in only]
 
 
 def best(row: dict[str, Any]) -> float:

@@ -122,9 +122,10 @@ def chosen(
     cases : the first so many.  only : a group, or a substring of names.  development : only those that choose, or only
     those that do not.  every : take each n-th.  Raises InputError where none is left.
     """
-    found = [c for c in plan(archive) if only is None or only == c.group or only in c.name]
+    planned = plan(archive)
+    found = [c for c in planned if only is None or only == c.group or only in c.name]
     found = [c for c in found if development is None or c.development == development]
-    return some_chosen("real", found[::every][:cases], (case.group for case in plan(archive)))
+    return some_chosen("real", found[::every][:cases], (case.group for case in planned))
 
 
 def _stop(file: str) -> float | None:
