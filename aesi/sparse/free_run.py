@@ -132,11 +132,12 @@ def remember_ahead(given: Array, memory: float, measured: Array, steps: int) -> 
     return np.asarray(given + memory ** (samples - known) * left[known])
 
 
-def held(scaled: Array) -> tuple[Array, int]:
-    """The series with its last value inside LIMIT held from the first beyond it; and where that is, or -1."""
+def held(scaled: Array, start: float) -> tuple[Array, int]:
+    """The series, which comes after `start`, with its last value inside LIMIT held from the first beyond it; and where
+    that is, or -1."""
     beyond = np.flatnonzero(~(np.abs(scaled) <= LIMIT))
     if not len(beyond):
         return scaled, -1
     first = int(beyond[0])
-    last = scaled[first - 1] if first else 0.0
+    last = scaled[first - 1] if first else start
     return np.append(scaled[:first], np.full(len(scaled) - first, last)), first

@@ -57,6 +57,14 @@ def test_divergence_is_found_and_held():
     assert run.outside[5]
 
 
+@pytest.mark.parametrize("feedback", [0.0, 5.0])
+def test_a_divergence_at_the_first_step_holds_the_error_that_the_run_began_with(feedback):
+    model = linear(feedback, 1.0, outside="extrapolate")
+    run = model.free_run(record([0.7, 0, 0, 0], [20.0, 20.0, 0.0, 0.0]))
+    assert run.diverged_at == 1
+    np.testing.assert_allclose(run.error_v, 0.7)
+
+
 def test_clipping_bounds_an_unstable_map():
     run = linear(1.5, 0.0).free_run(record([0.9] + [0] * 50, [0.0] * 51))
     assert run.diverged_at is None
