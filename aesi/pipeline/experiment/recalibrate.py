@@ -38,7 +38,7 @@ import numpy as np
 
 from aesi.calibration.ageing import LOSS_SD
 from aesi.errors import AesiError
-from aesi.numerics.bounded import descend
+from aesi.numerics.bounded import descend, slope_within
 from aesi.numerics.typing import Array, BoolArray
 from aesi.physics import ActiveEffect, Cell, ModelName
 from aesi.pipeline.product.deviations import (
@@ -168,16 +168,12 @@ class _Fit:
     def slopes(self, z: Array, residual: Array) -> Array | None:
         """(m + n_free, n_free) of the residual."""
         left = residual[: -len(z)]
-        _, high = self.bounds()
         slopes = np.empty((len(left), len(z)))
-        for j in range(len(z)):
-            step = STEP if z[j] + STEP <= high[j] else -STEP
-            moved = z.copy()
-            moved[j] += step
-            there = self._left(moved)
-            if there is None:
+        for j, bounds in enumerate(zip(*self.bounds(), strict=True)):
+            slope = slope_within(self._left, z, left, j, bounds, STEP)
+            if slope is None:
                 return None
-            slopes[:, j] = (there - left) / step
+            slopes[:, j] = slope
         return np.vstack([slopes, np.eye(len(z))])
 
     def _left(self, z: Array) -> Array | None:
