@@ -246,16 +246,7 @@ class SparseModel:
                 for mine in (self.library.feedbacks == q for q in self._functions)
             ]
         )
-        return (
-            drive
-            if self.fade is None
-            else self._zero + self._weight(variables, series) * (drive - self._zero)
-        )
-
-    @property
-    def _zero(self) -> float:
-        """The scaled error at which the physics is exact."""
-        return float(self.scaling.error_to_scaled(np.array(0.0)))
+        return drive if self.fade is None else self._weight(variables, series) * drive
 
     def _weight(self, variables: Array, series: ErrorSeries) -> Array:
         """(n,) what is left of the correction."""

@@ -79,12 +79,11 @@ class FoldRuns:
         """How one of the three did over all pieces."""
         run = self.free_run if problem.options.regime == "free_run" else self.one_step
         truth = problem.unseen_target
-        bare = truth - problem.zero
         with np.errstate(invalid="ignore"):
             runs = (run, self.from_none) if problem.options.regime == "free_run" else (run,)
             squares = [problem.row_weights @ (truth - each[:, column]) ** 2 for each in runs]
-            loss = float(np.mean(squares) / (problem.row_weights @ bare**2))
-            loss_free = mse(truth, self.free_run[:, column]) / float(np.mean(bare**2))
+            loss = float(np.mean(squares) / (problem.row_weights @ truth**2))
+            loss_free = mse(truth, self.free_run[:, column]) / float(np.mean(truth**2))
             loss_step = mse(truth, self.one_step[:, column])
         return Judged(
             loss,
@@ -119,7 +118,7 @@ def fold_runs(
 
 
 def _sums(problem: Problem, given: Array) -> Array:
-    error = problem.unseen_target[:, None] - problem.zero
+    error = problem.unseen_target[:, None]
     with np.errstate(invalid="ignore", over="ignore"):
         products = np.stack([np.broadcast_to(error**2, given.shape), error * given, given**2], axis=-1)
         return np.stack([products[a:b].sum(axis=0) for a, b in problem.folds], axis=1)

@@ -127,7 +127,7 @@ class Problem(TrainingRows, Factors):
         if not refits_physics_per_fold(drives, options.feedback, len(left_out), len(folds)):
             left_out = ()
         unseen = unseen_errors(left_out, rows.scaling, rows.error, rows.target, folds)
-        row_weights = balanced_weights(rows.spans, rows.target - rows.zero) if options.balance else np.ones(n)
+        row_weights = balanced_weights(rows.spans, rows.target) if options.balance else np.ones(n)
         counts = moving_block_weights(
             rows.spans, block, options.resamples, np.random.default_rng(options.seed)
         )
