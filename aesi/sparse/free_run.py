@@ -11,7 +11,7 @@ import numpy as np
 
 from aesi.numerics.compiled import kept_njit
 from aesi.numerics.typing import Array, BoolArray, IntArray
-from aesi.sparse.terms.basis import FUNCTIONS, clipped_values, slope, value
+from aesi.sparse.terms.basis import FUNCTIONS, clipped_values, value
 
 LIMIT = 10.0
 """A prediction beyond this many times the trained half-range counts as diverged."""
@@ -98,20 +98,6 @@ def ahead(drive: Array, functions: IntArray, measured: Array, steps: int, clip: 
                 break
             x = following
         out[k] = x
-    return out
-
-
-@kept_njit()
-def gains(drive: Array, functions: IntArray, measured: Array, clip: bool) -> Array:
-    """(n,) the slope of e'[k] -> e'[k + 1] at each measured error; above one the map amplifies."""
-    n = drive.shape[1]
-    out = np.zeros(n)
-    for k in range(n):
-        x = measured[k]
-        if clip and abs(x) > 1.0:
-            continue
-        for q in range(len(functions)):
-            out[k] += slope(functions[q], x) * drive[q, k]
     return out
 
 

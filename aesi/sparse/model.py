@@ -136,14 +136,6 @@ class SparseModel:
             return np.ones(len(series))
         return self.fade.kept(*self._place(self._variables(series), series))
 
-    def gain(self, series: ErrorSeries) -> Array:
-        """(n,) slope of the map e[k] -> e[k + 1] along a record; stable where its size is below one."""
-        if not self.has_feedback:
-            return np.full(len(series), self.memory)
-        drive = self._drive(self._variables(series), series)
-        measured = self.scaling.error_to_scaled(series.error_v)
-        return free_run.gains(drive, self._functions, measured, self._clip)
-
     def to_dict(self) -> dict[str, Any]:
         """Plain values, and an array in the leverage; the terms by their factors (variable, function) and, to be read,
         by name."""

@@ -91,18 +91,6 @@ def test_tan_past_its_pole_is_a_divergence_not_a_nan():
     assert run.diverged_at == 2
 
 
-def test_gain_is_the_slope_of_the_map():
-    series = make_record(60)
-    term = Library(("e", "I"), (Term(((0, 11), (1, 1))), Term(((0, 1),))))
-    scaling = Scaling(np.array([-0.05, -30.0]), np.array([0.05, 30.0]))
-    model = SparseModel("g", term, np.array([0.4, 0.3]), scaling, 1.0)
-    shift = 1e-7
-    moved = ErrorSeries(**{**series.__dict__, "error_v": series.error_v + shift})
-    central = (model.one_step(moved) - model.one_step(series))[1:] / shift
-    np.testing.assert_allclose(model.gain(series)[:-1], central, atol=1e-6)
-    assert linear(0.0, 0.1, 0.9).gain(series).tolist() == [0.9] * 60
-
-
 def test_json_round_trip():
     model = linear(0.5, 0.1)
     again = SparseModel.from_dict(json.loads(json.dumps(model.to_dict())))
