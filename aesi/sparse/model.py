@@ -210,9 +210,7 @@ class SparseModel:
                 drive[:, :-1], self._functions, scaled0, self._clip, free_run.LIMIT
             )
         else:
-            scaled, diverged = free_run.held(
-                free_run.remember(drive[0, :-1], self.memory, scaled0), scaled0
-            )
+            scaled, diverged = free_run.held(free_run.remember(drive[0, :-1], self.memory, scaled0), scaled0)
         return np.append(start, self.scaling.error_to_volts(scaled)), diverged
 
     def _ahead(self, drive: Array, error_v: Array, steps: int) -> Array:

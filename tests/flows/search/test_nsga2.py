@@ -120,7 +120,9 @@ def test_the_front_is_not_dominated_and_the_pick_lies_on_it(problem):
     assert best in front
 
     def score(trial):
-        return 1 - 0.3 * trial.losses[0] - 0.6 * trial.losses[1] - 0.1 * trial.losses[2] / len(problem.library)
+        return (
+            1 - 0.3 * trial.losses[0] - 0.6 * trial.losses[1] - 0.1 * trial.losses[2] / len(problem.library)
+        )
 
     assert score(best) == pytest.approx(max(score(trial) for trial in front))
 

@@ -34,7 +34,9 @@ def problem(left) -> Problem:
 
 
 def test_physics_of_too_few_folds_was_passed_over_in_silence():
-    with pytest.raises(DataError, match="without 2 parts of the training records, but the search leaves out 3"):
+    with pytest.raises(
+        DataError, match="without 2 parts of the training records, but the search leaves out 3"
+    ):
         problem(left_out()[:2])
 
 
