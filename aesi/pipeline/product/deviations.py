@@ -74,9 +74,9 @@ FILMS = tuple(FileParameter(FILM, side, STEP, True, FILM_ENERGY_SD) for side in 
 ENERGIES_J_MOL = np.array([prior.energy_j_mol / prior.prior_sd for prior in (*PRIORS, *FILMS)])
 """(n_slopes,) deviation of each activation energy over that of the logarithm of its rate; 0 where there is none."""
 ALL = tuple(range(len(PRIORS)))
-"""Places in PRIORS of what a fit moves: everything, the state of charge at the start alone, the contact alone."""
 INITIAL_STATE = (0,)
 RESISTOR = (1,)
+"""Places in PRIORS of what a fit moves: everything, the state of charge at the start alone, the contact alone."""
 
 
 @dataclass(frozen=True)
