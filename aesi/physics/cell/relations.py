@@ -123,22 +123,7 @@ class Product:
         return self.first(x) * self.second(x)
 
 
-@dataclass(frozen=True)
-class PowerSeries:
-    """c0 + c1 x + c2 x**2 + ..."""
-
-    coefficients: tuple[float, ...]
-
-    def __call__(self, x: Array) -> Array:
-        """(n,) the polynomial at x."""
-        x = np.asarray(x, dtype=float)
-        out = np.full_like(x, self.coefficients[-1])
-        for c in self.coefficients[-2::-1]:
-            out = out * x + c
-        return out
-
-
-Relation = Constant | Expression | LookupTable | PowerSeries | Scaled | Sum | Product
+Relation = Constant | Expression | LookupTable | Scaled | Sum | Product
 
 
 def scaled(relation: Relation, factor: float) -> Relation:
@@ -212,8 +197,6 @@ def _as_text(item: Relation) -> str | None:
             return f"({text})"
         case LookupTable():
             return None
-        case PowerSeries(coefficients):
-            return "(" + " + ".join(f"({c!r}) * x ** {k}" for k, c in enumerate(coefficients)) + ")"
         case Scaled(base, factor):
             inner = _as_text(base)
             return None if inner is None else f"({factor!r} * {inner})"
@@ -250,7 +233,5 @@ def tabulated(item: Relation, low: float, high: float, points: int) -> Array:
             return tabulated(first, low, high, points) + tabulated(second, low, high, points)
         case Product(first, second):
             return tabulated(first, low, high, points) * tabulated(second, low, high, points)
-        case PowerSeries():
-            return item(_grid(low, high, points))
         case _:
             return _leaf_values(item, low, high, points)
