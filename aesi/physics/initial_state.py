@@ -26,7 +26,7 @@ from aesi.physics.balance import same_rest
 from aesi.physics.cell import Cell
 from aesi.physics.effect import ActiveEffect
 from aesi.physics.rest.open_circuit import CHARGED_V, GIVEN_SD, READING_V, OpenCircuit
-from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments
+from aesi.physics.rest.voltage import first_rows_v, freed_of_instruments, freed_of_series
 from aesi.physics.simulation import ModelName, model_with
 from aesi.physics.start.load import FLOWED_S, LoadedStart
 from aesi.physics.start.relaxing import Rest, resting_rows, settled_voltage
@@ -150,7 +150,7 @@ class _Start:
         if self.open_circuit.charged(read):
             return self._full(read, f"rests at {begins:.3f} V", begins)
         voltage, sd_v = settled_voltage(self.open_circuit, rest.rows, self.model_name)
-        true = freed_of_instruments(self.model, self.effects, voltage)
+        true = self._freed_of_series(freed_of_instruments(self.model, self.effects, voltage))
         moved = rest.rows.charge_ah / capacity_ah  # before it, the cell was as much fuller and higher
         higher_v = self._rise_v(true, moved)
         unlike = [READING_V, sd_v, *([self._long_drop_v(rest, true), higher_v] if rest.flows else ())]
@@ -187,9 +187,10 @@ class _Start:
         return self.load.drop(true_v, float(rest.rows.current_a.mean()), FLOWED_S[-1])
 
     def _under_load(self) -> InitialState:
-        first = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
+        terminal = freed_of_instruments(self.model, self.effects, float(self.record.voltage_v[0]))
+        first = self._freed_of_series(terminal, self.current_a)
         drops = [self.load.drop(first, self.current_a, before_s) for before_s in FLOWED_S]
-        begun = first + drops[0]
+        begun = terminal + drops[0]
         said = f"starts under {self.current_a:.3g} A at {self.record.voltage_v[0]:.3f} V"
         if self.open_circuit.charged(begun, drops[0]):
             words = (
@@ -204,9 +205,13 @@ class _Start:
         )
         return InitialState(self._declared(soc), sd, "load", words)
 
+    def _freed_of_series(self, terminal_v: float, current_a: float = 0.0) -> float:
+        return freed_of_series(self.open_circuit, self.model, self.effects, terminal_v, current_a)
+
     def _full(self, true_v: float, how: str, rest_v: float | None, drop_v: float = 0.0) -> InitialState:
-        """drop_v : of `true_v`, what the model adds to the voltage as it was read."""
-        inside, sd = self.open_circuit.soc_at(true_v), self.open_circuit.full_sd(true_v)
+        """true_v : at the terminals.  drop_v : of it, what the model adds to the voltage as it was read."""
+        ocv_v = self._freed_of_series(true_v)
+        inside, sd = self.open_circuit.soc_at(ocv_v), self.open_circuit.full_sd(ocv_v)
         above_v = true_v - self.cell.upper_voltage_v
         near = f"within {1e3 * CHARGED_V:.0f} mV of"
         doubt = ""
