@@ -260,16 +260,16 @@ def _straight(item: Relation) -> bool:
 def _as_text(item: Relation) -> str | None:
     match item:
         case Constant(value):
-            return f"{value!r}"
+            return f"{float(value)!r}"
         case Expression(text):
             return f"({text})"
         case LookupTable():
             return None
         case PowerSeries(coefficients):
-            return "(" + " + ".join(f"({c!r}) * x ** {k}" for k, c in enumerate(coefficients)) + ")"
+            return "(" + " + ".join(f"({float(c)!r}) * x ** {k}" for k, c in enumerate(coefficients)) + ")"
         case Scaled(base, factor):
             inner = _as_text(base)
-            return None if inner is None else f"({factor!r} * {inner})"
+            return None if inner is None else f"({float(factor)!r} * {inner})"
         case Sum(first, second):
             return _joined(first, " + ", second)
         case Product(first, second):

@@ -48,6 +48,7 @@ def test_a_factor_of_one_changes_nothing_and_factors_join():
         Expression("exp(x) - 2"),
         TABLE,
         Scaled(Expression("x ** 2"), 0.3),
+        Scaled(Expression("x ** 2"), np.float64(0.3)),
         Sum(Expression("x"), PowerSeries((0.1, -0.2))),
         Product(Expression("x"), TABLE),
     ],
